@@ -137,7 +137,7 @@ enum Command {
     Remesh {
         /// Output folder of the run.
         folder: PathBuf,
-        /// The wanted error of the stress, relative to its norm.
+        /// Target error of the stress, relative to the norm of the stress.
         #[arg(long, value_name = "SHARE")]
         error: f64,
         /// The file to write: a Gmsh view (.pos) or mesh with sizes at its nodes (.msh).
@@ -164,8 +164,8 @@ struct RunArguments {
     /// Override a key of every job: time.step=0.01, contact.0.quadrature=gauss.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Continue from the newest intact checkpoint of the output folder, or from this file. Of several jobs, those whose results
-    /// are complete are passed over.
+    /// Continue from the newest intact checkpoint of the output folder, or from this file. With several jobs, those whose
+    /// results are complete are skipped.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
     restart: Option<Option<PathBuf>>,
     /// Print errors only; run.log has the rest.
@@ -456,8 +456,8 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
         return Err(Error::Refused(words));
     }
     if arguments.jobs.len() > 1 && matches!(from, Start::From(_)) {
-        let words = "a checkpoint continues one job; --restart without a file continues several jobs with the first one that is \
-                     not complete";
+        let words = "--restart FILE continues a single job; to continue several jobs from the first one that is not complete, \
+                     write --restart without a file";
         return Err(Error::Refused(words.into()));
     }
     in_session(|session, clock| {
@@ -487,7 +487,7 @@ fn stages(stages: Vec<Loaded>) -> Result<Vec<Loaded>> {
                 let help = "give all stages the same options, or run them separately";
                 return Err(later.fault(
                     "solver.petsc",
-                    "options of PETSc of an earlier stage apply here too",
+                    "the PETSc options of an earlier stage remain set in this stage",
                     help,
                 ));
             }

@@ -85,7 +85,7 @@ fn insert(node: &mut Node, parts: &[&str], value: Node, key: &Place) -> Result<(
                 }
                 _ => {
                     let message = format!("this list has no entry `{part}`");
-                    let help = format!("it has {count}, counted from 0; {count} adds another");
+                    let help = format!("the list has {count}, numbered from 0; index {count} adds another");
                     Err(Fault::new(key.clone(), message, "").help(help))
                 }
             }

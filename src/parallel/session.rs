@@ -92,7 +92,7 @@ impl Session {
     pub fn in_group<T>(&self, group: usize, work: impl FnOnce(&Session) -> T) -> Result<T> {
         let color = Color::with_value(i32::try_from(group).unwrap_or(i32::MAX));
         let ranks = self.world.split_by_color(color);
-        let none = || Error::Internal("MPI made no group of ranks".into());
+        let none = || Error::Internal("MPI could not create a group of ranks".into());
         let world = World(Rc::new(self.agree(ranks.ok_or_else(none))?));
         let session = Session { world, petsc: self.petsc.clone(), signal: Arc::clone(&self.signal) };
         Ok(within(&session.world, || work(&session)))

@@ -49,14 +49,14 @@ pub fn remesh(folder: &Path, wanted: f64, output: &Path) -> Result<Written> {
         Some("msh") => mesh_with_sizes,
         _ => {
             return Err(Error::Refused(format!(
-                "{}: sizes are a Gmsh view or mesh; give a file that ends in .pos or .msh",
+                "{}: cell sizes are written as a Gmsh view or mesh; give a file that ends in .pos or .msh",
                 output.display()
             )));
         }
     };
     if !(wanted > 0.0 && wanted < 1.0) {
         return Err(Error::Refused(format!(
-            "the wanted error is {wanted}; give one between 0 and 1, such as 0.05"
+            "the target error is {wanted}; give a number between 0 and 1, such as 0.05"
         )));
     }
     let path = folder.join("fields.vtkhdf");

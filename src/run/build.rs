@@ -107,8 +107,8 @@ fn refuse_remaining_mass<const D: usize, const S: usize>(job: &Job, body: &Body<
     let keeps_mass = body.redistributed_mass.as_ref().and_then(|mass| mass.keeps_mass);
     let Some(cell) = keeps_mass.filter(|_| job.time.scheme.is_midpoint()) else { return Ok(()) };
     Err(Error::Refused(format!(
-        "scheme \"{}\": all nodes of the cell with a corner at {:?} m are on contact boundaries, so that they keep their mass; use another \
-         mesh there (in a rectangle another `diagonal`), or scheme \"bdf2\"",
+        "scheme \"{}\" requires contact nodes without mass, but all nodes of the cell with a corner at {:?} m are on contact boundaries \
+         and keep their mass; use another mesh there (in a rectangle another `diagonal`), or scheme \"bdf2\"",
         job.time.scheme.name(),
         body.mesh.corners(cell)[0]
     )))
@@ -293,9 +293,9 @@ fn refuse_moving_contact<const D: usize>(
         let is_nodal = contact.quadrature == Quadrature::Nodal;
         if motion.moves(node, &point.normal) && (free || !is_nodal) {
             let remedy =
-                if is_nodal { "hold all components there, or none" } else { "use quadrature = \"nodal\"" };
+                if is_nodal { "fix all components there, or none" } else { "use quadrature = \"nodal\"" };
             return Err(Error::Refused(format!(
-                "contact at {place:?} m: a support moves a component there that is not along the boundary; {remedy}"
+                "contact at {place:?} m: a support moves this point in a direction that is not tangential to the boundary; {remedy}"
             )));
         }
         let (frame, count) = held.frame(node);
@@ -303,7 +303,7 @@ fn refuse_moving_contact<const D: usize>(
         if contact.friction.is_some() && slides && count > usize::from(free) {
             return Err(Error::Refused(format!(
                 "friction at {place:?} m: a support moves one tangential component there and leaves another free, and friction \
-                 depends on both; hold all components there, or none"
+                 depends on both; fix all components there, or none"
             )));
         }
     }

@@ -147,7 +147,7 @@ fn advice(scheme: &str, bound: Option<f64>, motion: Motion) -> [String; 2] {
     };
     let suits = match motion {
         Motion::Impacts => {
-            "contact may close in an impact: midpoint with [[contact]] redistribute_mass = true keeps the energy, implicit_euler damps \
+            "contact may close in an impact: midpoint with [[contact]] redistribute_mass = true conserves the energy, implicit_euler damps \
              it; bdf2 suits bodies that touch from the start and move smoothly"
         }
         Motion::Inertia => {

@@ -84,7 +84,7 @@ impl Deadline {
             log.warning(format!("{SLURM_END} is {over:.0} s in the past and is ignored"));
         } else if slurm.is_finite() {
             log.line(format!(
-                "limit      the Slurm job ends in {slurm:.0} s; the run stops a step, a checkpoint and {margin:.0} s before"
+                "limit      the Slurm job ends in {slurm:.0} s; the run stops one step, one checkpoint and {margin:.0} s earlier"
             ));
         }
     }

@@ -66,7 +66,7 @@ fn refuse_unfinished(folder: &Path) -> Result<()> {
         _ => "did not finish",
     };
     Err(Error::Refused(format!(
-        "{}: the folder holds a run that {what}, saved up to step {newest} ({}); continue from there with --restart, or start again and lose it with --force",
+        "{}: the folder holds a run that {what}, saved up to step {newest} ({}); continue it with --restart, or discard it and start again with --force",
         folder.display(),
         file.display()
     )))
@@ -84,7 +84,7 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     let remedy = if is_restart {
         "choose another [output] folder, or restore the keys"
     } else {
-        "choose another [output] folder, or overwrite them with --force"
+        "choose another [output] folder, or overwrite the files with --force"
     };
     let refuse = |what: String| Err(Error::Refused(format!("{}: {what}; {remedy}", folder.display())));
     let text = std::fs::read_to_string(&file).map_err(|error| Error::unreadable(&file, error))?;

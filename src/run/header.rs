@@ -92,7 +92,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
     }
     if let Some(guesses) = summary.guesses {
         log.line(format!(
-            "guesses    {} of {} steps have several solutions, at most {} were found",
+            "guesses    several solutions in {} of {} steps, at most {} in one step",
             guesses.steps_with_several, guesses.steps, guesses.most_solutions
         ));
     }

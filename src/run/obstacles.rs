@@ -34,7 +34,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         let on = table.on.join(", ");
         if deepest > TOO_DEEP * size {
             out.push(format!(
-                "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject it; correct the gap, the obstacle or [initial] displacement",
+                "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject the body; correct the gap, the obstacle or [initial] displacement",
                 100.0 * deepest / size
             ));
         }
@@ -48,7 +48,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 _ => "reverse the plane's `normal`: it must point out of the obstacle toward the body",
             };
             out.push(format!(
-                "contact.{number}: the body lies behind its obstacle, so that the boundary {on} touches nothing; {remedy}"
+                "contact.{number}: the body lies behind its obstacle, so that the boundary {on} can never touch it; {remedy}"
             ));
         }
     }

@@ -82,7 +82,7 @@ pub(super) fn transfer<const D: usize, const S: usize>(
     let fault = |words: String, help: &str| loaded.fault("initial.from", words, help);
     let is_folder = session.total(usize::from(session.is_first() && from.is_dir())) > 0;
     let file = if is_folder {
-        let help = "add a [checkpoint] table to the job that wrote it: it then saves its last state";
+        let help = "add a [checkpoint] table to the job of that folder, so that its last state is saved";
         let none = || fault(format!("{} holds no checkpoint", from.display()), help);
         let newest = newest(session, from)?.into_iter().next();
         session.agree(newest.ok_or_else(none))?
@@ -105,7 +105,7 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         state.velocity.update_ghosts()?;
     }
     let mut words = format!("starting from {} (step {}, t = {} s)", file.display(), found.step, found.time);
-    for (what, names) in [("dropped", &found.dropped), ("at rest", &found.at_rest)] {
+    for (what, names) in [("dropped", &found.dropped), ("initial values", &found.at_rest)] {
         if !names.is_empty() {
             words += &format!("; {what}: {}", names.join(", "));
         }

@@ -98,9 +98,9 @@ pub(super) fn warnings(job: &Job) -> Vec<String> {
     let dense = |found: TimeDependent<'_>| {
         let within = kinks(job, found.value).err()?;
         Some(format!(
-            "{}: {within} kinks of a table lie within steps of {length} s, more than {MOST_KINKS} and more than one in \
-             {STEPS_A_KINK} steps: steps take the values of the table at their own ends; choose a step that divides its \
-             intervals, or list the important times in [time] land_on",
+            "{}: {within} kinks of a table lie within steps of {length} s (more than {MOST_KINKS}, and more than one in \
+             {STEPS_A_KINK} steps): the steps do not end at these kinks and use only the values of the table at their own ends; \
+             choose a step that divides the intervals of the table, or list the important times in [time] land_on",
             found.key
         ))
     };

@@ -126,8 +126,8 @@ impl Summary {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
             format!(
-                "the contact pressure reached {most:.4e} Pa, beyond the {bound:.4e} Pa up to which steps with friction that weakens are \
-                 known to have one solution; a smaller [time] step raises that bound"
+                "the contact pressure reached {most:.4e} Pa, but with weakening friction a step is certain to have one solution only up \
+                 to {bound:.4e} Pa; a smaller [time] step raises this bound"
             )
         });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {

@@ -166,7 +166,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         match self.certificates.theta_step {
             Some(theta) if !self.certificates.steps_are_unique() && error.is_failure() => {
                 Err(Error::Failed(format!(
-                    "{error}; theta of a step = {theta:.3e} is not below 1 by a margin, which the job accepts: a step may have several solutions, none of which continues the previous step"
+                    "{error}; theta of a step = {theta:.3e} is not safely below 1, which the job accepts: the step may have several solutions, and none of them may be close to the previous step"
                 )))
             }
             _ => Err(error.into()),

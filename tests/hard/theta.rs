@@ -59,7 +59,7 @@ fn what_is_found_beyond_one_is_a_solution_and_others_are_told() {
         println!("theta {theta}: {solutions} solutions found");
         if theta > 1.0 {
             assert_eq!(solutions, 3, "theta {theta}: a rising, the falling and a rising branch");
-            outcome.says("5 of 5 steps have several solutions, at most 3 were found");
+            outcome.says("several solutions in 5 of 5 steps, at most 3 in one step");
         }
     }
 }

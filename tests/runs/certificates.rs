@@ -110,9 +110,10 @@ fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law(
         );
         let words = unbounded["certificates"]["not_covered"][1].as_str().expect("words").to_owned();
         assert!(
-            words.contains("the friction traction falls by 4.0000 Pa s/m for each Pa")
+            words.contains("with the sliding velocity by up to 4.0000 Pa s/m for each Pa")
                 && words.contains("theta of a step is 4.7")
-                && words.contains("e-4 for each Pa, so that for given pressures up to 2.12"),
+                && words.contains("e-4 for each Pa, so that each step has one solution")
+                && words.contains("for given contact pressures up to 2.12"),
             "{words}"
         );
         // A foundation whose pressure never exceeds 500 Pa.

@@ -79,8 +79,8 @@ fn the_report_shows_the_indicator_and_its_total() {
     let case = square().run_and_keep(1);
     let html = std::fs::read_to_string(report(&case.folder().join("out"))).expect("page");
     let total = case.results().number("error_indicator");
-    assert!(html.contains("Of all cells together: 0.0"), "no total");
-    let words = html.split("Of all cells together: ").nth(1).expect("total");
+    assert!(html.contains("All cells together: 0.0"), "no total");
+    let words = html.split("All cells together: ").nth(1).expect("total");
     let shown: f64 = words.split(' ').next().expect("a number").parse().expect("a number");
     assert!((shown / total - 1.0).abs() < 1e-4, "{shown} {total}");
     assert!(html.contains("id=\"error_indicator\"") && html.contains("error indicator / √(J/m)"));
@@ -129,5 +129,5 @@ fn sizes_need_the_indicator_a_share_and_a_view() {
     };
     refused("0.05", "sizes.pos", "add `error_indicator = true` to [output]");
     refused("0.05", "sizes.txt", "give a file that ends in .pos or .msh");
-    refused("5", "sizes.pos", "the wanted error is 5");
+    refused("5", "sizes.pos", "the target error is 5");
 }

@@ -66,7 +66,7 @@ fn what_a_stage_lacks_is_dropped_and_what_it_adds_starts_at_rest() {
         .without("material.viscoplasticity")
         .set("material.damage", "{ threshold = 1.0, viscosity = 1.0, largest = 0.5 }")
         .set("traction.0.value", "[0.0, 0.0]");
-    second.run_with(2, &[]).expect(0).says("dropped: viscoplastic_history").says("at rest: damage");
+    second.run_with(2, &[]).expect(0).says("dropped: viscoplastic_history").says("initial values: damage");
     // A restart of the second stage continues that stage.
     let expected = last(&second.results());
     let stopped = second.set("checkpoint.every", "2");
@@ -120,7 +120,11 @@ fn obstacles_moved_by_forces_continue_their_motion() {
     assert!(expected.len() == 8 && expected[0] > 1e-3 && expected[6].abs() > 1e-3, "{expected:?}");
     let difference = relative_difference(&expected, &motion(&second));
     assert!(difference < 1e-7, "{difference:e}: {:?} instead of {expected:?}", motion(&second));
-    assert!(!said.stdout.contains("at rest") && !said.stderr.contains("at rest"), "nothing starts at rest");
+    let starts_anew = "initial values";
+    assert!(
+        !said.stdout.contains(starts_anew) && !said.stderr.contains(starts_anew),
+        "nothing starts from initial values"
+    );
     // The first indenter is held in place, and the second one moves along another direction.
     let other =
         second.without("contact.0.obstacle_load").set("contact.1.obstacle_load.direction", "[0.1, -1]");
@@ -128,7 +132,7 @@ fn obstacles_moved_by_forces_continue_their_motion() {
         .run_with(1, &["--force", "--set", "time.end=0.01"])
         .expect(0)
         .says("dropped: displacement of the obstacle of contact.0, displacement of the obstacle of contact.1")
-        .says("at rest: displacement of the obstacle of contact.1");
+        .says("initial values: displacement of the obstacle of contact.1");
 }
 
 #[test]
@@ -156,7 +160,7 @@ fn stages_run_one_after_another() {
     let both = ["run".to_owned(), one.clone(), one.clone()];
     launch::run(1, &both).expect(2).says("two stages write to");
     let file = format!("{from}/checkpoint-8.h5");
-    launch::run(1, &["run".into(), one, two, "--restart".into(), file]).expect(2).says("continues one job");
+    launch::run(1, &["run".into(), one, two, "--restart".into(), file]).expect(2).says("a single job");
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
             "reference.exact.velocity has 3 components",
         ),
         ("[[run]]\ncells = [4, 4, 4]\n".into(), "3 numbers of cells for a mesh of dimension 2"),
-        (format!("{run}name = \"reference\"\n"), "two runs can't have the same name"),
+        (format!("{run}name = \"reference\"\n"), "the name of this run is already in use"),
         (
             format!(
                 "{run}[reference.run]\n[[probe]]\nname = \"tip\"\nvalue = \"velocity_x\"\nover = \"end\"\n"

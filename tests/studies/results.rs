@@ -125,7 +125,7 @@ fn a_looser_tolerance_is_compared_with_the_tightest() {
          of = \"velocity\"\nin = \"V\"\nover = \"max\"\n"
     );
     scene.write("study.toml", &study);
-    scene.study(1, &[]).expect(0).says("Change by the solver's tolerance");
+    scene.study(1, &[]).expect(0).says("Effect of the solver's tolerance: change of the results");
     let results = scene.results();
     let change = |row: usize| number(&results, &format!("/tolerances/{row}/changes/0/difference"));
     assert_eq!(results["tolerances"].as_array().expect("rows").len(), 2);

@@ -51,7 +51,7 @@ pub(super) const FIELD: OutputField = OutputField {
         names: &["error_indicator", "relative_error_indicator"],
         line: |figures: &[f64]| {
             format!(
-                "indicator  error of the stress {:.4e}, {:.1} % of its norm",
+                "indicator  error of the stress {:.4e} in the energy norm, {:.1} % of the norm of the stress",
                 figures[0],
                 100.0 * figures[1]
             )

@@ -166,8 +166,8 @@ fn refuse_other_fields(path: &Path, is_wanted: [bool; COUNT]) -> Result<()> {
                 "the output.also of the run that wrote it".to_owned()
             };
             return Err(Error::Refused(format!(
-                "{} {word} {name}, and all its times have the same fields: continue with {key}, or in another output.folder from a \
-                 named checkpoint (--restart FILE.h5)",
+                "{} {word} {name}, but all times in one file must have the same fields: continue with {key}, or write to another \
+                 output.folder and name the checkpoint (--restart FILE.h5)",
                 path.display()
             )));
         }

@@ -172,7 +172,7 @@ impl ParallelFile {
         let empty = self.new_dataset::<T>().no_chunk();
         let made =
             if width == 1 { empty.shape(rows).create(name) } else { empty.shape((rows, width)).create(name) };
-        let dataset = self.written(&format!("make dataset {name}"), made)?;
+        let dataset = self.written(&format!("create dataset {name}"), made)?;
         Ok(Rows::new(self, dataset, width))
     }
 
@@ -249,7 +249,7 @@ impl ParallelFile {
         } else {
             empty.chunk((chunk, width)).shape((rows, width)).create(name)
         };
-        let dataset = self.written(&format!("make dataset {name}"), made)?;
+        let dataset = self.written(&format!("create dataset {name}"), made)?;
         Ok(Rows::new(self, dataset, width))
     }
 
@@ -270,7 +270,7 @@ impl ParallelFile {
             let fixed = Extent { dim: width, max: Some(width) };
             empty.chunk((chunk_rows, width)).shape((growing, fixed)).create(name)
         };
-        let dataset = self.written(&format!("make dataset {name}"), made)?;
+        let dataset = self.written(&format!("create dataset {name}"), made)?;
         Ok(Rows::new(self, dataset, width))
     }
 
@@ -289,7 +289,7 @@ impl ParallelFile {
             .virtual_map(".", source, shape, whole.clone(), shape.0 * shape.1, whole)
             .shape(shape.0 * shape.1)
             .create(name);
-        self.written(&format!("make view {name}"), made).map(drop)
+        self.written(&format!("create view {name}"), made).map(drop)
     }
 
     /// Makes a dataset that shows the tables `{folder}/0`, `{folder}/1`, ... below each other without storing them
@@ -303,7 +303,7 @@ impl ParallelFile {
         columns: &[usize],
     ) -> Result<(), Agreed> {
         let made = stacked_view::create::<T>(&self.file, name, folder, rows, columns);
-        self.written(&format!("make view {name}"), made)
+        self.written(&format!("create view {name}"), made)
     }
 
     /// Opens a dataset of one or two dimensions.

@@ -135,12 +135,12 @@ impl ParallelFile {
     /// Checks on all ranks that there is space for this number of bytes and for HDF5's tables; without it the file counts as
     /// failed.
     pub(super) fn require_space(&self, bytes: u64) -> Result<(), Agreed> {
-        self.written(&format!("write {bytes} bytes more"), self.space(bytes))
+        self.written(&format!("write {bytes} more bytes"), self.space(bytes))
     }
 
     /// Whether there is space for this number of bytes and for HDF5's tables. The same outcome on all ranks.
     pub(super) fn has_space(&self, bytes: u64) -> Result<(), Agreed> {
-        self.agreed(&format!("write {bytes} bytes more"), self.space(bytes))
+        self.agreed(&format!("write {bytes} more bytes"), self.space(bytes))
     }
 
     fn space(&self, bytes: u64) -> hdf5::Result<()> {
@@ -173,7 +173,7 @@ impl ParallelFile {
 
     /// Creates a group and its missing parent groups.
     pub fn create_group(&self, name: &str) -> Result<(), Agreed> {
-        self.written(&format!("make group {name}"), self.file.create_group(name).map(drop))
+        self.written(&format!("create group {name}"), self.file.create_group(name).map(drop))
     }
 
     /// Whether there is a group or dataset of this name (`/` apart).

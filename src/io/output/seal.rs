@@ -98,7 +98,7 @@ fn compare(path: &Path, kind: Kind, found: u64, expected: u64) -> Result<()> {
     Err(refused(
         path,
         kind,
-        format!("its content has the digest {found:016x} instead of {expected:016x}: it is damaged"),
+        format!("its content has the checksum {found:016x} instead of {expected:016x}: it is damaged"),
     ))
 }
 

@@ -74,7 +74,7 @@ impl PartitionedFile {
         session.agree(if same {
             Ok(mesh)
         } else {
-            Err(contradiction(&self.file, "the mesh of its parts is not that of its header"))
+            Err(contradiction(&self.file, "its parts and its header describe different meshes"))
         })
     }
 

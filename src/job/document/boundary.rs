@@ -45,7 +45,7 @@ pub struct Support {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "Pa s/m"))]
     pub damping: Option<Resistance>,
-    /// Whether the boundary absorbs waves (dashpots of Lysmer and Kuhlemeyer). Adds the dashpots of Lysmer and Kuhlemeyer (1969):
+    /// Whether the boundary absorbs waves. The dashpots are those of Lysmer and Kuhlemeyer (1969):
     /// density times the speed of pressure waves along the normal, density times the speed of shear waves along the boundary, of
     /// the elastic material behind the boundary. Waves at normal incidence are absorbed completely.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

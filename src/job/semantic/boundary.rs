@@ -59,7 +59,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         let help = "give [material] density; for a body without inertia, write the weight as [[body_force]]";
         findings.fault_at_key(
             "gravity",
-            "gravity acts on materials with a density, and there are none",
+            "gravity requires a material with a density, but no material has one",
             help,
         );
     }
@@ -294,7 +294,7 @@ fn check_initial_stress(findings: &mut Findings<'_>, dimension: usize) {
     let regions = items(root, "region").into_iter().map(|region| format!("{region}.material.elasticity"));
     if !regions.chain(["material.elasticity".into()]).any(|path| root.find(&path).is_some()) {
         let help = "add [material.elasticity]";
-        findings.fault_at_key("initial.stress", "an initial stress is elastic, and no material is", help);
+        findings.fault_at_key("initial.stress", "an initial stress requires an elastic material", help);
     }
 }
 

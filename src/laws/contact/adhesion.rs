@@ -164,13 +164,13 @@ impl Adhesion {
     fn fault_of(&self, strength: f64) -> Option<LawFault> {
         if self.viscosity > 0.0 || self.length.is_some() {
             let key = if self.viscosity > 0.0 { "adhesion.viscosity" } else { "adhesion.length" };
-            let message = "bonds with a strength have no viscosity and no length";
+            let message = "`strength` cannot be combined with `viscosity` or `length`";
             return Some(LawFault::at_key(key, message, "delete it, or `strength`"));
         }
         let least = 0.5 * strength * strength / self.stiffness;
         (self.energy <= least).then(|| {
             let message = format!(
-                "bonds store {least} J/m^2 before their traction reaches the strength, and break with less"
+                "the energy is too small: bonds store {least} J/m^2 when their traction reaches the strength"
             );
             LawFault::at_value(
                 "adhesion.energy",

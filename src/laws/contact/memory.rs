@@ -51,7 +51,7 @@ impl Memory {
             refuse("obstacle".into(), message, "");
         }
         if let Some(friction) = interface.friction.as_ref().filter(|law| law.follows_pressure()) {
-            let message = "this friction law depends on the pressure of the normal law, which does not include that of memory";
+            let message = "this friction law depends on the pressure of the normal law only and would ignore the memory pressure";
             refuse(friction.table().into(), message, ", or use tresca");
         }
         faults

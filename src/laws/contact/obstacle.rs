@@ -109,8 +109,8 @@ impl Gap {
             }
             Self::Sphere(_) => "a component of the centre is not finite: correct [contact.obstacle.sphere]",
             Self::Shape(_) => {
-                "`distance` or `centre` is not finite, or `distance` changes by more than the way between two places, which \
-                 no distance does, or parts of `surface` overlap: correct [contact.obstacle.shape]"
+                "`distance` or `centre` is not finite, `distance` is not a signed distance (it changes by more than the distance \
+                 between two points), or parts of `surface` overlap: correct [contact.obstacle.shape]"
             }
         };
         Err(Error::Failed(format!(

@@ -59,7 +59,7 @@ impl ObstacleLoad {
             at_key("obstacle_load", "a force moves an obstacle, but there is none", help);
         }
         if self.direction.is_empty() && self.moment.is_none() {
-            let help = "add `direction` and `force`, `moment`, or all of them";
+            let help = "add `direction` and `force`, or `moment`, or all three";
             at_key(
                 "obstacle_load",
                 "neither a force along a `direction` nor a `moment` moves the obstacle",
@@ -69,12 +69,12 @@ impl ObstacleLoad {
             && (self.force != Scalar::default() || self.mass > 0.0 || self.velocity != 0.0)
         {
             let help = "add `direction`, or delete `force`, `mass` and `velocity`";
-            at_key("obstacle_load", "a force has no `direction`", help);
+            at_key("obstacle_load", "`force`, `mass` and `velocity` need a `direction`", help);
         }
         let turns = self.moment_of_inertia > 0.0 || self.angular_velocity != 0.0;
         if self.moment.is_none() && turns {
             let help = "add `moment`, which may be 0";
-            at_key("obstacle_load", "without a `moment` the obstacle does not turn by itself", help);
+            at_key("obstacle_load", "`moment_of_inertia` and `angular_velocity` need a `moment`", help);
         }
         if self.moment.is_some() && interface.friction.is_none() {
             let help = "add [contact.friction], or delete the key";

@@ -44,13 +44,13 @@ impl TriangulatedSurface {
     /// The surface with these corners in m and triangles of corners.
     pub(super) fn new(corners: &[Vector<3>], mut triangles: Vec<[usize; 3]>) -> Result<Self, String> {
         if let Some(bad) = corners.iter().find(|corner| corner.iter().any(|x| !x.is_finite())) {
-            return Err(format!("a corner is at {bad:?}"));
+            return Err(format!("a corner has coordinates that are not finite: {bad:?}"));
         }
         // Triangles without area, which some programs write, do not change the surface.
         triangles.retain(|[a, b, c]| a != b && b != c && c != a);
         if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
             return Err(format!(
-                "it has {} triangles; a surface has from 4 to {MOST_TRIANGLES}",
+                "it has {} triangles; a surface needs 4 to {MOST_TRIANGLES} triangles",
                 triangles.len()
             ));
         }
@@ -96,8 +96,8 @@ impl TriangulatedSurface {
         {
             None => Ok(()),
             Some(buried) => Err(format!(
-                "its triangle at {:?} m lies inside of another part of the obstacle; unite parts that overlap, and let all \
-                 triangles be counterclockwise as seen from outside",
+                "its triangle at {:?} m lies inside another part of the obstacle; unite parts that overlap, and order the \
+                 corners of all triangles counterclockwise as seen from outside",
                 buried.center().to_array()
             )),
         }
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn boxes_that_overlap_are_refused_and_others_are_not() {
         assert!(
-            both([CUBE, [[0.5, -0.5, 0.9], [0.8, 0.5, 2.0]]]).unwrap_err().contains("inside of another part")
+            both([CUBE, [[0.5, -0.5, 0.9], [0.8, 0.5, 2.0]]]).unwrap_err().contains("inside another part")
         );
         assert!(both([CUBE, [[0.5, -0.5, -0.5], [0.8, 0.5, 0.5]]]).is_err(), "one in the other");
         let apart = both([CUBE, [[0.5, -0.5, 1.1], [0.8, 0.5, 2.0]]]).unwrap();

@@ -69,8 +69,8 @@ impl Polyline {
                 );
             } else if after == before && high < low {
                 fault(
-                    "a downward jump has no relaxed monotonicity constant: no step is short enough to be solvable",
-                    "order the two points upwards, or replace the jump by a steep slope",
+                    "a downward jump has no relaxed monotonicity constant: no step is short enough to have a unique solution",
+                    "let the pressure jump upward, or replace the jump by a steep slope",
                 );
             } else if after == before && high == low {
                 fault("this point occurs twice", "delete one");

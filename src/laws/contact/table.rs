@@ -57,10 +57,10 @@ impl ContactTable {
         if self.quadrature == Quadrature::Gauss {
             let nodal = normal.as_ref().is_some_and(NormalLaw::needs_nodes);
             let not_there = [
-                (friction.is_some(), "friction does not act at Gauss points"),
-                (self.adhesion.is_some(), "adhesion does not act at Gauss points"),
-                (self.memory.is_some(), "memory does not act at Gauss points"),
-                (nodal, "this contact law does not act at Gauss points"),
+                (friction.is_some(), "friction is not available at Gauss points"),
+                (self.adhesion.is_some(), "adhesion is not available at Gauss points"),
+                (self.memory.is_some(), "memory is not available at Gauss points"),
+                (nodal, "this contact law is not available at Gauss points"),
             ];
             let help = "use \"nodal\", or delete the key";
             let not_there = not_there.into_iter().filter(|(is_there, _)| *is_there);

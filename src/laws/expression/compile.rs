@@ -65,7 +65,7 @@ pub(super) fn compile(text: &str) -> Result<Program, Fault> {
     parser.value()?;
     match parser.peek() {
         None => Ok(Program::new(parser.program, parser.tables)),
-        Some(')') => Err(parser.here("this parenthesis closes no other", "delete it, or open one before it")),
+        Some(')') => Err(parser.here("this `)` has no matching `(`", "delete it, or add a `(` before it")),
         Some(',') => {
             Err(parser.here("a comma outside of a function", "numbers are written with a point: 0.5"))
         }
@@ -312,7 +312,7 @@ impl Parser<'_> {
                 [Instruction::Number(number)] => number,
                 [Instruction::Number(number), Instruction::Unary(sign)] if sign == NEGATE => -number,
                 _ => {
-                    let message = "the points of a table are numbers";
+                    let message = "the points of a table must be numbers";
                     return Err(Fault::new(
                         start..self.at,
                         message,
@@ -343,7 +343,7 @@ impl Parser<'_> {
     fn no_comparison(&self) -> Fault {
         self.here(
             "this comparison is not available",
-            "compare two values with <, <=, > or >=; a product of comparisons is an `and`",
+            "compare two values with <, <=, > or >=; for `and`, multiply comparisons",
         )
     }
 

@@ -52,7 +52,7 @@ fn faults_point_into_the_text() {
         ("2x", 1..2, "operator is missing", "2*x"),
         ("(1)(2)", 3..4, "operator is missing", "2*x"),
         ("(1", 0..1, "never closed", ")"),
-        ("1)", 1..2, "closes no other", "delete"),
+        ("1)", 1..2, "no matching", "delete"),
         ("0,5", 1..2, "comma", "0.5"),
         ("x**2", 2..3, "two stars", "x^2"),
         ("x == 1", 2..3, "comparison", "<="),

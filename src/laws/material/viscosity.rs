@@ -33,7 +33,7 @@ impl Viscosity {
             return None;
         } else if modulus <= 0.0 {
             (
-                format!("this viscosity adds energy: {dimension} volumetric + shear is {modulus}"),
+                format!("this viscosity adds energy: {dimension}*volumetric + shear is {modulus} Pa s"),
                 format!("volumetric must be above {}", -shear / dimension as f64),
             )
         } else if volumetric > MOST_VOLUMETRIC * shear {

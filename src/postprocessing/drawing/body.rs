@@ -248,7 +248,7 @@ impl<'a> Body<'a> {
                 let place = Place::Cell;
                 let shown = Values { values, place, scale, is_clipped: false, common, regions: None };
                 let mut drawn = self.picture(look, &shown)?;
-                drawn.caption += &format!(" Of all cells together: {} {unit}.", number(total));
+                drawn.caption += &format!(" All cells together: {} {unit}.", number(total));
                 drawn
             }
         };
@@ -346,7 +346,7 @@ impl<'a> Body<'a> {
         let seen = self
             .view
             .words()
-            .map_or_else(String::new, |from| format!(" Seen from {from}; darker faces have less light."));
+            .map_or_else(String::new, |from| format!(" Seen from {from}; shading shows face orientation."));
         Ok(Picture::new(
             name,
             format!("Body coloured by {quantity}, {figures}, at {} s", number(self.snapshot.time)),

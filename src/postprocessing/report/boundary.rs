@@ -260,7 +260,7 @@ impl<'a> Boundary<'a> {
         let mut chart = Chart::new(x, Axis::new(quantity, unit), vec![series]);
         chart.bands = self.bands();
         let figures = format!("from {} to {} {unit}", number(low), number(high));
-        let bands = if chart.bands.is_empty() { "" } else { " Backgrounds: branches of the contact law." };
+        let bands = if chart.bands.is_empty() { "" } else { " Background: branches of the contact law." };
         let picture = Picture::of_chart(
             chart,
             &name,

@@ -30,7 +30,7 @@ const MEMBERS: [(&str, &str, &str); 10] = [
 const MORE_MEMBERS: [(&str, &str, &str); 13] = [
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
-    ("max_slip_pressure", "largest contact pressure under friction that weakens", "Pa"),
+    ("max_slip_pressure", "largest contact pressure with weakening friction", "Pa"),
     ("effects", "effects simulated", ""),
     ("scheme", "time scheme", ""),
     ("preconditioner", "preconditioner", ""),
@@ -97,7 +97,10 @@ pub(super) fn reason(summary: &Value) -> String {
     if error.is_empty() {
         return String::new();
     }
-    format!("<div class=\"missing\">\n<h2>Reason of the failure</h2>\n<pre>{}</pre>\n</div>\n", escape(error))
+    format!(
+        "<div class=\"missing\">\n<h2>Reason for the failure</h2>\n<pre>{}</pre>\n</div>\n",
+        escape(error)
+    )
 }
 
 /// The warnings of the run, if there are any.
@@ -114,7 +117,7 @@ pub(super) fn warnings(summary: &Value) -> String {
 /// The certificates and their meaning for the run.
 pub(super) fn certificates(found: &Found) -> String {
     let Some(object) = found.summary.as_ref().and_then(|summary| summary.get("certificates")) else {
-        return paragraph("No certificates: they are in summary.json.");
+        return paragraph("No certificates: summary.json is missing or does not contain them.");
     };
     let Ok(known) = serde_json::from_value::<Certificates>(object.clone()) else {
         return paragraph("The certificates in summary.json cannot be read.");
@@ -134,12 +137,12 @@ pub(super) fn certificates(found: &Found) -> String {
         ("growth constant c₁", growth(1), "Pa s/m", "slope of that bound"),
         ("trace norm |γ|²", known.trace_norm_squared, "m", "of the normal trace on the contact boundary"),
         (
-            "pressure bound of friction that weakens",
+            "pressure bound of weakening friction",
             known.slip_pressure_bound,
             "Pa",
-            "uniqueness of each step, for given pressures up to this",
+            "uniqueness of each step, for given pressures up to this value",
         ),
-        ("largest stable step", known.explicit_step_bound, "s", "bound of the explicit parts of the scheme"),
+        ("largest stable step", known.explicit_step_bound, "s", "stability bound of the explicit terms"),
     ];
     let rows = rows.into_iter().filter_map(|(name, value, unit, meaning)| {
         let value = format!("{} {unit}", number(value?));
@@ -199,7 +202,7 @@ pub(super) fn phases(summary: &Value) -> Option<Picture> {
     }
     svg += "</svg>";
     let words: Vec<String> = bars.iter().map(|(name, value)| format!("{name} {} s", size(*value))).collect();
-    let total = total.map(|total| format!(" Together {} s.", size(total))).unwrap_or_default();
+    let total = total.map(|total| format!(" Total: {} s.", size(total))).unwrap_or_default();
     let caption = format!(
         "Wall time of each phase on the slowest rank, with its minimum memory traffic where that is counted.{total}"
     );

@@ -85,7 +85,7 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
     for (number, source) in table.names().iter().enumerate() {
         let rows = table.of(source);
         let (what, quantity) = match source.as_str() {
-            "momentum" => ("rate of momentum", "rate of momentum"),
+            "momentum" => ("rate of change of momentum", "rate of change of momentum"),
             source => (source, "force"),
         };
         let is_felt = |force: &&str| exceeds(&rows, force, ROUNDING * largest);
@@ -135,7 +135,7 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
             column: "energy_imbalance",
             quantity: "energy imbalance",
             unit: "",
-            caption: "Energy imbalance of each step: error of its energy balance relative to the energy turned over",
+            caption: "Energy imbalance of each step: error of its energy balance relative to the largest energy exchanged so far",
             is_logarithmic: true,
             tolerance: None,
         },

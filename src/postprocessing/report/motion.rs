@@ -120,7 +120,7 @@ fn animated(drawings: &[(Picture, Option<&Picture>)], end: f64) -> Option<Pictur
         drawings.len(),
         number(end)
     );
-    let caption = format!("{words}. They stop under the pointer. The last: {}{law}", last.caption);
+    let caption = format!("{words}. Hover over the picture to pause. Last drawing: {}{law}", last.caption);
     Some(Picture::new("motion", words, caption, svg))
 }
 

@@ -164,8 +164,8 @@ fn body_section(found: &Found, body: &Body, snapshot: &Snapshot) -> Result<Secti
     words += &not_drawn(&uniform);
     if body.lacks_regions() {
         words += &paragraph(
-            "Each cell has one colour: [output] also = [\"region\"] in the job would tell the regions apart, within which \
-             values are averaged at the nodes.",
+            "Each cell has one colour, because fields.vtkhdf does not contain the regions: add [output] also = [\"region\"] to \
+             the job to average values at the nodes within each region.",
         );
     }
     Ok((BODY.into(), words, pictures))
@@ -263,7 +263,7 @@ fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
     }
     let dimension = found.dimension().unwrap_or(3);
     if let Some(resultants) = found.resultants.as_ref().filter(|resultants| !resultants.is_empty()) {
-        let words = "Forces on the body. In every step they add up to the rate of momentum.";
+        let words = "Forces on the body. In every step they add up to the rate of change of momentum.";
         add("Resultants", paragraph(words), history::resultants(resultants, dimension)?);
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };

@@ -26,17 +26,17 @@ pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Do
     if study.compare.split
         && (base.dimension().is_none() || !matches!(study.reference, Some(Reference::Run(_))))
     {
-        let help = "it needs [reference.run] and a mesh that the base job generates";
+        let help = "`split` needs [reference.run] and a mesh that the base job generates";
         document.fault("compare.split", "errors can't be split here", help);
     }
     for (index, run) in study.run.iter().enumerate() {
         let same = |other: &Run| run.name.is_some() && other.name == run.name;
         if run.name.as_deref() == Some("reference") || study.run[..index].iter().any(same) {
-            let message = "two runs can't have the same name";
+            let message = "the name of this run is already in use";
             document.fault(
                 &format!("run.{index}.name"),
                 message,
-                "\"reference\" is the name of the reference",
+                "choose another name; \"reference\" is that of the reference run",
             );
         }
     }
@@ -81,7 +81,7 @@ fn check_sweep(study: &Study, document: &mut Document) {
         match first {
             Some((other, count)) if count != draws.draws => {
                 let message = format!("`{key}` has {} draws, but `{other}` has {count}", draws.draws);
-                document.fault("sweep", message, "keys with random values are drawn together");
+                document.fault("sweep", message, "give all random keys the same number of draws");
             }
             _ => first = Some((key.as_str(), draws.draws)),
         }

@@ -96,8 +96,8 @@ pub(super) fn errors<const D: usize>(
     let is_quadratic =
         [Some(&run), reference.as_ref()].into_iter().flatten().any(|fields| fields.mesh.order() == 2);
     if is_quadratic && norms.iter().any(|norm| norm.of == Quantity::Stress) {
-        let words = "of quadratic cells the mean stress is compared, which varies less than the stress at their points: its error \
-                     is larger and falls by one order less";
+        let words = "for quadratic cells the mean stress of each cell is compared, not the stress at its integration points: the \
+                     error is larger, and its order of convergence is lower by one";
         found.notes.push(words.into());
     }
     let mut known: Vec<(Kind, (Vec<Squares>, Place))> = Vec::new();

@@ -312,8 +312,11 @@ fn tolerances(results: &Results, norm: usize, shown: &NormResult) -> Result<Opti
     let picture = Picture::of_chart(
         chart,
         &format!("solver-tolerance-{}", shown.name),
-        format!("Chart of changes by the solver's tolerance; below a tenth of the error: {most}"),
-        format!("Effect of the solver's tolerance, {}. Below a tenth of the error: {most}.", shown.meaning),
+        format!("Chart of the effect of the solver's tolerance; below a tenth of the error: {most}"),
+        format!(
+            "Effect of the solver's tolerance, {}. Tolerances whose effect is below a tenth of the error: {most}.",
+            shown.meaning
+        ),
     )?;
     Ok(Some(picture))
 }

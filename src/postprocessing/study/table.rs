@@ -314,7 +314,7 @@ fn tolerances(results: &Results) -> Table {
     let mut header = vec!["run", "tolerance", "computing s"];
     header.extend(&names);
     let mut table = Table::new(
-        "Change by the solver's tolerance, relative to the error at the tightest tolerance",
+        "Effect of the solver's tolerance: change of the results, relative to the error at the tightest tolerance",
         &header,
     );
     for row in &results.tolerances {

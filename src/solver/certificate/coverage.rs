@@ -14,23 +14,25 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
     let mut words = Vec::new();
     if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
         words.push(
-            "friction bounds depend on the contact pressure: theta holds for given pressures and does not cover their change with the solution; above some friction coefficient there may be several solutions"
+            "friction depends on the contact pressure, which theta takes as given: with a large friction coefficient a step may have several solutions"
                 .into(),
         );
     }
     if contacts.iter().any(|c| c.obstacle.is_some()) {
-        words.push("a force moves an obstacle: theta holds for a given motion of the obstacle".into());
+        words.push(
+            "a force or moment moves an obstacle: theta takes the motion of the obstacle as given".into(),
+        );
     }
     if contacts.iter().any(|c| c.wear.is_some()) {
         words.push(
-            "wear widens the gap between steps: theta of a step covers each step; for the continuous problem no certificate is known"
+            "wear widens the gap between steps: theta of a step remains valid, but uniqueness of the continuous problem is not certified"
                 .into(),
         );
     }
     if let Some(decrease) = decrease_with_displacement {
         words.push(format!(
-            "a contact law decreases with the displacement, by {decrease:.4e} Pa/m: theta of a step covers it in each step; for the \
-             continuous problem no certificate is known"
+            "a contact pressure decreases with the displacement, by up to {decrease:.4e} Pa/m: theta of a step accounts for \
+             this, but uniqueness of the continuous problem is not certified"
         ));
     }
     for fall in contacts.iter().filter_map(|contact| contact.decrease_per_pressure(step_length)) {
@@ -44,17 +46,17 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
                 _ => String::new(),
             };
             format!(
-                "; {each}for given pressures up to {bound:.4e} Pa each step has one solution, and the run checks the pressures"
+                "; {each}each step has one solution for given contact pressures up to {bound:.4e} Pa; the run warns if they exceed this bound"
             )
         });
         words.push(format!(
-            "the friction traction falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
-             bound: theta does not cover it{covered}"
+            "the friction traction decreases with the sliding velocity by up to {fall:.4} Pa s/m for each Pa of contact \
+             pressure, and the normal law does not bound the pressure: theta does not cover this decrease{covered}"
         ));
     }
     if theta_step.is_some() {
         let words_of = |name| {
-            format!("{name} at the end of a step may soften the body: theta of a step does not cover it")
+            format!("{name} may soften the body: theta of a step does not take softening into account")
         };
         words.extend(body.softening().map(words_of));
     }

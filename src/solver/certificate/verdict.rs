@@ -23,14 +23,14 @@ impl Certificates {
         if let Some(fall) = self.monotonicity_constant {
             verdict.words.push(format!("m_j = {fall:.4} Pa s/m, {}", self.growth()));
         }
-        let covered = if self.not_covered.is_empty() { "" } else { ", as far as covered" };
+        let covered = if self.not_covered.is_empty() { "" } else { ", except for what is not covered" };
         if let Some(theta) = self.theta {
             let meaning = if theta < 1.0 {
                 "below 1: the continuous problem has one solution"
             } else {
                 verdict.warnings.push(format!(
-                    "theta = {} is not below 1: the continuous problem may have several solutions; more \
-                     viscosity or a contact law that decreases less steeply would exclude that",
+                    "theta = {} is not below 1: the continuous problem may have several solutions; to \
+                     exclude this, increase the viscosity or use a contact law that decreases less steeply",
                     short(theta)
                 ));
                 "not below 1: the continuous problem may have several solutions"
@@ -51,7 +51,7 @@ impl Certificates {
                 "infinite (the supports do not prevent a rigid motion against the contact)".to_owned()
             };
             verdict.words.push(format!(
-                "m_A = {modulus:.4} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) {meaning}"
+                "m_A = {modulus:.4} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) of Wang and Cheng (2022) {meaning}"
             ));
         }
         if let Some(theta) = self.theta_step {
@@ -68,7 +68,7 @@ impl Certificates {
             {
                 verdict.warnings.push(format!(
                     "the step of {step} s exceeds {flowing:.4e} s: errors may grow where most of the body flows; a step below \
-                     {flowing:.4e} s or an implicit scheme would exclude that"
+                     {flowing:.4e} s or an implicit scheme prevents this"
                 ));
             }
         }
@@ -79,9 +79,9 @@ impl Certificates {
     fn growth(&self) -> String {
         match (self.growth_constants, &self.unbounded_growth) {
             (Some([rest, slope]), _) => format!(
-                "|dj(r)| <= {rest:.4} Pa + {slope:.4} Pa s/m |r|: contact pressures grow linearly at most, as hypothesis H(j) requires"
+                "|dj(r)| <= {rest:.4} Pa + {slope:.4} Pa s/m |r|: the contact pressure grows at most linearly with the velocity r, as hypothesis H(j) of Wang and Cheng (2022) requires"
             ),
-            (None, Some(why)) => format!("{why}: hypothesis H(j) does not cover it"),
+            (None, Some(why)) => format!("{why}: hypothesis H(j) does not apply"),
             (None, None) => "growth constant unknown".into(),
         }
     }
@@ -97,7 +97,7 @@ impl Verdict {
         );
         self.words.push(found.clone());
         let largest = unique_step.map_or_else(
-            || "no step is small enough where contact boundaries have no inertia, for want of [material] density or by \
+            || "no step is short enough: contact boundaries have no mass, because [material] density is absent or because of \
              redistribute_mass"
                 .to_owned(),
             |largest| format!("the largest step with one solution is {largest:.4e} s"),
@@ -114,13 +114,13 @@ impl Verdict {
         if step < bound {
             let least = if is_least { "at least " } else { "" };
             let power = if follows_stress {
-                "; for power laws only while the overstress is at most the yield stress; each step checks the overstress that occurs"
+                "; for power laws this bound holds only while the overstress is at most the yield stress; each step checks the bound at the current stress"
             } else {
                 ""
             };
             self.words.push(format!(
-                "steps are stable up to {least}{bound:.4e} s: explicit elastic and viscoplastic stress, adhesion, \
-                 contact memory{power}"
+                "steps are stable up to {least}{bound:.4e} s (elastic and viscoplastic stress, adhesion and contact memory are \
+                 explicit){power}"
             ));
             return;
         }
@@ -184,12 +184,12 @@ mod tests {
         let first = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).words[0].clone();
         assert_eq!(
             first(paper()),
-            "m_j = 10.0000 Pa s/m, |dj(r)| <= 0.0000 Pa + 10.0000 Pa s/m |r|: contact pressures grow linearly at most, as hypothesis H(j) requires"
+            "m_j = 10.0000 Pa s/m, |dj(r)| <= 0.0000 Pa + 10.0000 Pa s/m |r|: the contact pressure grows at most linearly with the velocity r, as hypothesis H(j) of Wang and Cheng (2022) requires"
         );
         let why = Some("the growth constant is infinite".into());
         let wall = first(Certificates { growth_constants: None, unbounded_growth: why, ..paper() });
         assert!(
-            wall.ends_with("Pa s/m, the growth constant is infinite: hypothesis H(j) does not cover it"),
+            wall.ends_with("Pa s/m, the growth constant is infinite: hypothesis H(j) does not apply"),
             "{wall}"
         );
     }
@@ -201,7 +201,10 @@ mod tests {
                 Certificates { trace_norm_squared: None, monotonicity_constant: Some(fall), ..paper() };
             known.verdict(1.0 / 64.0, None, &[]).words[2].clone()
         };
-        assert_eq!(words(0.0), "m_A = 50.0000 Pa s > m_j |gamma|^2 = 0.0000 Pa s: condition (13) holds");
+        assert_eq!(
+            words(0.0),
+            "m_A = 50.0000 Pa s > m_j |gamma|^2 = 0.0000 Pa s: condition (13) of Wang and Cheng (2022) holds"
+        );
         assert!(words(0.1).contains("<= m_j |gamma|^2 = infinite") && words(0.1).contains("does not hold"));
     }
 
@@ -234,7 +237,7 @@ mod tests {
     fn the_bound_of_power_laws_says_where_it_holds() {
         let known = Certificates { explicit_bound_follows_stress: true, ..paper() };
         let words = known.verdict(0.01, None, &[]).words;
-        assert!(words.iter().any(|words| words.contains("each step checks the overstress that occurs")));
+        assert!(words.iter().any(|words| words.contains("each step checks the bound at the current stress")));
     }
 
     #[test]

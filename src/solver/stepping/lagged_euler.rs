@@ -37,7 +37,7 @@ pub(super) fn refuse_fast_flow<const D: usize, const S: usize>(
     }
     Err(Error::Failed(format!(
         "the step of {} s to t = {} s is longer than {bound:.4e} s, the stability bound of explicit viscoplastic flow at the largest \
-         overstress in the body, with which the rate of a power law increases; use a shorter [time] step, \
+         overstress in the body (for power laws the bound decreases with the overstress); use a shorter [time] step, \
          scheme = \"implicit_euler\", or accept it with [solver] accept = [\"explicit_stability\"]",
         step.length, step.time
     )))

@@ -45,7 +45,7 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
             Ok(StepOutcome { solutions, ..outcome })
         }
         Err(error) if error.is_failure() => {
-            Err(Error::Failed(format!("{error}; solutions found from other starts: {}", others.len())))
+            Err(Error::Failed(format!("{error}; solutions from other start velocities: {}", others.len())))
         }
         Err(other) => Err(other.into()),
     }

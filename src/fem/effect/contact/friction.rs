@@ -72,7 +72,7 @@ impl<const D: usize> Friction<D> {
             let (is_held, place) = (point.unknown == Unknown::Held, &mesh.nodes[node]);
             if is_held && law.follows_pressure() {
                 return Err(Error::Refused(format!(
-                    "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, so that the bound of this friction law is not known; free the normal component there, or use tresca"
+                    "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, on which this friction law depends; free the normal component there, or use tresca"
                 )));
             }
             if !is_held && point.free_length < 1.0 - ROUNDING {

@@ -131,7 +131,7 @@ impl<const D: usize> Contact<D> {
             let along = dot(tangent, &velocity);
             if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
                 return Err(Error::Refused(format!(
-                    "friction at {:?} m: a support fixes a direction in which the obstacle moves, at {along} m/s at t = {} s, but not the other tangential direction, in which the friction is then not known; fix all components there, or none",
+                    "friction at {:?} m: a support fixes a direction in which the obstacle moves (at {along} m/s at t = {} s) but not the other tangential direction, so that the friction is not determined; fix all components there, or none",
                     point.place, rate.time
                 )));
             }

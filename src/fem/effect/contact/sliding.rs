@@ -20,7 +20,7 @@ impl<const D: usize> Contact<D> {
     pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, held: &Held<D>) -> Result<()> {
         if self.needs_ghosts {
             return Err(Error::Refused(
-                "friction does not act at Gauss points: use quadrature = \"nodal\"".into(),
+                "friction is not available at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
         self.friction = Some(Friction::new(law, &self.points, self.surface_may_move(), mesh, held)?);

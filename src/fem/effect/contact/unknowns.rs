@@ -22,7 +22,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         if contact.needs_ghosts {
             if contact.law.has_vertical_parts() || contact.law.depends_on_displacement() {
                 return Err(Error::Refused(
-                    "contact at Gauss points needs a law of the velocity without jumps: use quadrature = \"nodal\"".into(),
+                    "contact at Gauss points requires a normal law that depends on the velocity and has no jumps: use quadrature = \"nodal\"".into(),
                 ));
             }
             continue;
