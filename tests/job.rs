@@ -284,11 +284,12 @@ fn every_key_is_described() {
     let text = describe(None).expect("described");
     for part in [
         "[[contact]]",
-        "youngs_modulus: a number or an expression in t, x, y, z; above 0; unit Pa; required",
+        "youngs_modulus: a number or an expression in x, y, z; above 0; unit Pa; required",
         "example: poisson_ratio = 0.4",
         "default 1e-10",
         "pressure: a number or an expression in t, x, y, z; unit Pa",
         "value: a list of items, each a number or an expression in t, x, y, z; unit Pa",
+        "point: a list of items, each a number or an expression in t; unit m",
         "\"bdf2\": Second order in time.",
     ] {
         assert!(text.contains(part), "{part} is not in {text}");

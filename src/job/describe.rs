@@ -292,6 +292,11 @@ fn code(text: &str) -> String {
 
 /// The accepted kind of value, in words.
 pub(super) fn kind(schema: Schema) -> String {
+    kind_in(schema, schema.text("variables").unwrap_or("t, x, y, z"))
+}
+
+/// The same, with these variables of expressions.
+fn kind_in(schema: Schema, variables: &str) -> String {
     let alternatives = schema.alternatives();
     if !alternatives.is_empty() {
         let mut kinds: Vec<String> = schema.words().iter().map(|word| format!("\"{word}\"")).collect();
@@ -304,14 +309,14 @@ pub(super) fn kind(schema: Schema) -> String {
         return kinds.join(" or ");
     }
     if schema.text("format") == Some("expression") {
-        return "a number or an expression in t, x, y, z".into();
+        return format!("a number or an expression in {variables}");
     }
     if let Some(items) = schema.items().filter(|_| schema.accepts("array")) {
         let count = match (schema.number("minItems"), schema.number("maxItems")) {
             (Some(least), Some(most)) if least == most => format!("{least} "),
             _ => String::new(),
         };
-        return format!("a list of {count}items, each {}", kind(items));
+        return format!("a list of {count}items, each {}", kind_in(items, variables));
     }
     let plain = [
         ("object", "a table"),

@@ -6,7 +6,14 @@ use super::describe;
 use super::report::{Fault, Place};
 use super::schema::{Kind, Schema};
 use super::source::{Node, Value};
-use crate::laws::{expression::Expression, nearest::nearest};
+use crate::laws::{
+    expression::{Expression, Variable},
+    nearest::nearest,
+};
+
+/// The variables of expressions by name.
+const VARIABLES: [(&str, Variable); 4] =
+    [("t", Variable::T), ("x", Variable::X), ("y", Variable::Y), ("z", Variable::Z)];
 
 /// The faults of single keys.
 pub(super) fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {
@@ -23,6 +30,9 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     fn value(&mut self, node: &Node, schema: Schema, path: &str) {
+        if let Some(variables) = schema.text("variables") {
+            self.variables(node, variables, path);
+        }
         let alternatives = schema.alternatives();
         if alternatives.is_empty() {
             self.plain(node, schema, path);
@@ -232,6 +242,29 @@ impl Walk<'_> {
                 node.at.clone()
             };
             self.faults.push(Fault::new(at, format!("in `{path}`: {}", fault.message), "").help(fault.help));
+        }
+    }
+
+    /// Finds expressions in other variables than these, such as "x, y, z".
+    fn variables(&mut self, node: &Node, variables: &str, path: &str) {
+        let is_allowed = |name: &str| variables.split(", ").any(|allowed| allowed == name);
+        let other = match &node.value {
+            Value::Array(items) => {
+                for (index, item) in items.iter().enumerate() {
+                    self.variables(item, variables, &join(path, &index.to_string()));
+                }
+                return;
+            }
+            Value::Text(text) => Expression::parse(text).ok().and_then(|expression| {
+                VARIABLES.iter().find(|(name, variable)| !is_allowed(name) && expression.uses(*variable))
+            }),
+            // A table of values over time.
+            Value::Table(_) => VARIABLES.iter().find(|(name, _)| *name == "t" && !is_allowed(name)),
+            _ => None,
+        };
+        if let Some((name, _)) = other {
+            let message = format!("`{path}` can't depend on {name}");
+            self.faults.push(Fault::new(node.at.clone(), message, "").help(format!("use {variables} only")));
         }
     }
 

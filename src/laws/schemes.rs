@@ -82,6 +82,7 @@ schemes! {
     Bdf2 = "bdf2" { order: 2, kind: TwoStep, formula: Some(bdf2::blend) }
     /// Second order in time, for impacts and waves. All stresses are taken at the midpoint of the step, contact at its end. The total
     /// energy of an elastic body is conserved exactly and never grows in an impact; no vibration is damped, however short. Requires a
-    /// density and, for contact, `redistribute_mass`.
+    /// density, fixed steps and, for contact, `redistribute_mass`. Damage, adhesion, contact memory, moving supports and obstacles
+    /// moved by forces are refused.
     Midpoint = "midpoint" { order: 2, kind: Midpoint, formula: Some(midpoint::blend) }
 }

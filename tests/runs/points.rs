@@ -67,7 +67,7 @@ fn the_parts_of_a_mesh_know_its_points_and_a_mesh_with_others_is_another() {
     launch::run_alone(&["partition", &from, "-n", "3", "-o", &to]).expect(0);
     for file in [&from, &to] {
         let outcome = launch::run_alone(&["inspect", file]).expect(0);
-        outcome.says("points      axis: 1 nodes").says("points      rim: ");
+        outcome.says("points      axis: 1 node").says("points      rim: ");
     }
     for ranks in [1, 3] {
         let found = quarter(&file, 1).run_and_keep(ranks);

@@ -19,7 +19,7 @@ pub struct Support {
     /// 0, for example the nodes of an edge, or a single node; otherwise the facets at whose centre it is not 0. A product of
     /// conditions holds where all hold, their `max` where one holds. Absent: the whole boundaries.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
-    #[schemars(example = "x < 1", example = "hypot(x - 1, y) < 1e-6", example = "(x > 1)*(x < 2)")]
+    #[schemars(extend("variables" = "x, y, z"), example = "x < 1", example = "hypot(x - 1, y) < 1e-6", example = "(x > 1)*(x < 2)")]
     pub part: Option<Scalar>,
     /// The components of the displacement that the support determines: "all", "normal" or a list of axes. They keep their initial
     /// values, unless `displacement` or `velocity` moves them.
@@ -163,11 +163,11 @@ pub struct Initial {
     /// The displacement at time 0, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent:
     /// zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "m"), example = [0.0, 0.0])]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "m"), example = [0.0, 0.0])]
     pub displacement: Option<Vec<Scalar>>,
     /// The velocity at time 0, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "m/s"), example = [0.0, 0.0])]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "m/s"), example = [0.0, 0.0])]
     pub velocity: Option<Vec<Scalar>>,
     /// The elastic stress at displacement zero of all materials with elasticity, constant in each cell: the values at its centre.
     /// Viscoplastic flow relaxes it; with `from` the saved history of these materials takes its place. Absent: none.
@@ -181,26 +181,26 @@ pub struct Initial {
 pub struct InitialStress {
     /// The component xx.
     #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("unit" = "Pa"), example = -1e5)]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa"), example = -1e5)]
     pub xx: Scalar,
     /// The component yy.
     #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("unit" = "Pa"), example = "-2e4*(10 - y)")]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa"), example = "-2e4*(10 - y)")]
     pub yy: Scalar,
     /// The component zz; not in plane stress.
     #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("unit" = "Pa"))]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa"))]
     pub zz: Scalar,
     /// The component xy.
     #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("unit" = "Pa"))]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa"))]
     pub xy: Scalar,
     /// The component yz; in 3D only.
     #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("unit" = "Pa"))]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa"))]
     pub yz: Scalar,
     /// The component xz; in 3D only.
     #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("unit" = "Pa"))]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa"))]
     pub xz: Scalar,
 }

@@ -63,27 +63,10 @@ pub(super) fn check(findings: &mut Findings<'_>) {
             help,
         );
     }
-    for component in ["xx", "yy", "zz", "xy", "yz", "xz"] {
-        let path = format!("initial.stress.{component}");
-        if root.read::<Scalar>(&path).is_some_and(|scalar| scalar.depends_on_time()) {
-            findings.fault(&path, "the initial state can't depend on t", "use x, y and z only");
-        }
-    }
-    for entry in items(root, "contact").into_iter().chain(items(root, "support")) {
-        let path = format!("{entry}.where");
-        if root.read::<Scalar>(&path).is_some_and(|scalar| scalar.depends_on_time()) {
-            findings.fault(&path, "the part of a boundary can't depend on t", "use x, y and z only");
-        }
-    }
     for key in ["initial.displacement", "initial.velocity"] {
         if root.find("initial.from").is_some() && root.find(key).is_some() {
             let help = "delete this key, or `from`";
             findings.fault_at_key(key, "`from` gives the whole initial state", help);
-        }
-        for path in items(root, key) {
-            if root.read::<Scalar>(&path).is_some_and(|scalar| scalar.depends_on_time()) {
-                findings.fault(&path, "the initial state can't depend on t", "use x, y and z only");
-            }
         }
     }
 }

@@ -5,7 +5,6 @@ use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Method;
 use crate::job::source::Node;
 use crate::laws::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
-use crate::laws::expression::Scalar;
 use crate::laws::schemes::Scheme;
 
 /// Checks that do not depend on the mesh.
@@ -110,13 +109,6 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     if root.find(&obstacle).is_none() {
         return;
     }
-    let components = OBSTACLE_VECTORS.map(|vector| items(root, &format!("{obstacle}.{vector}")));
-    for scalar in components.into_iter().flatten().chain(rotations(&obstacle)) {
-        if root.read::<Scalar>(&scalar).is_some_and(|scalar| scalar.depends_on_position()) {
-            let help = "use t only; `gap` in the law may depend on x, y and z";
-            findings.fault(&scalar, "the motion of a rigid obstacle depends on time only", help);
-        }
-    }
     for rotation in rotations(&obstacle) {
         if root.find(&rotation).is_some() && root.find(&format!("{contact}.friction")).is_none() {
             findings.warnings.push(format!(
@@ -136,11 +128,6 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     }
     check_shape(findings, &format!("{obstacle}.shape"));
     check_moment(findings, contact);
-    let distance = format!("{obstacle}.shape.distance");
-    if root.read::<Scalar>(&distance).is_some_and(|distance| distance.depends_on_time()) {
-        let help = "use x, y and z only; a shape moves by its `centre`";
-        findings.fault(&distance, "the shape of a rigid obstacle does not depend on t", help);
-    }
     let normal: Option<Vec<f64>> = root.read(&format!("{obstacle}.plane.normal"));
     if normal.is_some_and(|normal| !normal.is_empty() && normal.iter().all(|&x| x == 0.0)) {
         let help = "give the normal that points out of the obstacle toward the body";

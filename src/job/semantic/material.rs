@@ -45,12 +45,6 @@ pub(super) fn check(findings: &mut Findings<'_>) {
                 findings.fault(&key, fault.message, fault.help);
             }
         }
-        for key in Material::variable_keys() {
-            let key = format!("{path}.{key}");
-            if root.read::<Scalar>(&key).is_some_and(|scalar| scalar.depends_on_time()) {
-                findings.fault(&key, "a property of a material can't depend on t", "use x, y and z only");
-            }
-        }
         if path != "material" && present("hypothesis") {
             let message = "the hypothesis applies to the whole body";
             findings.fault(&format!("{path}.hypothesis"), message, "give it in [material] only");

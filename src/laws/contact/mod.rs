@@ -50,7 +50,7 @@ pub struct Contact {
     /// one with the larger part of its area. A product of conditions holds where all hold, their `max` where one holds. Absent: the
     /// whole boundaries.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
-    #[schemars(example = "x < 1", example = "(x > 1)*(x < 2)")]
+    #[schemars(extend("variables" = "x, y, z"), example = "x < 1", example = "(x > 1)*(x < 2)")]
     pub part: Option<Scalar>,
     /// The points of a facet at which the contact laws are evaluated.
     #[serde(default)]

@@ -52,15 +52,15 @@ pub enum Gap {
 pub struct Plane {
     /// A point of the plane, one component per axis: numbers, or expressions in t. Motion of this point along the plane is a
     /// tangential motion of the obstacle's surface, such as that of a belt.
-    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.0, "-0.01 + 0.1*t"]))]
+    #[schemars(extend("variables" = "t", "unit" = "m"), example = serde_json::json!([0.0, "-0.01 + 0.1*t"]))]
     pub point: Vec<Scalar>,
     /// The normal of the plane, which points out of the obstacle toward the body, of any length: numbers, or expressions in t.
-    #[schemars(example = [0.0, 1.0])]
+    #[schemars(extend("variables" = "t"), example = [0.0, 1.0])]
     pub normal: Vec<Scalar>,
     /// Angular velocity, in 3D, of the rotation of the plane about its normal through `point`, counterclockwise as seen from the
     /// body: a number, or an expression in t. It affects friction only. Absent: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "rad/s"), example = 10.0)]
+    #[schemars(extend("variables" = "t", "unit" = "rad/s"), example = 10.0)]
     pub rotation: Option<Scalar>,
 }
 
@@ -69,7 +69,7 @@ pub struct Plane {
 #[serde(deny_unknown_fields)]
 pub struct Sphere {
     /// The centre, one component per axis: numbers, or expressions in t.
-    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, "-1.01 + 0.1*t"]))]
+    #[schemars(extend("variables" = "t", "unit" = "m"), example = serde_json::json!([0.5, "-1.01 + 0.1*t"]))]
     pub centre: Vec<Scalar>,
     /// The radius.
     #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1.0)]
@@ -80,7 +80,7 @@ pub struct Sphere {
     /// Angular velocity of the rotation about the centre, counterclockwise; in 3D about `axis`, as seen against its direction: a
     /// number, or an expression in t. It affects friction only. Absent: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
+    #[schemars(extend("variables" = "t", "unit" = "rad/s"), example = "-2*t")]
     pub rotation: Option<Scalar>,
     /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` or `moment` in 3D, not allowed in 2D.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -17,7 +17,7 @@ pub struct ObstacleLoad {
     pub direction: Vec<f64>,
     /// The force along the direction: a number, or an expression in t. In 2D it is a force per metre of thickness.
     #[serde(default)]
-    #[schemars(extend("unit" = "N"), example = "min(t, 2 - t)")]
+    #[schemars(extend("variables" = "t", "unit" = "N"), example = "min(t, 2 - t)")]
     pub force: Scalar,
     /// Mass of the obstacle, in 2D per metre of thickness. 0: the force and the contact tractions are in equilibrium in each step.
     /// The kinetic energy of the obstacle is not part of `kinetic_energy`; implicit_euler damps its motion.
@@ -32,7 +32,7 @@ pub struct ObstacleLoad {
     /// number, or an expression in t. In 2D it is a moment per metre of thickness. It acts against friction only: the shape itself does
     /// not turn, and should be round about the axis. Absent: the obstacle turns by its key `rotation`, or not at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "N m"), example = 0.0)]
+    #[schemars(extend("variables" = "t", "unit" = "N m"), example = 0.0)]
     pub moment: Option<Scalar>,
     /// Moment of inertia about the centre or the axis, in 2D per metre of thickness. 0: the moment and the contact tractions are in
     /// equilibrium in each step; steps of an obstacle that also moves along `direction` may then fail.
@@ -87,12 +87,6 @@ impl ObstacleLoad {
                 "the direction is the zero vector",
                 help,
             ));
-        }
-        let expressions = [("force", Some(&self.force)), ("moment", self.moment.as_ref())];
-        for (key, _) in expressions.iter().filter(|(_, value)| value.is_some_and(|v| v.depends_on_position()))
-        {
-            let message = format!("the {key} depends on time only");
-            faults.push(LawFault::at_value(format!("obstacle_load.{key}"), message, "use t only"));
         }
         faults
     }

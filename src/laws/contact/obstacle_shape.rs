@@ -21,7 +21,7 @@ pub struct Shape {
     /// `centre`. A lower bound of the distance suffices: the expression must have the Lipschitz constant 1, as distances, their
     /// `min` (union) and their `max` (intersection) have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "m"), example = "sqrt(x^2 + z^2) - 0.1")]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "m"), example = "sqrt(x^2 + z^2) - 0.1")]
     pub distance: Option<Scalar>,
     /// In 3D, an STL file (binary or ASCII) of the surface, relative to the job file, in place of `distance`. The surface must be
     /// closed, its triangles counterclockwise as seen from outside of the obstacle, and its parts must not overlap. Coordinates are
@@ -36,13 +36,13 @@ pub struct Shape {
     /// The position of the origin of `distance` or `surface`, one component per axis: numbers, or expressions in t. Absent: the
     /// origin.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, 0.0, "-1.01 + 0.1*t"]))]
+    #[schemars(extend("variables" = "t", "unit" = "m"), example = serde_json::json!([0.5, 0.0, "-1.01 + 0.1*t"]))]
     pub centre: Vec<Scalar>,
     /// Angular velocity of the rotation about the centre, counterclockwise; in 3D about `axis`, as seen against its direction: a
     /// number, or an expression in t. It affects friction only: the geometry does not rotate; it should be axisymmetric about the
     /// axis. Absent: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
+    #[schemars(extend("variables" = "t", "unit" = "rad/s"), example = "-2*t")]
     pub rotation: Option<Scalar>,
     /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` or `moment` in 3D, not allowed in 2D.
     #[serde(default, skip_serializing_if = "Option::is_none")]

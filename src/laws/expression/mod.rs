@@ -72,7 +72,7 @@ impl Scalar {
 
     /// Whether it contains `variable`.
     pub fn uses(&self, variable: Variable) -> bool {
-        matches!(self, Self::Expression(expression) if expression.program.uses(variable))
+        matches!(self, Self::Expression(expression) if expression.uses(variable))
     }
 }
 
@@ -98,6 +98,11 @@ impl Expression {
     /// The expression as written.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Whether it contains `variable`.
+    pub fn uses(&self, variable: Variable) -> bool {
+        self.program.uses(variable)
     }
 
     /// Value at `time` and `point`; not finite where the expression is undefined, as in sqrt(-1).

@@ -34,7 +34,7 @@ impl Hypothesis {
 #[schemars(rename = "Elasticity", description = "Isotropic linear elasticity.")]
 pub struct Elasticity<N = f64> {
     /// Young's modulus. An expression in x, y, z is evaluated at the centre of each cell.
-    #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
     pub youngs_modulus: N,
     /// Poisson's ratio.
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]

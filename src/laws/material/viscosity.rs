@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 pub struct Viscosity<N = f64> {
     /// Factor of the trace of the strain rate. It may be negative if d volumetric + shear is positive, with the dimension d. An
     /// expression in x, y, z is evaluated at the centre of each cell.
-    #[schemars(extend("unit" = "Pa s"), example = 25.0)]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa s"), example = 25.0)]
     pub volumetric: N,
     /// Factor of the strain rate. An expression in x, y, z is evaluated at the centre of each cell.
-    #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 50.0)]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa s", "exclusiveMinimum" = 0), example = 50.0)]
     pub shear: N,
 }
 

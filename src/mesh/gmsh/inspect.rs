@@ -39,7 +39,8 @@ fn words<const D: usize>(mesh: &GlobalMesh<D>) -> String {
         lines.push(format!("boundary    {name}: {count} facets, {size:.6} {unit}"));
     }
     for set in &mesh.point_sets {
-        lines.push(format!("points      {}: {} nodes", set.name, set.places.len()));
+        let (count, plural) = (set.places.len(), if set.places.len() == 1 { "" } else { "s" });
+        lines.push(format!("points      {}: {count} node{plural}", set.name));
     }
     lines.push(format!("surface     {} facets", mesh.facets.len()));
     lines.join("\n")

@@ -69,8 +69,9 @@ impl Preconditioner {
         let [factored, multigrid] = [Self::Cholesky, Self::Gamg].map(|which| problem.seconds(which));
         let chosen = if factored <= multigrid { Self::Cholesky } else { Self::Gamg };
         let reason = format!(
-            "estimated time of {} steps with one matrix: {} with a factorisation, {} with multigrid",
+            "estimated time of {} step{} with one matrix: {} with a factorisation, {} with multigrid",
             problem.steps,
+            if problem.steps == 1 { "" } else { "s" },
             seconds(factored),
             seconds(multigrid)
         );

@@ -32,7 +32,8 @@ pub struct DampedResponse {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Symmetry {
-    /// p(-r) = p(r), as in equation (72) of Wang and Cheng (2022).
+    /// p(-r) = p(r), as in equation (72) of Wang and Cheng (2022): the foundation also pushes a body that moves away from it, and
+    /// so does work on it.
     #[default]
     Even,
     /// p(-r) = -p(r): the foundation resists motion in both directions.

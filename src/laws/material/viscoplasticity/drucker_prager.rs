@@ -41,7 +41,7 @@ pub struct DruckerPrager<N = f64> {
     #[schemars(range(min = 0), example = 0.6)]
     pub friction_coefficient: f64,
     /// Yield stress in pure shear at zero pressure. An expression in x, y, z is evaluated at the centre of each cell.
-    #[schemars(extend("unit" = "Pa", "minimum" = 0), example = 1e4)]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "minimum" = 0), example = 1e4)]
     pub cohesion: N,
 }
 

@@ -24,7 +24,7 @@ pub struct Perzyna<N = f64> {
     pub relaxation: f64,
     /// Yield stress: von Mises norm of the stress above which the material flows. An expression in x, y, z is evaluated at the
     /// centre of each cell.
-    #[schemars(extend("unit" = "Pa", "minimum" = 0), example = 19.0)]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "minimum" = 0), example = 19.0)]
     pub yield_stress: N,
     /// Exponent of the overstress. 1: the law of Wang and Cheng (2022). Above 1 the yield stress must be positive, and with scheme
     /// lagged_euler explicit_step_bound holds only while the von Mises norm is at most twice the yield stress.
