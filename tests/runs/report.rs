@@ -134,7 +134,7 @@ fn the_page_of_a_plane_run_has_its_pictures_and_the_known_numbers() {
     let html = std::fs::read_to_string(&page).expect("page");
     assert!(
         html.contains("Not drawn, because constant:")
-            && html.contains("touching area of contact bottom: 1 m")
+            && html.contains("touching area of contact bottom: 0.9375 m")
     );
     let document = parsed(&html);
     assert_eq!(
