@@ -29,7 +29,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-effects bench-space verification lint deny msrv book deb install clean
+.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-effects bench-space verification lint deny msrv book gallery deb install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -46,6 +46,7 @@ help:
 	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
 	@echo 'make bench-accuracy  the studies of docs/what-accuracy-costs.md; ARGS=--write puts their tables into it'
 	@echo 'make book      docs/ as a book in target/book, with its links and formulas checked'
+	@echo 'make gallery   run the jobs with pictures in README.md, and write the pictures'
 	@echo 'make bench-effects  what effects cost (docs/speed.md); ARGS=--write puts the table into it'
 	@echo 'make bench-space  errors in space against seconds and memory (docs/space.md); ARGS=--write puts the tables into it'
 	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'
@@ -149,6 +150,10 @@ deny:
 book: deps
 	cargo test --release --locked --test book
 	@echo '$(or $(CARGO_TARGET_DIR),target)/book/index.html'
+
+# The pictures of jobs in README.md.
+gallery: build
+	scripts/gallery.sh $(binary)
 
 msrv: deps
 	rustup toolchain install $(msrv) --profile minimal

@@ -509,8 +509,8 @@ fn chart(errors: &[(String, Vec<f64>)]) -> Option<String> {
     if series.is_empty() {
         return None;
     }
-    let x = Axis { quantity: "size of the cells, relative to the first mesh", unit: "" };
-    let mut chart = Chart::new(x, Axis { quantity: "relative error", unit: "" }, series);
+    let x = Axis::new("size of the cells, relative to the first mesh", "");
+    let mut chart = Chart::new(x, Axis::new("relative error", ""), series);
     (chart.logarithmic, chart.logarithmic_x) = (true, true);
     Some(chart.svg().expect("a chart"))
 }

@@ -151,6 +151,26 @@ fn the_start_page_is_one_page() {
     assert!(words <= 900, "README.md has {words} words");
 }
 
+/// The links of the book are those of tests/book.rs.
+#[test]
+fn links_and_pictures_of_pages_at_the_root_are_there() {
+    let mut missing = Vec::new();
+    let mut seen = 0;
+    for page in pages().into_iter().filter(|page| !page.starts_with("docs/")) {
+        let text = read(&page);
+        let pictures = text.split("<img src=\"").skip(1).filter_map(|rest| rest.split('"').next());
+        for target in links(&text).into_iter().chain(pictures).filter(|target| !target.starts_with("http")) {
+            let file = target.split('#').next().unwrap_or(target);
+            seen += 1;
+            if !file.is_empty() && !root().join(file).exists() {
+                missing.push(format!("{page}: {target}"));
+            }
+        }
+    }
+    assert!(seen > 30, "only {seen} links were seen");
+    assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
 /// The TOML blocks of a page, one after the other.
 fn toml(page: &str) -> String {
     let text = read(page);

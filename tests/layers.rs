@@ -1,10 +1,11 @@
 //! Rules of the source: modules use only modules above them, the files of a module have no circular imports, functions have few
-//! parameters, and `unsafe` occurs in few files only.
+//! parameters, `unsafe` occurs in few files only, and the licences of all packages are allowed.
 
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
+    process::Command,
 };
 
 /// Files and folders in which `unsafe` is allowed; folders end with a slash.
@@ -621,4 +622,59 @@ fn the_fuzz_targets_are_built_with_the_packages_of_the_solver() {
             package["version"]
         );
     }
+}
+
+/// Whether a licence in the notation of Cargo.toml can be fulfilled with these.
+fn is_licensed(expression: &str, allowed: &[&str]) -> bool {
+    let words = expression.replace('/', " OR ").replace(['(', ')'], " ");
+    // A package with two licences at the same time names them by AND; its alternatives by OR bind more tightly in all packages.
+    words.split(" AND ").all(|part| part.split(" OR ").any(|licence| allowed.contains(&licence.trim())))
+}
+
+#[test]
+fn alternatives_of_licences_are_read() {
+    let allowed = ["MIT", "Zlib", "Apache-2.0 WITH LLVM-exception"];
+    for expression in
+        ["MIT", "GPL-3.0/MIT", "(MIT OR GPL-3.0) AND Zlib", "Apache-2.0 WITH LLVM-exception OR Apache-2.0"]
+    {
+        assert!(is_licensed(expression, &allowed), "{expression}");
+    }
+    for expression in ["GPL-3.0", "Apache-2.0", "(MIT OR Zlib) AND GPL-3.0", ""] {
+        assert!(!is_licensed(expression, &allowed), "{expression}");
+    }
+}
+
+/// The list of deny.toml, also without `make deny`, which needs a network.
+#[test]
+fn the_licences_of_all_packages_are_allowed() {
+    let text = std::fs::read_to_string(root().join("deny.toml")).expect("deny.toml");
+    let rules: toml::Table = text.parse().expect("tables");
+    let list = |value: &toml::Value| -> Vec<String> {
+        value.as_array().expect("a list").iter().map(|one| one.as_str().expect("a name").to_owned()).collect()
+    };
+    let licences = &rules["licenses"];
+    let exceptions = licences["exceptions"].as_array().expect("a list");
+    let version = Command::new("rustc").arg("-vV").output().expect("rustc");
+    let version = String::from_utf8(version.stdout).expect("text");
+    let host = version.lines().find_map(|line| line.strip_prefix("host: ")).expect("a host");
+    let metadata = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--locked", "--offline", "--filter-platform", host])
+        .current_dir(root())
+        .output()
+        .expect("cargo");
+    assert!(metadata.status.success(), "{}", String::from_utf8_lossy(&metadata.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).expect("JSON");
+    let packages = metadata["packages"].as_array().expect("packages");
+    assert!(packages.len() > 100, "only {} packages were seen", packages.len());
+    let mut faults = Vec::new();
+    for package in packages {
+        let (name, licence) = (&package["name"], package["license"].as_str().unwrap_or_default());
+        let mut allowed = list(&licences["allow"]);
+        let own = exceptions.iter().filter(|exception| exception["crate"].as_str() == name.as_str());
+        own.for_each(|exception| allowed.extend(list(&exception["allow"])));
+        if !is_licensed(licence, &allowed.iter().map(String::as_str).collect::<Vec<_>>()) {
+            faults.push(format!("{name} has the licence {licence:?}, which deny.toml does not allow"));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }

@@ -132,6 +132,7 @@ fn the_page_of_a_plane_run_has_its_pictures_and_the_known_numbers() {
         assert!(names.iter().any(|other| other == name), "{name} is not in {names:?}");
     }
     let html = std::fs::read_to_string(&page).expect("page");
+    assert!(out.join("report/thumbnail.png").is_file());
     assert!(
         html.contains("Not drawn, because constant:")
             && html.contains("touching area of contact bottom: 0.9375 m")

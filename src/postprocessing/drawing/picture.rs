@@ -7,6 +7,8 @@ use std::sync::Arc;
 
 /// Pixels of a PNG file per unit of the view box.
 const RESOLUTION: f32 = 2.0;
+/// Pixels of a thumbnail per unit of the view box.
+const THUMBNAIL: f32 = 0.5;
 /// The font of PNG files, so that they need no font of the computer.
 const FONT: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
 
@@ -22,7 +24,7 @@ pub struct Picture {
     /// The drawing: a complete `svg` element.
     pub svg: String,
     /// The chart that is drawn; none for other drawings.
-    pub chart: Option<Chart>,
+    pub chart: Option<Box<Chart>>,
 }
 
 impl Picture {
@@ -40,7 +42,7 @@ impl Picture {
         caption: impl Into<String>,
     ) -> Result<Self> {
         let svg = chart.svg()?;
-        Ok(Self { chart: Some(chart), ..Self::new(name, alt, caption, svg) })
+        Ok(Self { chart: Some(Box::new(chart)), ..Self::new(name, alt, caption, svg) })
     }
 
     /// Two pictures to be seen beside each other: charts of the same quantities get the same axes.
@@ -75,18 +77,30 @@ impl Picture {
 
     /// The drawing as the content of a PNG file.
     pub fn png(&self) -> Result<Vec<u8>> {
+        self.rendered(&self.svg, RESOLUTION)
+    }
+
+    /// A small PNG file without the texts, which would be illegible.
+    pub fn thumbnail(&self) -> Result<Vec<u8>> {
+        let mut parts = self.svg.split("<text");
+        let mut svg = parts.next().unwrap_or_default().to_owned();
+        svg.extend(parts.filter_map(|part| Some(part.split_once("</text>")?.1)));
+        self.rendered(&svg, THUMBNAIL)
+    }
+
+    fn rendered(&self, svg: &str, resolution: f32) -> Result<Vec<u8>> {
         let fault =
             |words: String| Error::Internal(format!("the picture {} cannot be drawn: {words}", self.name));
         let mut options = usvg::Options::default();
         let fonts = Arc::make_mut(&mut options.fontdb);
         fonts.load_font_data(FONT.to_vec());
         fonts.set_sans_serif_family("DejaVu Sans");
-        let tree = usvg::Tree::from_str(&self.svg, &options).map_err(|error| fault(error.to_string()))?;
-        let size = tree.size().to_int_size().scale_by(RESOLUTION).ok_or_else(|| fault("no size".into()))?;
+        let tree = usvg::Tree::from_str(svg, &options).map_err(|error| fault(error.to_string()))?;
+        let size = tree.size().to_int_size().scale_by(resolution).ok_or_else(|| fault("no size".into()))?;
         let mut pixels =
             tiny_skia::Pixmap::new(size.width(), size.height()).ok_or_else(|| fault("no size".into()))?;
         pixels.fill(tiny_skia::Color::WHITE);
-        let zoom = tiny_skia::Transform::from_scale(RESOLUTION, RESOLUTION);
+        let zoom = tiny_skia::Transform::from_scale(resolution, resolution);
         resvg::render(&tree, zoom, &mut pixels.as_mut());
         pixels.encode_png().map_err(|error| fault(error.to_string()))
     }
@@ -123,6 +137,20 @@ mod tests {
         let [left, right] =
             Picture::beside_each_other([small(), chart("slip", [[0.0, 0.0], [4.0, 10.0]])]).expect("pair");
         assert!(left.svg == small().svg && has(&right, "10"));
+    }
+
+    #[test]
+    fn a_thumbnail_is_small_and_has_no_texts() {
+        let picture = |words: &str| {
+            let square = "<rect x=\"300\" y=\"10\" width=\"20\" height=\"20\"/>";
+            let svg = format!("{}{}{square}</svg>", open_svg(40.0), text(10.0, 25.0, "start", words));
+            Picture::new("p", "", "", svg)
+        };
+        let thumbnail = picture("von Mises stress").thumbnail().expect("PNG");
+        let pixels = tiny_skia::Pixmap::decode_png(&thumbnail).expect("pixels");
+        assert_eq!([pixels.width(), pixels.height()], [280, 20]);
+        assert_eq!(pixels.pixels().iter().filter(|pixel| pixel.red() == 0).count(), 100);
+        assert!(thumbnail == picture("other").thumbnail().expect("PNG"));
     }
 
     #[test]

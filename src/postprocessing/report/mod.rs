@@ -16,6 +16,7 @@ mod table;
 
 use crate::{
     error::{Error, Result},
+    io::output::field_list::VON_MISES,
     postprocessing::drawing::{body, chart, colour, markup, picture, scale, svg, view},
     run::VERSION,
 };
@@ -66,6 +67,10 @@ fn write_page(page: &Page, folder: &Path, name: &str, missing: Vec<String>) -> R
     for picture in page.pictures() {
         write(&folder.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
         write(&folder.join(format!("{}.png", picture.name)), &picture.png()?)?;
+    }
+    let stress = page.pictures().iter().find(|picture| picture.name == VON_MISES.name);
+    if let Some(picture) = stress.or(page.pictures().first()) {
+        write(&folder.join("thumbnail.png"), &picture.thumbnail()?)?;
     }
     let path = folder.join(name);
     let mut made_by = format!("Made by solver report, version {VERSION}. All quantities in SI units.");
