@@ -309,7 +309,8 @@ fn kind_in(schema: Schema, variables: &str) -> String {
         return kinds.join(" or ");
     }
     if schema.text("format") == Some("expression") {
-        return format!("a number or an expression in {variables}");
+        let infinite = if schema.get("infinite") == true { ", inf" } else { "" };
+        return format!("a number{infinite} or an expression in {variables}");
     }
     if let Some(items) = schema.items().filter(|_| schema.accepts("array")) {
         let count = match (schema.number("minItems"), schema.number("maxItems")) {
@@ -326,8 +327,9 @@ fn kind_in(schema: Schema, variables: &str) -> String {
         ("boolean", "true or false"),
         ("array", "a list"),
     ];
-    let accepted: Vec<&str> =
+    let mut accepted: Vec<&str> =
         plain.iter().filter(|(name, _)| schema.accepts(name)).map(|(_, words)| *words).collect();
+    accepted.extend((schema.get("infinite") == true).then_some("inf"));
     if accepted.is_empty() { "a value".into() } else { accepted.join(" or ") }
 }
 

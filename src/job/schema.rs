@@ -38,11 +38,11 @@ const OPENING: &str = "\
 A job is a TOML file with the tables below. [table] occurs at most once, [[table]] any number of times. An effect whose
 table is absent is not simulated. All quantities are in SI units. Paths are relative to the job file.
 
-Where a number or an expression is accepted, a table of values over time is, too: { table = \"load.csv\" } with the times in
+Where an expression in t is accepted, a table of values over time is, too: { table = \"load.csv\" } with the times in
 the first column of the file and the values in the second (column = 3: in the third), linear between the points and constant
 before the first and after the last. Expressions have + - * / ^, comparisons < <= > >= (1 or 0), min, max, abs, sign, floor,
 ceil, round, sqrt, cbrt, exp, ln, log10, sin, cos, tan, asin, acos, atan, atan2, hypot, sinh, cosh, tanh, step(x) (1 from 0
-on), pulse(t, start, end) (1 from start to end), if(condition, then, otherwise) and interpolate(t, t1, v1, t2, v2, ...).
+on), pulse(t, start, end) (1 from start to end), pi, e, inf, if(condition, then, otherwise) and interpolate(t, t1, v1, t2, v2, ...).
 
 ";
 

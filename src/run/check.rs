@@ -230,8 +230,10 @@ impl Report {
             parts.join(", ")
         ));
         let seconds = &self.estimate.seconds;
+        let newton =
+            if self.newton { "; steps with many Newton iterations take many times as long" } else { "" };
         lines.push(format!(
-            "time       about {} for setup, {} per step, {} in total without output; a rough estimate from one core of a common server, divided by the number of ranks",
+            "time       about {} for setup, {} per step, {} in total without output; a rough estimate from one core of a common server, divided by the number of ranks{newton}",
             duration(seconds.set_up),
             duration(seconds.step),
             duration(seconds.run)

@@ -22,18 +22,65 @@ pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<()
     refuse_unwritable(folder)?;
     log.lock(&folder.join(LOG), false)?;
     refuse_foreign(job, start)?;
-    if *start == Start::Anew { refuse_unfinished(folder) } else { Ok(()) }
+    let remedy = "continue it with --restart, or discard it and start again with --force";
+    if *start == Start::Anew { refuse_unfinished(folder, remedy) } else { Ok(()) }
 }
 
-/// Where a stage of several goes on: `None` if its folder holds its complete results. On one rank.
-pub(super) fn continuation(job: &Job) -> Result<Option<Start>> {
+/// The starts of stages; none for a stage that is complete. Stages that are continued begin with the first one that is not; the later
+/// ones start anew. Refuses folders in which a stage must not start. On one rank, before the first stage runs.
+pub(super) fn starts(stages: &[&Job], start: &Start) -> Result<Vec<Option<Start>>> {
+    if stages.len() == 1 {
+        return Ok(vec![Some(start.clone())]);
+    }
+    let are_continued = *start == Start::Newest;
+    let mut has_begun = !are_continued;
+    let mut starts = Vec::new();
+    for job in stages {
+        let found = match (has_begun, are_continued) {
+            (false, _) => continuation(job)?,
+            (true, false) => Some(start.clone()),
+            (true, true) => Some(Start::Anew),
+        };
+        has_begun |= found.is_some();
+        if found == Some(Start::Anew) {
+            let remedy = if are_continued {
+                "its start state has changed or will change; to discard the run, start all stages again with --force"
+            } else {
+                "continue the stages with --restart, or discard their results and start again with --force"
+            };
+            refuse_foreign(job, &Start::Anew)?;
+            refuse_unfinished(job.output_folder(), remedy)?;
+        }
+        starts.push(found);
+    }
+    Ok(starts)
+}
+
+/// Where a stage of several goes on: `None` if its folder holds its complete results.
+fn continuation(job: &Job) -> Result<Option<Start>> {
     let folder = job.output_folder();
+    if began_before_its_start(job)? {
+        return Ok(Some(Start::Anew));
+    }
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_default();
     let summary: serde_json::Value = serde_json::from_str(&read(SUMMARY)).unwrap_or_default();
     if summary["status"] == "completed" && read("job.toml") == job.to_toml()? {
         return Ok(None);
     }
     Ok(Some(if list(folder)?.is_empty() { Start::Anew } else { Start::Newest }))
+}
+
+/// Whether the state from which a job starts was written after the results in the folder of the job were begun.
+fn began_before_its_start(job: &Job) -> Result<bool> {
+    let Some(from) = job.initial.as_ref().and_then(|initial| initial.from.as_deref()) else {
+        return Ok(false);
+    };
+    let file =
+        if from.is_dir() { list(from)?.into_iter().next().map(|(_, file)| file) } else { Some(from.into()) };
+    let written = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
+    let begun = written(&job.output_folder().join("job.toml"));
+    let start = file.and_then(|file| written(&file));
+    Ok(begun.zip(start).is_some_and(|(begun, start)| start > begun))
 }
 
 /// Refuses a folder that can't be written or created. On one rank; changes no file.
@@ -53,7 +100,7 @@ pub(super) fn refuse_unwritable(folder: &Path) -> Result<()> {
 }
 
 /// Refuses a folder with a checkpoint of an unfinished run, because a new start would remove the checkpoint.
-fn refuse_unfinished(folder: &Path) -> Result<()> {
+fn refuse_unfinished(folder: &Path, remedy: &str) -> Result<()> {
     let saved = list(folder)?;
     let Some((newest, file)) = saved.first() else { return Ok(()) };
     let text = std::fs::read_to_string(folder.join(SUMMARY)).unwrap_or_default();
@@ -66,7 +113,7 @@ fn refuse_unfinished(folder: &Path) -> Result<()> {
         _ => "did not finish",
     };
     Err(Error::Refused(format!(
-        "{}: the folder holds a run that {what}, saved up to step {newest} ({}); continue it with --restart, or discard it and start again with --force",
+        "{}: the folder holds a run that {what}, saved up to step {newest} ({}); {remedy}",
         folder.display(),
         file.display()
     )))
@@ -158,7 +205,7 @@ mod tests {
     fn a_checkpoint_is_lost_by_a_new_start_only_where_its_run_came_to_its_end() {
         let refused = |summary: Option<&str>, checkpoints: &[u64]| {
             let folder = folder(summary, checkpoints);
-            refuse_unfinished(folder.path()).err().map(|error| error.to_string())
+            refuse_unfinished(folder.path(), "--restart or --force").err().map(|error| error.to_string())
         };
         let completed = r#"{"status": "completed", "steps": 8}"#;
         assert_eq!(refused(Some(completed), &[4, 8]), None);

@@ -32,7 +32,7 @@ pub use summary::Summary;
 
 use crate::{
     error::{Exit, Result},
-    job::Loaded,
+    job::{Job, Loaded},
     laws::material::Hypothesis,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -61,7 +61,8 @@ pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Re
 }
 
 /// Runs stages one after the other, each from the start that the command line asks for. Stages that are continued begin with the first
-/// one whose results are not complete, from its newest checkpoint if it has one; the later ones start anew. Collective.
+/// one whose results are not complete, from its newest checkpoint if it has one, or which began before its start state was written;
+/// the later ones start anew. All output folders are checked before the first stage runs. Collective.
 pub fn run_stages(
     session: &Session,
     stages: Vec<Loaded>,
@@ -69,27 +70,22 @@ pub fn run_stages(
     clock: Clock,
 ) -> Result<Exit, Agreed> {
     let mut clock = clock;
-    let are_continued = stages.len() > 1 && *start == Start::Newest;
-    let mut has_begun = !are_continued;
-    for stage in stages {
-        let mut start = start.clone();
-        if !has_begun {
-            let found = session.on_first(|| folder::continuation(&stage.job))?;
-            // The first rank alone reads the folder.
-            let is = |wanted: Option<Start>| session.total(usize::from(found == Some(wanted))) > 0;
-            if is(None) {
-                if session.is_first() && clock.on_terminal {
-                    let folder = stage.job.output_folder().display();
-                    let _ = writeln!(std::io::stdout(), "{folder}: completed before");
-                }
-                continue;
+    let jobs: Vec<&Job> = stages.iter().map(|stage| &stage.job).collect();
+    let starts = session.on_first(|| folder::starts(&jobs, start))?;
+    // The first rank alone reads the folders.
+    let is = |at: usize, wanted: &Option<Start>| {
+        session.total(usize::from(starts.as_ref().is_some_and(|starts| starts[at] == *wanted))) > 0
+    };
+    for (at, stage) in stages.into_iter().enumerate() {
+        if is(at, &None) {
+            if session.is_first() && clock.on_terminal {
+                let folder = stage.job.output_folder().display();
+                let _ = writeln!(std::io::stdout(), "{folder}: completed before");
             }
-            start = if is(Some(Start::Newest)) { Start::Newest } else { Start::Anew };
-            has_begun = true;
-        } else if are_continued {
-            start = Start::Anew;
+            continue;
         }
-        let exit = run(session, stage, &start, clock)?;
+        let start = if is(at, &Some(Start::Anew)) { &Start::Anew } else { start };
+        let exit = run(session, stage, start, clock)?;
         if exit != Exit::Done {
             return Ok(exit);
         }

@@ -125,9 +125,11 @@ impl Summary {
     pub fn range_warnings(&self) -> impl Iterator<Item = String> {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
+            let advice =
+                if self.effects.contains(&"inertia") { "; a smaller [time] step raises this bound" } else { "" };
             format!(
                 "the contact pressure reached {most:.4e} Pa, but with weakening friction a step is certain to have one solution only up \
-                 to {bound:.4e} Pa; a smaller [time] step raises this bound"
+                 to {bound:.4e} Pa{advice}"
             )
         });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {

@@ -188,6 +188,24 @@ fn stages_that_were_stopped_go_on_with_the_first_one_that_is_not_complete() {
     launch::run(2, &["run", &one, "--set", "time.end=0.25", "--force"]).expect(0);
     launch::run(2, &both(&["--restart"])).expect(0).says("removed");
     assert_eq!(straight, tables.map(|name| second.results().text(name)));
+    // The first is run again alone: the second does not belong to its results any more.
+    launch::run(1, &["run", &one, "--force"]).expect(0);
+    let outcome = launch::run(2, &both(&["--restart"])).expect(0).says("out: completed before");
+    assert_eq!(outcome.stdout.matches("completed before").count(), 1, "{}", outcome.stdout);
+    launch::run(2, &both(&["--restart"])).expect(0).says("out: completed before");
+    // The second is stopped: a new start of both is refused before the first one runs.
+    launch::run(2, &["run", &two, "--set", "time.end=0.25", "--force"]).expect(0);
+    let summary = second.results().path("summary.json");
+    let stopped = std::fs::read_to_string(&summary).expect("summary").replace("\"completed\"", "\"stopped\"");
+    std::fs::write(&summary, stopped).expect("written");
+    let log = first.results().text("run.log");
+    launch::run(2, &both(&[])).expect(2).says("the folder holds a run that was stopped").says("--restart");
+    assert_eq!(first.results().text("run.log"), log);
+    // A new start state leaves nothing to continue.
+    launch::run(1, &["run", &one, "--force"]).expect(0);
+    launch::run(2, &both(&["--restart"])).expect(2).says("its start state has changed");
+    launch::run(2, &both(&["--force"])).expect(0);
+    assert_eq!(straight, tables.map(|name| second.results().text(name)));
 }
 
 #[test]

@@ -19,16 +19,21 @@ pub const DEBONDING: EnergyKind = EnergyKind::new(10, Role::Dissipated, "adhesio
 /// `u_{n-1}`. With the potential `F` of the law the work against it is exactly
 ///
 /// ```text
-/// -w b_n^2 t(u_{n-1}) . (u_n - u_{n-1}) = d(w b^2 F(u)) + w (b_{n-1}^2 - b_n^2) F(u_{n-1}) - numerical
+/// -w b_n^2 t(u_{n-1}) . (u_n - u_{n-1}) = d(w b^2 F(u)) + released - numerical
+/// released = w (b_{n-1}^2 - b_n^2) F(u_{n-1})
 /// numerical = w b_n^2 (F(u_n) - F(u_{n-1}) + t(u_{n-1}) . (u_n - u_{n-1})).
 /// ```
 ///
 /// In an implicit step the force is `w b_n^2 t(u_n)` with `b_n` from `u_n`, and
 ///
 /// ```text
-/// -k w b_n^2 t(u_n) . v_n = d(w b^2 F(u)) + w (b_{n-1}^2 - b_n^2) (F(u_{n-1}) + F(u_n)) / 2 - numerical
+/// -k w b_n^2 t(u_n) . v_n = d(w b^2 F(u)) + released - numerical
+/// released = w (b_{n-1}^2 - b_n^2) (F(u_{n-1}) + F(u_n)) / 2
 /// numerical = w (b_{n-1}^2 + b_n^2) / 2 (F(u_n) - F(u_{n-1})) + k w b_n^2 t(u_n) . v_n.
 /// ```
+///
+/// In a long step `released` may be many times the energy of the bonds, because `F` continues to grow. The dissipated energy is that
+/// of the law, [`Toughness::dissipated`], and the rest of `released` is numerical; with a truncation length it is all dissipated.
 ///
 /// Faces of the body that meet at a node share its bonding, which follows from the sums over them.
 #[derive(Debug)]
@@ -92,6 +97,23 @@ impl<const D: usize> Adhesion<D> {
         (drive, toughness)
     }
 
+    /// Books the energy in J that bonds at the points of a node release in a step of this length in which the bonding falls from the
+    /// first value to the second.
+    fn book(
+        &self,
+        group: &[(usize, SurfacePoint<D>)],
+        bondings: [f64; 2],
+        (released, length): (f64, f64),
+        energy: &mut Energy,
+    ) {
+        let mut toughness = Toughness::default();
+        group.iter().for_each(|(law, point)| toughness.add(point.weight, &self.laws[*law].toughness()));
+        let is_truncated = group.iter().any(|(law, _)| self.laws[*law].length.is_some());
+        let dissipated = if is_truncated { released } else { toughness.dissipated(bondings, length) };
+        energy[DEBONDING] += dissipated;
+        energy[NUMERICAL] += dissipated - released;
+    }
+
     /// Energy in J that intact bonds at the points of a node store.
     fn potential(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> f64 {
         let of_point = |(law, point): &(usize, SurfacePoint<D>)| {
@@ -116,7 +138,8 @@ impl<const D: usize> Adhesion<D> {
         for ((group, before), after) in self.groups().zip(&self.bonding.converged).zip(&mut trial) {
             let (drive, toughness) = self.drive(group, displacement);
             [*after, _] = toughness.relax(*before, drive, step.length);
-            energy[DEBONDING] += (before * before - *after * *after) * self.potential(group, displacement);
+            let released = (before * before - *after * *after) * self.potential(group, displacement);
+            self.book(group, [*before, *after], (released, step.length), energy);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&point.value(displacement), &point.normal);
                 point.add(point.weight * *after * *after, &traction, forces);
@@ -229,11 +252,12 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         let Evaluation::End(blend) = at else { return };
         self.advance(Evolution { blend, length: step.length }, nodal.displacement);
         let bondings = self.bonding.converged.iter().zip(&self.bonding.trial);
-        for (group, (before, after)) in self.groups().zip(bondings) {
-            let (before, after) = (before * before, after * after);
+        for (group, (bonding, next)) in self.groups().zip(bondings) {
+            let (before, after) = (bonding * bonding, next * next);
             let ends = [nodal.previous_displacement, nodal.displacement];
             let potentials = ends.map(|displacement| self.potential(group, displacement));
-            energy[DEBONDING] += (before - after) * 0.5 * (potentials[0] + potentials[1]);
+            let released = (before - after) * 0.5 * (potentials[0] + potentials[1]);
+            self.book(group, [*bonding, *next], (released, step.length), energy);
             energy[NUMERICAL] += 0.5 * (before + after) * (potentials[1] - potentials[0]);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&point.value(nodal.displacement), &point.normal);

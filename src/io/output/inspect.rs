@@ -65,7 +65,12 @@ fn describe_checkpoint(file: &hdf5::File) -> hdf5::Result<String> {
 fn describe_fields(file: &hdf5::File) -> hdf5::Result<String> {
     let nodes = file.dataset("VTKHDF/Points")?.shape();
     let cells = file.dataset("Mesh/cells")?.shape();
-    let kind = if cells.get(1) == Some(&3) { "triangles" } else { "tetrahedra" };
+    let kind = match cells.get(1) {
+        Some(3) => "triangles",
+        Some(6) => "quadratic triangles",
+        Some(10) => "quadratic tetrahedra",
+        _ => "tetrahedra",
+    };
     let count = |shape: &[usize]| shape.first().copied().unwrap_or(0);
     let mut text = format!("fields on {} nodes and {} {kind}\n", count(&nodes), count(&cells));
     let fields = file.group("Fields")?.member_names()?;

@@ -140,6 +140,15 @@ fn name(job: &Job, source: Source) -> String {
     format!("{kind} {}", on.join("+").replace([',', '"', '\n', '\r'], "_"))
 }
 
+/// The names of all sources that a run of the job may have.
+pub(crate) fn source_names(job: &Job) -> Vec<String> {
+    let supports = (0..job.support.len()).map(Source::Support);
+    let contacts = (0..job.contact.len()).map(Source::Contact);
+    let tractions = (0..job.traction.len()).map(Source::Traction);
+    let others = [Source::BodyForce, Source::Momentum];
+    supports.chain(contacts).chain(tractions).chain(others).map(|source| name(job, source)).collect()
+}
+
 /// The columns of the motion of an obstacle, each after a comma; empty where no force moves one.
 struct ObstaclePath {
     motion: Option<[f64; 2]>,

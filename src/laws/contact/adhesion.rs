@@ -97,6 +97,20 @@ impl Toughness {
         let bonding = ((viscosity * start + length * energy) / resistance).min(start);
         [bonding, -length * bonding / resistance]
     }
+
+    /// The energy in J/m^2 or J that bonds without a `length` dissipate while the bonding falls from the first value to the second
+    /// in a step of this length in s: `-b b' drive` integrated over the step, with the drive at which the bonding gives way.
+    pub fn dissipated(&self, [before, after]: [f64; 2], length: f64) -> f64 {
+        let Self { energy, viscosity, softening: [begin, end] } = *self;
+        if end > 0.0 {
+            let [first, last] = [begin, end].map(f64::sqrt);
+            // The separation, times the root of the stiffness, at which the bonding of the law has this value.
+            let opened = |bonding: f64| first * last / (bonding * bonding * (last - first) + first);
+            return 0.5 * first * last / (last - first) * (opened(after) - opened(before));
+        }
+        let fall = before - after;
+        (energy + viscosity * fall / length) * fall
+    }
 }
 
 /// The bonding of a cohesive law, not above `start`, and its derivative with respect to the driving force, given the driving forces at
@@ -310,6 +324,29 @@ mod tests {
         assert!((peak / (100.0f64 * 0.5).sqrt() - 1.0).abs() < 1e-3, "peak {peak}");
         assert!((dissipated / 0.5 - 1.0).abs() < 2e-3, "dissipated {dissipated}");
         assert!((work / 0.5 - 1.0).abs() < 2e-3, "work {work}");
+    }
+
+    #[test]
+    fn steps_of_any_length_dissipate_the_energy_of_the_bonds() {
+        let brittle = Adhesion { viscosity: 0.0, length: None, ..GLUE };
+        for law in [brittle, COHESIVE] {
+            let toughness = law.toughness();
+            let whole = toughness.dissipated([1.0, 0.0], 1.0);
+            assert!((whole / law.energy - 1.0).abs() < 1e-14, "at once: {whole}");
+            let (mut bonding, mut sum, mut integral, mut last) = (1.0, 0.0, 0.0, 0.0);
+            for step in 1..=4000 {
+                let u = [0.0, 1e-4 * f64::from(step)];
+                let [next, _] = toughness.relax(bonding, law.drive(&u, &DOWN), 1.0);
+                let potential = law.potential(&u, &DOWN);
+                integral += (bonding * bonding - next * next) * 0.5 * (potential + last);
+                sum += toughness.dissipated([bonding, next], 1.0);
+                (bonding, last) = (next, potential);
+            }
+            assert!((sum - toughness.dissipated([1.0, bonding], 1.0)).abs() < 1e-12 * whole);
+            assert!((sum / integral - 1.0).abs() < 1e-4, "{sum} and {integral}");
+        }
+        // From 1 to 0.9 in half a second: (0.5 + 2 * 0.2) * 0.1.
+        assert!((GLUE.toughness().dissipated([1.0, 0.9], 0.5) - 0.09).abs() < 1e-15);
     }
 
     /// Stiffness 100 Pa/m, strength 5 Pa: intact up to 0.05 m, broken at 0.4 m.

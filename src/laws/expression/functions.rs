@@ -26,6 +26,7 @@ const NAMES: &[(&str, Meaning)] = &[
     ("z", Meaning::Value(Instruction::Variable(Variable::Z))),
     ("pi", Meaning::Value(Instruction::Number(std::f64::consts::PI))),
     ("e", Meaning::Value(Instruction::Number(std::f64::consts::E))),
+    ("inf", Meaning::Value(Instruction::Number(f64::INFINITY))),
     ("min", Meaning::Many(Binary::of_pieces(f64::min, below))),
     ("max", Meaning::Many(Binary::of_pieces(f64::max, below))),
     ("atan2", Meaning::Two(Binary::smooth(f64::atan2))),

@@ -2,7 +2,7 @@
 
 use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values};
 use crate::{
-    io::output::{field_list::FIELDS, history::columns},
+    io::output::{field_list::FIELDS, history::columns, resultants::source_names},
     job::{Document, Job},
     laws::nearest::nearest,
 };
@@ -200,7 +200,7 @@ fn known_columns(parts: &[&str], base: &Job) -> Vec<String> {
     known.extend(match parts {
         ["profile", ..] => [plain(axes), plain(&OF_PROFILES)].concat(),
         ["resultant", ..] => [plain(&["moment_x", "moment_y", "moment_z"]), plain(&OF_RESULTANTS)].concat(),
-        ["history", _] => columns().map(str::to_owned).collect(),
+        ["history", ..] => columns().map(str::to_owned).collect(),
         [_] => {
             let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.names);
             OF_SUMMARY.iter().chain(figures).map(|name| (*name).to_owned()).collect()
@@ -227,7 +227,17 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
             }
             true
         }
-        ["history", _] | ["resultant", _, _] => true,
+        ["resultant", source, _] | ["resultant", source, "max" | "min", _] => {
+            let names = source_names(base);
+            if !names.iter().any(|name| name == source) {
+                let near = nearest(source, names.iter().map(String::as_str));
+                let near = near.map_or(String::new(), |near| format!("did you mean `{near}`? "));
+                let help = format!("{near}the base job has: {}", names.join(", "));
+                document.fault(&path, format!("no source of resultants is called `{source}`"), help);
+            }
+            true
+        }
+        ["history", _] | ["history", "max" | "min", _] => true,
         ["probe" | "profile" | "history" | "resultant", ..] => false,
         ref parts => parts.iter().all(|part| !part.is_empty()),
     };
@@ -242,7 +252,8 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
     }
     if !has_form {
         let help = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
-                    resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also .min., of profiles .first.)";
+                    resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also history.max.COLUMN and \
+                    resultant.SOURCE.max.COLUMN; .min. in place of .max., of profiles also .first.)";
         document.fault(&path, format!("`{name}` is not a quantity"), help);
     }
     if study.response[..index].iter().any(|other| other.of == *name) {

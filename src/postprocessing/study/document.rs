@@ -184,8 +184,9 @@ pub struct Draws {
 #[serde(deny_unknown_fields)]
 pub struct Response {
     /// A quantity named as in [check] of a job: a number of summary.json such as "max_von_mises", or history.COLUMN,
-    /// probe.NAME.COLUMN, probe.NAME.max.COLUMN, resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN; .min. and, of profiles, .first. in place of .max. Probes and profiles are those
-    /// of the base job.
+    /// probe.NAME.COLUMN or resultant.SOURCE.COLUMN at the end; history.max.COLUMN, probe.NAME.max.COLUMN or
+    /// resultant.SOURCE.max.COLUMN over all steps; profile.BOUNDARY.max.COLUMN over the boundary at the end. .min. and, of profiles,
+    /// .first. in place of .max. Probes and profiles are those of the base job.
     #[schemars(length(min = 1), example = "probe.tip.displacement_y")]
     pub of: String,
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 ///
 /// A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table: `history.COLUMN`,
 /// `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN`, `.min.` or `.first.` over the
-/// boundary or at its first point, at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
+/// boundary or at its first point, at the last output. With `.max.` or `.min.` before the column, the others are over all steps.
 pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
     let parts: Vec<&str> = name.split('.').collect();
     match parts[..] {
@@ -19,7 +19,12 @@ pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
         ["resultant", source, field] => {
             column(folder, "resultants.csv", Some(("source", source)), field)?.pop()
         }
+        ["resultant", source, side, field] => {
+            let all = column(folder, "resultants.csv", Some(("source", source)), field)?.into_iter();
+            extreme(side, all)
+        }
         ["history", field] => column(folder, "history.csv", None, field)?.pop(),
+        ["history", side, field] => extreme(side, column(folder, "history.csv", None, field)?.into_iter()),
         ["profile", boundary, side, field] => {
             let filter = Some(("profile", boundary));
             let times = column(folder, "profiles.csv", filter, "time")?;
@@ -71,12 +76,16 @@ mod tests {
             r#"{"max_von_mises": 4.5, "status": "completed", "certificates": {"theta": 0.5}}"#,
         );
         write("history.csv", "step,work\n1,2.5\n2,3.5\n");
+        write("resultants.csv", "step,source,force_x\n1,contact low,7\n1,momentum,9\n2,contact low,-3\n");
         write("probes.csv", "step,probe,velocity_y\n1,a,1\n1,b,2\n2,a,3\n2,b,4\n");
         write("profiles.csv", "time,profile,x,pressure\n1,low,0,9\n2,low,0,-1\n2,low,1,5\n2,top,0,7\n");
         let cases = [
             ("max_von_mises", 4.5),
             ("certificates.theta", 0.5),
             ("history.work", 3.5),
+            ("history.min.work", 2.5),
+            ("resultant.contact low.force_x", -3.0),
+            ("resultant.contact low.max.force_x", 7.0),
             ("probe.a.velocity_y", 3.0),
             ("probe.b.min.velocity_y", 2.0),
             ("probe.a.max.velocity_y", 3.0),

@@ -37,6 +37,13 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
     }
     for fall in contacts.iter().filter_map(|contact| contact.decrease_per_pressure(step_length)) {
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
+            if bound == 0.0 {
+                let why = match theta_step {
+                    Some(0.0) => ", because nothing but the contact holds the body",
+                    _ => "",
+                };
+                return format!("; uniqueness of steps is certified for no contact pressure{why}");
+            }
             // If no other graph decreases, theta is proportional to the pressure.
             let each = match theta_step {
                 Some(0.0) => {

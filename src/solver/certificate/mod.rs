@@ -25,8 +25,8 @@
 //! `m_j` is the steepest decrease of a contact graph, `m_t` that of a friction graph (slip weakening: the decrease of the
 //! coefficient times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. If the normal law has
 //! no largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1, `1 / sup of sum d S_tau(w)`
-//! over `(K w, w) - sum (m_j S_nu(w) + m_t S_tau(w))` with the decrease `d` of the coefficient; the run compares its pressures with
-//! this bound. Suprema are taken over the velocities that the supports allow. The numerical values approach them from below, with a
+//! over `(K w, w) - sum (m_j S_nu(w) + m_t S_tau(w))` with the decrease `d` of the coefficient, and 0 where nothing but the contact
+//! holds the body; the run compares its pressures with this bound. Suprema are taken over the velocities that the supports allow. The numerical values approach them from below, with a
 //! relative error of about 1e-6; statements on the uniqueness of solutions keep a margin of 1e-3 ([`Certificates::MARGIN`]). On
 //! meshes with more than 10,000 velocity components `explicit_step_bound` is the smallest of the bounds of single cells, which is
 //! never too large, unless a step of the run is longer than that. If a region of the body has no viscosity, `m_A` is 0 and `theta`
@@ -89,19 +89,20 @@ impl Certificates {
         };
         let scheme_is_implicit = matrix.scheme.is_implicit();
         let mut suprema = Suprema::new(session, body, state, matrix);
-        let mut find = |supremum| suprema.find(supremum);
         if !body.contacts.is_empty() {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
-            known.theta_step = Some(if falling { find(Supremum::ThetaStep)? } else { 0.0 });
+            known.theta_step = Some(if falling { suprema.find(Supremum::ThetaStep)? } else { 0.0 });
             if viscous && decrease.is_none() {
-                known.theta = Some(if falling { find(Supremum::Theta)? } else { 0.0 });
+                known.theta = Some(if falling { suprema.find(Supremum::Theta)? } else { 0.0 });
             }
-            known.trace_norm_squared = Some(find(Supremum::TraceNorm)?)
+            known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?)
                 .filter(|norm| *norm < RIGID * extent(session, &body.mesh.nodes));
         }
         if body.contacts.iter().any(|contact| contact.decrease_per_pressure(length).is_some()) {
             let bound = if known.steps_are_unique() {
-                (1.0 - Self::MARGIN) / find(Supremum::SlipPressure)?
+                let largest = suprema.find(Supremum::SlipPressure)?;
+                let is_held = !suprema.is_of_rigid_motion(Supremum::SlipPressure, largest)?;
+                if is_held { (1.0 - Self::MARGIN) / largest } else { 0.0 }
             } else {
                 0.0
             };
@@ -118,7 +119,7 @@ impl Certificates {
             let least = cells::explicit_step_bound(session, body).filter(|waves| is_large && decides(waves));
             let waves = match least {
                 Some(waves) => waves,
-                None => 1.0 / find(Supremum::ExplicitStep)?,
+                None => 1.0 / suprema.find(Supremum::ExplicitStep)?,
             };
             let bound = flow.map_or(waves, |flow| waves.min(flow));
             known.explicit_step_bound = Some(bound);

@@ -21,6 +21,10 @@ const CONTACT_LIMITS: Limits = Limits { tolerance: 1e-8, iterations: 200 };
 /// `theta_step` of the suggested largest step; the distance from 1 allows for the rounding of its digits.
 const SUGGESTED_THETA_STEP: f64 = 1.0 - 2.0 * Certificates::MARGIN;
 
+/// Ratio of a supremum over the motions to the quotient of an irregular motion above which the denominator of the supremum is a
+/// rounding error.
+const RESOLVED: f64 = 1e12;
+
 /// The supremum to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Supremum {
@@ -82,6 +86,22 @@ impl<'a, 'm, const D: usize, const S: usize> Suprema<'a, 'm, D, S> {
         let peak = maximise(session, &mut pencil, start, beside, CONTACT_LIMITS)?;
         self.peak = Some(peak.vector);
         Ok(peak.value)
+    }
+}
+
+impl<const D: usize, const S: usize> Suprema<'_, '_, D, S> {
+    /// Whether a supremum of a quotient by the matrix of the step is only that of rounding errors: a motion of the contact boundary
+    /// costs nothing that the matrix can resolve, because nothing but the contact holds the body. Collective.
+    pub(super) fn is_of_rigid_motion(&mut self, supremum: Supremum, value: f64) -> Result<bool> {
+        let mut x = pseudorandom_vector(self.body, self.state)?;
+        let mut pencil = Pencil { body: self.body, matrix: &mut *self.matrix, supremum };
+        let mut values = Vec::new();
+        for form in 0..pencil.forms() {
+            let mut y = x.like()?;
+            pencil.apply(form, &mut x, &mut y)?;
+            values.push(x.dot(&y)?);
+        }
+        Ok(value > RESOLVED * pencil.value(&values))
     }
 }
 

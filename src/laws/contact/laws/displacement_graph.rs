@@ -28,15 +28,15 @@ pub struct DisplacementGraph {
     /// an upward jump.
     #[schemars(length(min = 1), extend("unit" = "[m, Pa]"), example = [[-2e-3, 0.0], [-1e-3, -50.0], [0.0, 0.0]])]
     pub points: Vec<[f64; 2]>,
-    /// Slope of the pressure at penetrations beyond the last corner; infinite for a rigid obstacle.
+    /// Slope of the pressure at penetrations beyond the last corner; inf for a rigid obstacle.
     #[serde(default)]
-    #[schemars(extend("unit" = "Pa/m"), example = 1e6)]
+    #[schemars(extend("infinite" = true, "unit" = "Pa/m"), example = 1e6)]
     pub slope_after: f64,
     /// Gap: distance from the undeformed boundary to the obstacle along the outward normal, as a number or an expression in the
-    /// time t and the undeformed coordinates x, y, z. Infinite: no obstacle. Absent: 0, or the distance to [contact.obstacle] if
+    /// time t and the undeformed coordinates x, y, z. inf: no obstacle. Absent: 0, or the distance to [contact.obstacle] if
     /// there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
+    #[schemars(extend("infinite" = true, "unit" = "m"), example = "0.01 - 0.1*t")]
     pub gap: Option<Scalar>,
 }
 

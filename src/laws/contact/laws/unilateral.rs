@@ -20,10 +20,10 @@ pub struct Unilateral {
     #[serde(default)]
     pub bound: Bound,
     /// Gap: distance from the undeformed boundary to the obstacle along the outward normal, as a number or an expression in the
-    /// time t and the undeformed coordinates x, y, z. Infinite: no obstacle. Absent: 0, or the distance to [contact.obstacle] if
+    /// time t and the undeformed coordinates x, y, z. inf: no obstacle. Absent: 0, or the distance to [contact.obstacle] if
     /// there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
+    #[schemars(extend("infinite" = true, "unit" = "m"), example = "0.01 - 0.1*t")]
     pub gap: Option<Scalar>,
 }
 
