@@ -89,10 +89,7 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
             format!("{run}[[response]]\nof = \"history.max.work\"\n"),
             "there is no quantity `history.max.work`",
         ),
-        (
-            format!("{run}[[response]]\nof = \"resultant.suport left.force_x\"\n"),
-            "did you mean `support left`?",
-        ),
+        (format!("{run}[[response]]\nof = \"resultant.momentun.force_x\"\n"), "did you mean `momentum`?"),
         (format!("{run}[[response]]\nof = \"max_vonmises\"\n"), "did you mean `max_von_mises`?"),
         (format!("{run}[[response]]\nof = \"history.kinetic_enery\"\n"), "did you mean `kinetic_energy`?"),
         (format!("{run}[[response]]\nof = \"history.nothing\"\n"), "there is no quantity `history.nothing`"),

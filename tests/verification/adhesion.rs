@@ -47,7 +47,11 @@ impl Mass {
             if open(middle) > 0.0 { high = middle } else { low = middle }
         }
         let potential = bond.stiffness * stretch * (self.moved.max(0.0) - 0.5 * stretch);
-        self.dissipated += (self.bonding.powi(2) - low * low) * potential;
+        self.dissipated += if bond.length.is_finite() {
+            (self.bonding.powi(2) - low * low) * potential
+        } else {
+            low * drive * (self.bonding - low)
+        };
         self.bonding = low;
         let pull = low * low * bond.stiffness * stretch;
         self.peak = larger(self.peak, pull);
