@@ -183,6 +183,12 @@ fn files_of_a_run_are_inspected() {
     run(2, &arguments).expect(0);
     let file = |name: &str| folder.path().join(name).display().to_string();
     run_alone(&["inspect", &file("fields.vtkhdf")]).expect(0).says("fields on 25 nodes and 32 triangles");
+    let quadratic = folder.path().join("quadratic").display().to_string();
+    let other = format!("output.folder={quadratic}");
+    let more = ["--set", "mesh.order=2", "--set", &other];
+    run(1, &[&[paper.as_str()][..], &short, &more].concat()).expect(0);
+    let fields = format!("{quadratic}/fields.vtkhdf");
+    run_alone(&["inspect", &fields]).expect(0).says("fields on 81 nodes and 32 quadratic triangles");
     run_alone(&["inspect", &file("checkpoint-2.h5")]).expect(0).says("\"step\": 2");
     let mut bytes = std::fs::read(file("checkpoint-2.h5")).expect("read");
     bytes[3000] ^= 1;

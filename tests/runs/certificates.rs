@@ -131,6 +131,34 @@ fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law(
     }
 }
 
+/// Springs hold the top tangentially: the block can turn about a point of it, and slides then on the ground.
+#[test]
+fn friction_that_alone_holds_a_body_is_certified_for_no_pressure() {
+    let held = |springs: &str, cells: &str| {
+        Case::of("slip_weakening_block")
+            .without("material.density")
+            .without("material.viscosity")
+            .without("initial")
+            .without("body_force")
+            .set("material.elasticity", "{ youngs_modulus = 1e9, poisson_ratio = 0.25 }")
+            .set("support", &format!("[{{ on = ['top'], stiffness = {{ {springs} }} }}]"))
+            .set("traction", "[{ on = ['top'], value = [0, -1e5] }]")
+            .set("mesh.rectangle.cells", cells)
+            .set("time.scheme", "'implicit_euler'")
+    };
+    for (ranks, cells) in [(1, "[16, 4]"), (2, "[16, 4]"), (2, "[40, 10]")] {
+        let turning = check(&held("tangential = 2e9", cells), ranks);
+        assert_eq!(certificate(&turning, "slip_pressure_bound"), 0.0, "{cells} on {ranks}");
+        let words = turning["certificates"]["not_covered"][1].as_str().expect("words").to_owned();
+        assert!(
+            words.contains("for no contact pressure, because nothing but the contact holds the body"),
+            "{words}"
+        );
+        let standing = check(&held("tangential = 2e9, normal = 1e9", cells), ranks);
+        assert!(certificate(&standing, "slip_pressure_bound") > 1e5, "{cells} on {ranks}: {standing}");
+    }
+}
+
 #[test]
 fn a_run_is_compared_with_the_pressure_that_slip_weakening_is_certified_for() {
     for (step, beyond) in [("0.01", false), ("0.25", true)] {

@@ -100,9 +100,11 @@ impl Certificates {
         }
         if body.contacts.iter().any(|contact| contact.decrease_per_pressure(length).is_some()) {
             let bound = if known.steps_are_unique() {
-                let largest = suprema.find(Supremum::SlipPressure)?;
-                let is_held = !suprema.is_of_rigid_motion(Supremum::SlipPressure, largest)?;
-                if is_held { (1.0 - Self::MARGIN) / largest } else { 0.0 }
+                if suprema.is_unbounded_by_rigid_motions(Supremum::SlipPressure)? {
+                    0.0
+                } else {
+                    (1.0 - Self::MARGIN) / suprema.find(Supremum::SlipPressure)?
+                }
             } else {
                 0.0
             };

@@ -21,9 +21,10 @@ const CONTACT_LIMITS: Limits = Limits { tolerance: 1e-8, iterations: 200 };
 /// `theta_step` of the suggested largest step; the distance from 1 allows for the rounding of its digits.
 const SUGGESTED_THETA_STEP: f64 = 1.0 - 2.0 * Certificates::MARGIN;
 
-/// Ratio of a supremum over the motions to the quotient of an irregular motion above which the denominator of the supremum is a
-/// rounding error.
-const RESOLVED: f64 = 1e12;
+/// Share of the quotients of an irregular motion below which those of a rigid motion are rounding errors.
+const UNRESOLVED: f64 = 1e-13;
+/// Share of the square of a motion below which what is left of it without others is a rounding error.
+const DEPENDENT: f64 = 1e-10;
 
 /// The supremum to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,19 +91,76 @@ impl<'a, 'm, const D: usize, const S: usize> Suprema<'a, 'm, D, S> {
 }
 
 impl<const D: usize, const S: usize> Suprema<'_, '_, D, S> {
-    /// Whether a supremum of a quotient by the matrix of the step is only that of rounding errors: a motion of the contact boundary
-    /// costs nothing that the matrix can resolve, because nothing but the contact holds the body. Collective.
-    pub(super) fn is_of_rigid_motion(&mut self, supremum: Supremum, value: f64) -> Result<bool> {
-        let mut x = pseudorandom_vector(self.body, self.state)?;
-        let mut pencil = Pencil { body: self.body, matrix: &mut *self.matrix, supremum };
-        let mut values = Vec::new();
-        for form in 0..pencil.forms() {
-            let mut y = x.like()?;
-            pencil.apply(form, &mut x, &mut y)?;
-            values.push(x.dot(&y)?);
+    /// Whether a rigid motion that the supports allow meets the first form of a supremum, but no resistance of the matrix of the step:
+    /// the supremum is then infinite, and its numerical value a rounding error. Collective.
+    pub(super) fn is_unbounded_by_rigid_motions(&mut self, supremum: Supremum) -> Result<bool> {
+        let (session, body, state) = (self.session, self.body, self.state);
+        let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum };
+        // The first form and the resistance of a motion, with the forces of the latter.
+        let mut measured = |motion: &mut DistributedVector| -> Result<(f64, f64, DistributedVector)> {
+            let (mut first, mut forces) = (motion.like()?, motion.like()?);
+            pencil.apply(0, motion, &mut first)?;
+            pencil.apply(1, motion, &mut forces)?;
+            Ok((motion.dot(&first)?, motion.dot(&forces)?, forces))
+        };
+        let mut irregular = pseudorandom_vector(body, state)?;
+        let size = irregular.dot(&irregular)?;
+        let (first, resistance, _) = measured(&mut irregular)?;
+        let least = [first, resistance].map(|square| UNRESOLVED * square / size);
+        let mut resisted: Vec<(DistributedVector, DistributedVector, f64)> = Vec::new();
+        for mut motion in rigid_motions(session, body, state)? {
+            let whole = motion.dot(&motion)?;
+            for (other, forces, square) in &resisted {
+                motion.add_scaled(-motion.dot(forces)? / square, other)?;
+            }
+            let size = motion.dot(&motion)?;
+            if size <= DEPENDENT * whole {
+                continue;
+            }
+            let (first, resistance, forces) = measured(&mut motion)?;
+            if resistance > least[1] * size {
+                resisted.push((motion, forces, resistance));
+            } else if first > least[0] * size {
+                return Ok(true);
+            }
         }
-        Ok(value > RESOLVED * pencil.value(&values))
+        Ok(false)
     }
+}
+
+/// The translations and rotations of a body, zero at fixed components.
+fn rigid_motions<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<Vec<DistributedVector>> {
+    let owned = state.velocity.owned()?.len() / D;
+    let nodes = &body.mesh.nodes[..owned];
+    let mut sums = [0.0; 4];
+    for node in nodes {
+        sums[3] += 1.0;
+        (0..D).for_each(|i| sums[i] += node[i]);
+    }
+    let [middle @ .., count] = session.sum(sums);
+    let middle = middle.map(|sum| sum / count);
+    let mut motions = Vec::new();
+    // Along an axis, or from one axis to another.
+    let pairs = (0..D).flat_map(|i| (i..D).map(move |j| (i, j)));
+    for (i, j) in pairs {
+        let mut motion = state.velocity.like()?;
+        motion.fill(0.0)?;
+        for (values, node) in motion.owned_mut()?.chunks_exact_mut(D).zip(nodes) {
+            if i == j {
+                values[i] = 1.0;
+            } else {
+                values[i] = middle[j] - node[j];
+                values[j] = node[i] - middle[i];
+            }
+        }
+        forms::clear_fixed_components(body, &mut motion)?;
+        motions.push(motion);
+    }
+    Ok(motions)
 }
 
 fn copy(vector: &DistributedVector) -> Result<DistributedVector> {
