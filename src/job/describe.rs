@@ -309,7 +309,7 @@ fn kind_in(schema: Schema, variables: &str) -> String {
         return kinds.join(" or ");
     }
     if schema.text("format") == Some("expression") {
-        let infinite = if schema.get("infinite") == true { ", inf" } else { "" };
+        let infinite = if schema.may_be_infinite() { ", inf" } else { "" };
         return format!("a number{infinite} or an expression in {variables}");
     }
     if let Some(items) = schema.items().filter(|_| schema.accepts("array")) {
@@ -329,7 +329,7 @@ fn kind_in(schema: Schema, variables: &str) -> String {
     ];
     let mut accepted: Vec<&str> =
         plain.iter().filter(|(name, _)| schema.accepts(name)).map(|(_, words)| *words).collect();
-    accepted.extend((schema.get("infinite") == true).then_some("inf"));
+    accepted.extend(schema.may_be_infinite().then_some("inf"));
     if accepted.is_empty() { "a value".into() } else { accepted.join(" or ") }
 }
 

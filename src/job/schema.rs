@@ -86,6 +86,11 @@ impl Schema {
         self.get(keyword).as_f64()
     }
 
+    /// Whether infinity is allowed, which is no number of JSON.
+    pub(crate) fn may_be_infinite(&self) -> bool {
+        self.get("infinite") == true
+    }
+
     /// Whether a value of this JSON type is allowed.
     pub(crate) fn accepts(&self, kind: &str) -> bool {
         match self.get("type") {

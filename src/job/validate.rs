@@ -193,7 +193,7 @@ impl Walk<'_> {
     }
 
     fn number(&mut self, node: &Node, number: f64, schema: Schema, path: &str) {
-        let may_be = number.is_finite() || (number == f64::INFINITY && schema.get("infinite") == true);
+        let may_be = number.is_finite() || (number == f64::INFINITY && schema.may_be_infinite());
         if !may_be {
             let message = format!("`{path}` is not a finite number");
             self.faults.push(Fault::new(node.at.clone(), message, "not finite").help("give a number"));

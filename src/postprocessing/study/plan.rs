@@ -114,7 +114,7 @@ impl Plan {
             let is_side_by_side = has_groups || !values.is_empty();
             match job.planned(&run, None, &output, &mut taken) {
                 Ok(planned) => runs.push(Planned { swept: values, is_side_by_side, ..planned }),
-                Err(error) if values.is_empty() => refusals.push(refusal(&run, None, &error)),
+                Err(error) if values.is_empty() => refusals.push(refusal(&called(&run, None), &error)),
                 Err(error) => refused.push(RefusedRun {
                     name: run.name.unwrap_or_default(),
                     set: run.set,
@@ -125,8 +125,7 @@ impl Plan {
         }
         if runs.is_empty() {
             // No value can be used: more likely an error in the study than a limit that the sweep crosses.
-            let words = |run: &RefusedRun| format!("the job of run {} is refused:\n{}", run.name, run.error);
-            refusals.extend(refused.iter().map(words));
+            refusals.extend(refused.iter().map(|run| refusal(&run.name, &run.error)));
         }
         let mut split = Vec::new();
         let reference = match &study.reference {
@@ -140,7 +139,7 @@ impl Plan {
                     Some(PlannedReference::Run(Box::new(planned)))
                 }
                 Err(error) => {
-                    refusals.push(refusal(run, Some("reference"), &error));
+                    refusals.push(refusal(&called(run, Some("reference")), &error));
                     None
                 }
             },
@@ -316,7 +315,7 @@ impl Source<'_> {
             let name = format!("reference-{}", cells_name(cells));
             let run = Run { cells: Some(cells.clone()), ..reference.clone() };
             let planned = self.planned(&run, Some(&name), output, &mut Vec::new());
-            found.push(planned.map_err(|error| Error::Refused(refusal(&run, Some(&name), &error)))?);
+            found.push(planned.map_err(|error| Error::Refused(refusal(&called(&run, Some(&name)), &error)))?);
         }
         Ok(found)
     }
@@ -335,8 +334,8 @@ pub(super) fn remove_unused_output(job: &mut Job, folder: &Path) {
     job.check.clear();
 }
 
-fn refusal(run: &Run, fixed_name: Option<&str>, error: &Error) -> String {
-    format!("the job of run {} is refused:\n{error}", called(run, fixed_name))
+fn refusal(run: &str, error: &dyn std::fmt::Display) -> String {
+    format!("the job of run {run} is refused:\n{error}")
 }
 
 fn called(run: &Run, fixed_name: Option<&str>) -> String {

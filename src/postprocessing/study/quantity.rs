@@ -10,21 +10,16 @@ use std::path::Path;
 /// boundary or at its first point, at the last output. With `.max.` or `.min.` before the column, the others are over all steps.
 pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
     let parts: Vec<&str> = name.split('.').collect();
+    // A column at the last step, or over all steps.
+    let of_steps = |table: &str, filter: Option<(&str, &str)>, words: &[&str]| match words {
+        [field] => column(folder, table, filter, field)?.pop(),
+        [side, field] => extreme(side, column(folder, table, filter, field)?.into_iter()),
+        _ => None,
+    };
     match parts[..] {
-        ["probe", name, field] => column(folder, "probes.csv", Some(("probe", name)), field)?.pop(),
-        ["probe", name, side, field] => {
-            let all = column(folder, "probes.csv", Some(("probe", name)), field)?.into_iter();
-            extreme(side, all)
-        }
-        ["resultant", source, field] => {
-            column(folder, "resultants.csv", Some(("source", source)), field)?.pop()
-        }
-        ["resultant", source, side, field] => {
-            let all = column(folder, "resultants.csv", Some(("source", source)), field)?.into_iter();
-            extreme(side, all)
-        }
-        ["history", field] => column(folder, "history.csv", None, field)?.pop(),
-        ["history", side, field] => extreme(side, column(folder, "history.csv", None, field)?.into_iter()),
+        ["probe", name, ref words @ ..] => of_steps("probes.csv", Some(("probe", name)), words),
+        ["resultant", source, ref words @ ..] => of_steps("resultants.csv", Some(("source", source)), words),
+        ["history", ref words @ ..] => of_steps("history.csv", None, words),
         ["profile", boundary, side, field] => {
             let filter = Some(("profile", boundary));
             let times = column(folder, "profiles.csv", filter, "time")?;
