@@ -57,6 +57,14 @@ fn effects_that_are_absent_leave_their_certificates_null() {
 fn the_trace_norm_of_a_free_body_is_infinite() {
     let free = check(&Case::square(8).without("support"), 2);
     assert!(free["certificates"]["trace_norm_squared"].is_null(), "{free}");
+    // Guided along its length, and one of two bodies.
+    let mesh = format!("'{}/meshes/two_bodies.msh'", env!("CARGO_MANIFEST_DIR"));
+    for case in [Case::of("bouncing_bar"), Case::of("hard/two_bodies").set("mesh.file", &mesh)] {
+        for ranks in [1, 2] {
+            let guided = check(&case, ranks);
+            assert!(guided["certificates"]["trace_norm_squared"].is_null(), "{guided}");
+        }
+    }
 }
 
 #[test]

@@ -59,7 +59,8 @@ use suprema::{Suprema, Supremum};
 
 /// Number of velocity components up to which the cost of the sharp bound of explicit steps is negligible.
 const SMALL: usize = 10_000;
-/// A trace norm |gamma|^2 of more than this multiple of the length of the body is caused by a rigid motion and rounding errors.
+/// A trace norm |gamma|^2 of more than this multiple of the length of the body is caused by a rigid motion of one of several bodies
+/// and rounding errors.
 const RIGID: f64 = 1e10;
 
 impl Certificates {
@@ -95,8 +96,10 @@ impl Certificates {
             if viscous && decrease.is_none() {
                 known.theta = Some(if falling { suprema.find(Supremum::Theta)? } else { 0.0 });
             }
-            known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?)
-                .filter(|norm| *norm < RIGID * extent(session, &body.mesh.nodes));
+            if !suprema.is_unbounded_by_rigid_motions(Supremum::TraceNorm)? {
+                known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?)
+                    .filter(|norm| *norm < RIGID * extent(session, &body.mesh.nodes));
+            }
         }
         if body.contacts.iter().any(|contact| contact.decrease_per_pressure(length).is_some()) {
             let bound = if known.steps_are_unique() {

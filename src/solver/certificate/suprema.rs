@@ -91,12 +91,12 @@ impl<'a, 'm, const D: usize, const S: usize> Suprema<'a, 'm, D, S> {
 }
 
 impl<const D: usize, const S: usize> Suprema<'_, '_, D, S> {
-    /// Whether a rigid motion that the supports allow meets the first form of a supremum, but no resistance of the matrix of the step:
-    /// the supremum is then infinite, and its numerical value a rounding error. Collective.
+    /// Whether a rigid motion that the supports allow meets the first form of a supremum, but not the second: the supremum is then
+    /// infinite, and its numerical value a rounding error. Collective.
     pub(super) fn is_unbounded_by_rigid_motions(&mut self, supremum: Supremum) -> Result<bool> {
         let (session, body, state) = (self.session, self.body, self.state);
         let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum };
-        // The first form and the resistance of a motion, with the forces of the latter.
+        // The first form of a motion, and the second with its forces.
         let mut measured = |motion: &mut DistributedVector| -> Result<(f64, f64, DistributedVector)> {
             let (mut first, mut forces) = (motion.like()?, motion.like()?);
             pencil.apply(0, motion, &mut first)?;
