@@ -99,9 +99,10 @@ test64-lib: deps64
 check64: deps64
 	PETSC_DIR=$(PETSC64_DIR) cargo clippy --locked -- -D warnings
 
-# Random contact laws; families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
+# Random contact laws; random jobs; families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
 hard: deps
 	CLARKE_RANDOM_LAWS=1000 cargo test --release --locked --test verification random_laws
+	CLARKE_RANDOM_SCENES=5000 cargo test --release --locked --test verification random_scenes
 	CLARKE_HARD=1 cargo test --release --locked --test hard -- --test-threads 1 --nocapture
 	CLARKE_HARD=1 cargo test --release --locked --test faults -- --test-threads 1 --nocapture
 	fuzz/run.sh

@@ -38,6 +38,7 @@ mod profiles;
 mod pulses;
 mod quadratic;
 mod random_laws;
+mod random_scenes;
 mod scenes;
 mod schemes;
 mod softening;
@@ -130,6 +131,9 @@ fn scenario() {
         "flowing_space" => manufactured_flow::space(&session),
         "unique_plane" => uniqueness::plane(&session),
         "unique_space" => uniqueness::space(&session),
+        scenes if scenes.starts_with(random_scenes::SCENARIO) => {
+            random_scenes::scenario(&session, scenes, &folder);
+        }
         other => panic!("no scenario {other}"),
     }
 }

@@ -1,0 +1,50 @@
+//! Random jobs over every feature, as a user would run them: from files, at default settings.
+//!
+//! A scene is drawn in a frame: a rotation, units of length, mass and time, and a number of steps. Every job must be completed, or end
+//! with a message that names the reason and a remedy. Completed ones must have balanced energies, forces and moments in every step, and
+//! the same results on 1, 2 and 3 ranks, after a restart, in a rotated frame and in other units; shorter steps must converge.
+
+mod drawn;
+mod invariants;
+
+use crate::mpirun;
+use clarke::parallel::session::Session;
+use std::path::Path;
+
+/// Jobs of `make test`; `CLARKE_RANDOM_SCENES=5000`, or `=17..18`, tries others.
+const JOBS: u64 = 60;
+/// Jobs for each start of the launcher.
+const BATCH: u64 = 100;
+/// The name of the scenario, before the first job and the one behind the last.
+pub const SCENARIO: &str = "random_scenes ";
+
+fn chosen() -> std::ops::Range<u64> {
+    let Some(words) = std::env::var("CLARKE_RANDOM_SCENES").ok() else { return 0..JOBS };
+    let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("CLARKE_RANDOM_SCENES={words}"));
+    match words.split_once("..") {
+        Some((first, end)) => number(first)..number(end),
+        None => 0..number(&words),
+    }
+}
+
+/// The jobs whose numbers the name of a scenario has.
+pub fn scenario(session: &Session, name: &str, folder: &Path) {
+    let numbers: Vec<u64> =
+        name[SCENARIO.len()..].split(' ').map(|text| text.parse().expect("a number")).collect();
+    invariants::hold(session, numbers[0]..numbers[1], folder);
+}
+
+#[test]
+fn random_scenes_are_completed_or_end_with_a_reason_and_keep_their_invariants() {
+    let jobs = chosen();
+    let mut first = jobs.start;
+    while first < jobs.end {
+        let end = jobs.end.min(first + BATCH);
+        let folder = tempfile::tempdir().expect("folder");
+        // The results on one rank come first: the others are compared with them.
+        for ranks in [1, 2, 3] {
+            mpirun::run(ranks, &format!("{SCENARIO}{first} {end}"), folder.path());
+        }
+        first = end;
+    }
+}

@@ -1,0 +1,648 @@
+//! Scenes drawn at random.
+
+use crate::scenes::{noise, stir};
+use clarke::mesh::{
+    GlobalMesh,
+    generate::{Diagonal, box_mesh, rectangle},
+};
+use std::fmt::Write;
+
+/// The frame in which a scene is written down.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// The angle by which it is rotated.
+    pub angle: f64,
+    /// How many of its units a metre, a kilogram and a second are.
+    pub units: [f64; 3],
+    /// Steps for each step of the scene.
+    pub steps: u32,
+}
+
+impl Frame {
+    pub const PLAIN: Self = Self { angle: 0.0, units: [1.0; 3], steps: 1 };
+}
+
+/// Exponents of metre, kilogram and second.
+type Dimension = [f64; 3];
+const ONE: Dimension = [0.0; 3];
+const LENGTH: Dimension = [1.0, 0.0, 0.0];
+const TIME: Dimension = [0.0, 0.0, 1.0];
+const VELOCITY: Dimension = [1.0, 0.0, -1.0];
+const ACCELERATION: Dimension = [1.0, 0.0, -2.0];
+const FORCE: Dimension = [1.0, 1.0, -2.0];
+
+/// A dimension multiplied by powers of length, mass and time.
+fn times(dimension: Dimension, by: Dimension) -> Dimension {
+    std::array::from_fn(|i| dimension[i] + by[i])
+}
+
+/// Steps of a scene, and their length in s.
+pub const STEPS: u32 = 12;
+const STEP: f64 = 0.003;
+
+/// A scene that is drawn and written down.
+pub struct Scene<const D: usize> {
+    pub job: String,
+    pub mesh: GlobalMesh<D>,
+}
+
+struct Draw<const D: usize> {
+    number: u64,
+    count: u64,
+    frame: Frame,
+    text: String,
+}
+
+impl<const D: usize> Draw<D> {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.count += 1;
+        low + (high - low) * 0.5 * (1.0 + noise(self.number * 100_003 + self.count))
+    }
+
+    /// Between two positive numbers, each decade as often.
+    fn decades(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+
+    fn chance(&mut self, share: f64) -> bool {
+        self.between(0.0, 1.0) < share
+    }
+
+    fn one_of<'a>(&mut self, words: &[&'a str]) -> &'a str {
+        words[(self.between(0.0, words.len() as f64) as usize).min(words.len() - 1)]
+    }
+
+    fn direction(&mut self) -> [f64; D] {
+        std::array::from_fn(|_| self.between(-1.0, 1.0))
+    }
+
+    /// The dimension of pressures: in the plane forces are those of a metre of thickness, and stresses forces per length.
+    fn pressure(&self) -> Dimension {
+        [2.0 - D as f64, 1.0, -2.0]
+    }
+
+    /// A number in the units of the frame.
+    fn number(&self, value: f64, dimension: Dimension) -> f64 {
+        value * (0..3).map(|i| self.frame.units[i].powf(dimension[i])).product::<f64>()
+    }
+
+    /// The components of a vector in the frame.
+    fn turned(&self, vector: [f64; D]) -> [f64; D] {
+        turned(self.frame.angle, vector)
+    }
+
+    /// A vector in the frame, as a list of numbers.
+    fn vector(&self, vector: [f64; D], dimension: Dimension) -> String {
+        format!("{:?}", self.turned(vector).map(|value| self.number(value, dimension)))
+    }
+
+    /// A vector that varies with the time: a list of expressions.
+    fn varying(&self, vector: [f64; D], dimension: Dimension, factor: &str) -> String {
+        let along = self.turned(vector).map(|value| self.number(value, dimension));
+        format!("{:?}", along.map(|value| format!("{value:e}*({factor})")))
+    }
+
+    /// A point that moves with a constant velocity.
+    fn moving(&self, point: [f64; D], velocity: [f64; D]) -> String {
+        let (point, velocity) = (self.turned(point), self.turned(velocity));
+        let words: [String; D] = std::array::from_fn(|i| {
+            format!("{:e} + {:e}*t", self.number(point[i], LENGTH), self.number(velocity[i], VELOCITY))
+        });
+        format!("{words:?}")
+    }
+
+    /// A field that is linear in the coordinates: its value at the origin and its gradient.
+    fn linear(&self, value: [f64; D], gradient: [[f64; D]; D], dimension: Dimension) -> String {
+        let value = self.turned(value);
+        // In the frame the gradient is `R G R^T`.
+        let columns = gradient.map(|row| self.turned(row));
+        let gradient: [[f64; D]; D] = {
+            let by_column: [[f64; D]; D] =
+                std::array::from_fn(|j| self.turned(std::array::from_fn(|i| columns[i][j])));
+            std::array::from_fn(|i| std::array::from_fn(|j| by_column[j][i]))
+        };
+        let slope = times(dimension, [-1.0, 0.0, 0.0]);
+        let words: [String; D] = std::array::from_fn(|i| {
+            let mut word = format!("{:e}", self.number(value[i], dimension));
+            for j in 0..D {
+                let _ = write!(word, " + {:e}*{}", self.number(gradient[i][j], slope), ["x", "y", "z"][j]);
+            }
+            word
+        });
+        format!("{words:?}")
+    }
+
+    /// A smooth function of time without unit, between -1 and 1.
+    fn factor(&mut self) -> String {
+        let frequency = self.between(20.0, 60.0);
+        let of_frame = self.number(frequency, [0.0, 0.0, -1.0]);
+        match self.one_of(&["constant", "sine", "ramp"]) {
+            "constant" => "1".into(),
+            "sine" => format!("sin({of_frame:e}*t)"),
+            _ => format!("min({of_frame:e}*t, 1)"),
+        }
+    }
+
+    fn line(&mut self, line: impl AsRef<str>) {
+        self.text += line.as_ref();
+        self.text.push('\n');
+    }
+
+    fn key(&mut self, key: &str, value: f64, dimension: Dimension) {
+        let value = self.number(value, dimension);
+        self.line(format!("{key} = {value:e}"));
+    }
+}
+
+/// A vector rotated by an angle: in the plane counterclockwise, in space about a slanted axis (Rodrigues).
+pub fn turned<const D: usize>(angle: f64, vector: [f64; D]) -> [f64; D] {
+    let (sine, cosine) = angle.sin_cos();
+    if D == 2 {
+        return std::array::from_fn(|i| match i {
+            0 => cosine * vector[0] - sine * vector[1],
+            _ => sine * vector[0] + cosine * vector[1],
+        });
+    }
+    let axis = [1.0 / 3.0, -2.0 / 3.0, 2.0 / 3.0];
+    let along: f64 = (0..D).map(|i| axis[i] * vector[i]).sum();
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let across = axis[j] * vector[k] - axis[k] * vector[j];
+        cosine * vector[i] + sine * across + (1.0 - cosine) * along * axis[i]
+    })
+}
+
+/// What a scene contains.
+struct Content {
+    scheme: &'static str,
+    is_dynamic: bool,
+    is_elastic: bool,
+    is_viscous: bool,
+    is_quadratic: bool,
+}
+
+/// The scene of this number in a frame.
+pub fn scene<const D: usize>(number: u64, frame: Frame) -> Scene<D> {
+    let mut draw = Draw::<D> { number, count: 0, frame, text: String::new() };
+    let scheme = match number % 8 {
+        0 | 4 => "implicit_euler",
+        1 | 5 | 7 => "bdf2",
+        2 | 6 => "midpoint",
+        _ => "lagged_euler",
+    };
+    let content = Content {
+        scheme,
+        is_dynamic: draw.chance(0.75) || scheme == "midpoint",
+        is_elastic: draw.chance(0.9) || scheme == "midpoint",
+        is_viscous: draw.chance(0.5),
+        is_quadratic: draw.chance(0.3),
+    };
+    let mesh = mesh::<D>(&mut draw);
+    draw.line("[mesh]\nfile = \"mesh.msh\"");
+    if content.is_quadratic {
+        draw.line("order = 2");
+    }
+    time(&mut draw, &content);
+    let hypothesis = draw.one_of(&["plane_stress", "plane_strain"]);
+    draw.line("[material]");
+    if D == 2 {
+        draw.line(format!("hypothesis = \"{hypothesis}\""));
+    }
+    let is_viscous = material(&mut draw, &content, "material", hypothesis == "plane_stress" && D == 2);
+    let content = Content { is_viscous, ..content };
+    if mesh.regions.len() > 1 {
+        draw.line("[[region]]\nname = \"core\"\n[region.material]");
+        material(&mut draw, &content, "region.material", true);
+    }
+    loads(&mut draw, &content);
+    contacts(&mut draw, &content);
+    draw.line("[[output.probe]]\nname = \"corner\"");
+    let mut corner = [0.9; D];
+    corner[0] = 1.2;
+    let corner = draw.vector(corner, LENGTH);
+    draw.line(format!("point = {corner}"));
+    let half = draw.number(STEP * f64::from(STEPS / 2), TIME);
+    draw.line(format!("[checkpoint]\nat = [{half:e}]"));
+    Scene { job: draw.text, mesh }
+}
+
+fn mesh<const D: usize>(draw: &mut Draw<D>) -> GlobalMesh<D> {
+    let diagonal = [Diagonal::Right, Diagonal::Left, Diagonal::Alternating, Diagonal::Crossed]
+        [(draw.between(0.0, 4.0) as usize).min(3)];
+    let has_core = draw.chance(0.2);
+    let plane = || rectangle([1.2, 0.9], [4, 3], diagonal, [1.3, 0.8]).expect("mesh");
+    let space = || box_mesh([1.2, 0.9, 0.9], [3, 2, 2], [1.2, 1.0, 0.9]).expect("mesh");
+    // One of the two has the dimension.
+    let mut mesh: GlobalMesh<D> = if D == 2 { same_dimension(plane()) } else { same_dimension(space()) };
+    mesh = stir(mesh, 0.05);
+    if has_core {
+        mesh.regions = vec!["body".into(), "core".into()];
+        mesh.cell_regions = (0..mesh.cells.len() / (D + 1)).map(|cell| u16::from(cell % 3 == 0)).collect();
+    }
+    let (angle, metre) = (draw.frame.angle, draw.frame.units[0]);
+    mesh.nodes.iter_mut().for_each(|node| *node = turned(angle, *node).map(|x| x * metre));
+    mesh
+}
+
+/// The same mesh, whose dimension the compiler does not know.
+fn same_dimension<const A: usize, const D: usize>(mesh: GlobalMesh<A>) -> GlobalMesh<D> {
+    assert_eq!(A, D);
+    let node = |node: [f64; A]| std::array::from_fn(|i| node[i]);
+    GlobalMesh {
+        nodes: mesh.nodes.into_iter().map(node).collect(),
+        cells: mesh.cells,
+        curved: Vec::new(),
+        is_second_order: mesh.is_second_order,
+        cell_regions: mesh.cell_regions,
+        regions: mesh.regions,
+        facets: mesh.facets.into_iter().map(|facet| std::array::from_fn(|i| facet[i])).collect(),
+        facet_cells: mesh.facet_cells,
+        boundaries: mesh.boundaries,
+        point_sets: mesh.point_sets,
+    }
+}
+
+fn time<const D: usize>(draw: &mut Draw<D>, content: &Content) {
+    draw.line(format!("[time]\nscheme = \"{}\"", content.scheme));
+    draw.key("end", STEP * f64::from(STEPS), TIME);
+    let step = STEP / f64::from(draw.frame.steps);
+    draw.key("step", step, TIME);
+    let adapts = draw.chance(0.2) && content.scheme != "midpoint";
+    // Convergence is tried with fixed steps.
+    if adapts && draw.frame.steps == 1 {
+        draw.line("[time.adaptive]");
+        draw.key("smallest_step", STEP / 64.0, TIME);
+        draw.key("largest_step", STEP, TIME);
+    }
+}
+
+/// The keys of a material; says whether it is viscous.
+fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str, is_thin: bool) -> bool {
+    let pressure = draw.pressure();
+    let viscosity = times(pressure, TIME);
+    if content.is_dynamic {
+        let density = draw.between(0.5, 3.0);
+        draw.key("density", density, [-(D as f64), 1.0, 0.0]);
+    }
+    if content.is_elastic {
+        let (modulus, ratio) = (draw.between(20.0, 200.0), draw.between(0.0, 0.45));
+        draw.line(format!("[{table}.elasticity]"));
+        draw.key("youngs_modulus", modulus, pressure);
+        draw.key("poisson_ratio", ratio, ONE);
+    }
+    let needs_viscosity = !content.is_elastic || content.scheme == "lagged_euler" && !content.is_dynamic;
+    let is_viscous = content.is_viscous || needs_viscosity;
+    if is_viscous {
+        let (volumetric, shear) = (draw.between(-0.1, 2.0), draw.between(1.0, 5.0));
+        draw.line(format!("[{table}.viscosity]"));
+        draw.key("volumetric", volumetric, viscosity);
+        draw.key("shear", shear, viscosity);
+    }
+    if content.is_elastic && draw.chance(0.4) {
+        flow(draw, table, is_thin);
+    }
+    let is_damaged = content.is_elastic && content.scheme != "midpoint" && draw.chance(0.15);
+    if is_damaged && table == "material" {
+        let (threshold, slowness) = (draw.between(1e-4, 2e-3), draw.between(1e-4, 2e-3));
+        draw.line("[material.damage]");
+        draw.key("threshold", threshold, pressure);
+        draw.key("viscosity", slowness, viscosity);
+    }
+    is_viscous
+}
+
+fn flow<const D: usize>(draw: &mut Draw<D>, table: &str, is_thin: bool) {
+    let pressure = draw.pressure();
+    let viscosity = times(pressure, TIME);
+    let law = draw.one_of(&["perzyna", "maxwell", "norton", "drucker_prager"]);
+    let law = if law == "drucker_prager" && is_thin { "perzyna" } else { law };
+    draw.line(format!("[{table}.viscoplasticity.{law}]"));
+    let (relaxation, bound) = (draw.between(1.0, 10.0), draw.between(0.05, 0.5));
+    match law {
+        "perzyna" => {
+            let metric = draw.one_of(&["elasticity", "compliance", "frobenius"]);
+            draw.key("relaxation", relaxation, viscosity);
+            draw.key("yield_stress", bound, pressure);
+            match draw.one_of(&["perfect", "hardening", "power"]) {
+                "hardening" => draw.key("hardening_modulus", 4.0, pressure),
+                "power" => draw.key("exponent", 1.5, ONE),
+                _ => draw.line(format!("metric = \"{metric}\"")),
+            }
+        }
+        "maxwell" => {
+            let time = draw.between(0.05, 1.0);
+            draw.key("relaxation_time", time, TIME);
+            draw.key("volumetric_relaxation_time", 0.3, TIME);
+        }
+        "norton" => {
+            let rate = draw.between(0.001, 0.02);
+            draw.key("rate", rate, [0.0, 0.0, -1.0]);
+            draw.key("reference_stress", 1.0, pressure);
+            draw.key("exponent", 2.0, ONE);
+            if draw.chance(0.5) {
+                draw.key("hardening_strain", 0.1, ONE);
+            }
+        }
+        _ => {
+            let coefficient = draw.between(0.1, 0.5);
+            draw.key("relaxation", relaxation, viscosity);
+            draw.key("friction_coefficient", coefficient, ONE);
+            draw.key("cohesion", bound, pressure);
+        }
+    }
+}
+
+fn loads<const D: usize>(draw: &mut Draw<D>, content: &Content) {
+    let pressure = draw.pressure();
+    let kind = draw.one_of(&["all", "all", "moved", "normal", "springs", "absorbing", "none", "none"]);
+    let kind = match kind {
+        "none" | "springs" if !content.is_dynamic => "all",
+        "absorbing" if !content.is_dynamic || !content.is_elastic => "all",
+        "moved" if content.scheme == "midpoint" => "all",
+        kind => kind,
+    };
+    let kind = if kind == "normal" && !content.is_dynamic { "all" } else { kind };
+    if kind != "none" {
+        draw.line("[[support]]\non = [\"left\"]");
+    }
+    match kind {
+        "all" => draw.line("fix = \"all\""),
+        "normal" => draw.line("fix = \"normal\""),
+        "moved" => {
+            let direction = draw.direction();
+            let way = draw.varying(direction.map(|x| 0.01 * x), LENGTH, "1");
+            let frequency = draw.number(50.0, [0.0, 0.0, -1.0]);
+            let way = way.replace("*(1)", &format!("*(1 - cos({frequency:e}*t))"));
+            draw.line(format!("fix = \"all\"\ndisplacement = {way}"));
+        }
+        "springs" => {
+            draw.line("[support.stiffness]");
+            draw.key("normal", 100.0, times(pressure, [-1.0, 0.0, 0.0]));
+            draw.key("tangential", 50.0, times(pressure, [-1.0, 0.0, 0.0]));
+            draw.line("[support.damping]");
+            draw.key("normal", 1.0, times(pressure, [-1.0, 0.0, 1.0]));
+        }
+        "absorbing" => draw.line("absorbing = true"),
+        _ => {}
+    }
+    if draw.chance(0.5) {
+        let (direction, factor) = (draw.direction(), draw.factor());
+        let value = draw.varying(direction.map(|x| 3.0 * x), pressure, &factor);
+        draw.line(format!("[[traction]]\non = [\"top\", \"right\"]\nvalue = {value}"));
+    }
+    if draw.chance(0.25) {
+        let factor = draw.factor();
+        let value = draw.number(2.0, pressure);
+        draw.line(format!("[[traction]]\non = [\"top\"]\npressure = \"{value:e}*({factor})\""));
+    }
+    if draw.chance(0.3) {
+        let (direction, factor) = (draw.direction(), draw.factor());
+        let value = draw.varying(direction.map(|x| 3.0 * x), times(pressure, [-1.0, 0.0, 0.0]), &factor);
+        draw.line(format!("[[body_force]]\nvalue = {value}"));
+    }
+    if content.is_dynamic && draw.chance(0.5) {
+        let mut down = [0.0; D];
+        down[D - 1] = -9.81;
+        let value = draw.vector(down, ACCELERATION);
+        draw.line(format!("[gravity]\nacceleration = {value}"));
+    }
+    let mut velocity = draw.direction().map(|x| 0.5 * x);
+    velocity[D - 1] -= 0.5;
+    let gradient: [[f64; D]; D] = std::array::from_fn(|_| draw.direction().map(|x| 0.3 * x));
+    // A held boundary does not move, and one that is moved starts from rest.
+    let velocity = if kind == "all" || kind == "moved" || kind == "normal" {
+        draw.linear(
+            [0.0; D],
+            gradient.map(|mut row| {
+                row[1..].fill(0.0);
+                row
+            }),
+            VELOCITY,
+        )
+    } else {
+        draw.linear(velocity, gradient, VELOCITY)
+    };
+    if kind != "moved" && content.is_dynamic {
+        draw.line(format!("[initial]\nvelocity = {velocity}"));
+    }
+}
+
+/// What a normal law has.
+#[derive(Clone, Copy, PartialEq)]
+enum Normal {
+    /// The pressure depends on the velocity.
+    Rate,
+    /// The pressure depends on a gap.
+    Gap,
+}
+
+fn contacts<const D: usize>(draw: &mut Draw<D>, content: &Content) {
+    if !draw.chance(0.9) {
+        return;
+    }
+    draw.line("[[contact]]\non = [\"bottom\"]");
+    let redistributes = content.is_dynamic
+        && content.scheme != "lagged_euler"
+        && !content.is_viscous
+        && (content.scheme == "midpoint" || draw.chance(0.3));
+    if redistributes || content.scheme == "midpoint" {
+        draw.line("redistribute_mass = true");
+    }
+    let normal = normal_law(draw);
+    let gap_of_obstacle = normal == Normal::Gap && draw.chance(0.6);
+    if gap_of_obstacle {
+        obstacle(draw, content);
+    } else if normal == Normal::Gap {
+        let (gap, rate) = (draw.between(0.0, 0.004), draw.between(0.0, 0.3));
+        let (gap, rate) = (draw.number(gap, LENGTH), draw.number(rate, VELOCITY));
+        let key = format!("gap = \"{gap:e} - {rate:e}*t\"\n");
+        let at = draw.text.rfind("[contact.normal.").expect("a normal law");
+        let line = draw.text[at..].find('\n').expect("a line") + at + 1;
+        draw.text.insert_str(line, &key);
+    }
+    let rubs = draw.chance(0.6);
+    if rubs {
+        friction(draw);
+    }
+    let pressure = draw.pressure();
+    let stiffness = times(pressure, [-1.0, 0.0, 0.0]);
+    if rubs && normal == Normal::Gap && draw.chance(0.2) {
+        let wear = draw.decades(1e-4, 1e-2);
+        draw.line("[contact.wear]");
+        draw.key("coefficient", wear, pressure.map(|x| -x));
+    } else if !gap_of_obstacle && normal == Normal::Rate && content.scheme != "midpoint" && draw.chance(0.4) {
+        let (normal, energy) = (draw.between(10.0, 200.0), draw.between(1e-5, 1e-3));
+        draw.line("[contact.adhesion]");
+        draw.key("stiffness", normal, stiffness);
+        draw.key("tangential_stiffness", 0.5 * normal, stiffness);
+        draw.key("energy", energy, times(pressure, LENGTH));
+        if draw.chance(0.4) {
+            let strength = draw.between(0.2, 0.9) * (2.0 * normal * energy).sqrt();
+            draw.key("strength", strength, pressure);
+        } else {
+            let slowness = draw.decades(1e-5, 1e-3);
+            draw.key("viscosity", slowness, times(pressure, [1.0, 0.0, 1.0]));
+        }
+    }
+}
+
+fn normal_law<const D: usize>(draw: &mut Draw<D>) -> Normal {
+    let pressure = draw.pressure();
+    let damping = times(pressure, [-1.0, 0.0, 1.0]);
+    let stiffness = times(pressure, [-1.0, 0.0, 0.0]);
+    let (first, high, fall) = (draw.between(0.01, 0.1), draw.between(0.1, 0.5), draw.between(0.02, 0.2));
+    let law = draw.one_of(&[
+        "damped_response",
+        "exponential_damper",
+        "graph",
+        "displacement_graph",
+        "compliance",
+        "unilateral",
+        "unilateral",
+        "one way",
+    ]);
+    if law == "one way" {
+        draw.line("[contact.normal.unilateral]\nbound = \"velocity\"");
+        return Normal::Rate;
+    }
+    draw.line(format!("[contact.normal.{law}]"));
+    let pair = |draw: &Draw<D>, of: f64, value: f64, dimension: Dimension| {
+        format!("[{:e}, {:e}]", draw.number(of, dimension), draw.number(value, pressure))
+    };
+    match law {
+        "damped_response" => {
+            let symmetry = draw.one_of(&["odd", "one_sided"]);
+            let (breakpoint, rise, fall) = (
+                draw.number(first, VELOCITY),
+                draw.number(high / first, damping),
+                draw.number(-fall, damping),
+            );
+            draw.line(format!(
+                "breakpoints = [{breakpoint:e}, {:e}]\nslopes = [{rise:e}, {fall:e}, {rise:e}]\nsymmetry = \"{symmetry}\"",
+                2.0 * breakpoint
+            ));
+            Normal::Rate
+        }
+        "exponential_damper" => {
+            draw.key("limit", high, pressure);
+            draw.key("velocity", first, VELOCITY);
+            Normal::Rate
+        }
+        "graph" => {
+            let points = [
+                pair(draw, -first, 0.0, VELOCITY),
+                pair(draw, 0.0, 0.0, VELOCITY),
+                pair(draw, 0.0, high, VELOCITY),
+                pair(draw, first, high - fall * first, VELOCITY),
+            ];
+            draw.line(format!("points = [{}]", points.join(", ")));
+            draw.key("slope_after", 1.0, damping);
+            Normal::Rate
+        }
+        "displacement_graph" => {
+            let points = [
+                pair(draw, 0.0, 0.0, LENGTH),
+                pair(draw, 0.003, 10.0 * high, LENGTH),
+                pair(draw, 0.006, 12.0 * high, LENGTH),
+            ];
+            draw.line(format!("points = [{}]", points.join(", ")));
+            draw.key("slope_after", 500.0, stiffness);
+            Normal::Gap
+        }
+        "compliance" => {
+            let exponent = [1.0, 1.5, 2.0][(draw.between(0.0, 3.0) as usize).min(2)];
+            let value = draw.decades(100.0, 10_000.0);
+            draw.key("stiffness", value, times(pressure, [-exponent, 0.0, 0.0]));
+            draw.key("exponent", exponent, ONE);
+            Normal::Gap
+        }
+        _ => Normal::Gap,
+    }
+}
+
+fn obstacle<const D: usize>(draw: &mut Draw<D>, content: &Content) {
+    let (lift, approach) = (draw.between(0.003, 0.006), draw.between(0.0, 0.6));
+    let mut velocity = draw.direction().map(|x| 0.5 * x);
+    velocity[D - 1] = approach;
+    let mut down = [0.0; D];
+    down[D - 1] = -1.0;
+    let kind = draw.one_of(&["plane", "sphere", "shape"]);
+    let is_loaded = content.scheme != "midpoint" && draw.chance(0.25);
+    if is_loaded {
+        velocity = [0.0; D];
+    }
+    draw.line(format!("[contact.obstacle.{kind}]"));
+    if kind == "plane" {
+        let mut point = [0.5; D];
+        point[D - 1] = -lift;
+        let mut normal = draw.direction().map(|x| 0.002 * x);
+        normal[D - 1] = 1.0;
+        let (point, normal) = (draw.moving(point, velocity), draw.vector(normal, ONE));
+        draw.line(format!("point = {point}\nnormal = {normal}"));
+    } else {
+        let radius = draw.between(0.4, 2.0);
+        let mut centre = [0.5; D];
+        centre[D - 1] = -radius - lift;
+        let centre = draw.moving(centre, velocity);
+        let radius = draw.number(radius, LENGTH);
+        if kind == "sphere" {
+            draw.line(format!("radius = {radius:e}"));
+        } else {
+            let squares = ["x^2 + y^2", "x^2 + y^2 + z^2"][D - 2];
+            draw.line(format!("distance = \"sqrt({squares}) - {radius:e}\""));
+        }
+        draw.line(format!("centre = {centre}"));
+        if draw.chance(0.4) {
+            draw.key("rotation", 3.0, [0.0, 0.0, -1.0]);
+            if D == 3 {
+                let axis = draw.vector(std::array::from_fn(|i| [0.2, 1.0, 0.1][i]), ONE);
+                draw.line(format!("axis = {axis}"));
+            }
+        }
+    }
+    if is_loaded {
+        let direction = draw.vector(down.map(|x| -x), ONE);
+        let (mass, force, factor) = (draw.between(0.1, 2.0), draw.between(0.0, 2.0), draw.factor());
+        let force = draw.number(force, FORCE);
+        draw.line(format!(
+            "[contact.obstacle_load]\ndirection = {direction}\nforce = \"{force:e}*({factor})\""
+        ));
+        draw.key("mass", mass, [0.0, 1.0, 0.0]);
+        draw.key("velocity", approach, VELOCITY);
+    }
+}
+
+fn friction<const D: usize>(draw: &mut Draw<D>) {
+    let law = draw.one_of(&[
+        "tresca",
+        "coulomb",
+        "coulomb",
+        "slip_weakening",
+        "distance_weakening",
+        "rate_and_state",
+    ]);
+    let (coefficient, more) = (draw.between(0.05, 0.5), draw.between(0.0, 0.2));
+    draw.line(format!("[contact.friction.{law}]"));
+    match law {
+        "tresca" => {
+            let pressure = draw.pressure();
+            draw.key("bound", coefficient, pressure);
+        }
+        "coulomb" => draw.key("coefficient", coefficient, ONE),
+        "rate_and_state" => {
+            draw.key("reference", coefficient + 0.2, ONE);
+            draw.key("velocity", 0.01, VELOCITY);
+            draw.key("direct", 0.01, ONE);
+            draw.key("evolution", 0.01 + 0.02 * more, ONE);
+            draw.key("distance", 0.002, LENGTH);
+        }
+        _ => {
+            draw.key("static", coefficient + more, ONE);
+            draw.key("dynamic", coefficient, ONE);
+            match law {
+                "slip_weakening" => draw.key("decay_velocity", 0.5, VELOCITY),
+                _ => draw.key("distance", 0.002, LENGTH),
+            }
+        }
+    }
+}

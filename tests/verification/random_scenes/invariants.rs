@@ -1,0 +1,384 @@
+//! What holds in each random scene.
+
+use super::drawn::{Frame, Scene, scene, turned};
+use clarke::{
+    error::Exit,
+    job::Job,
+    mesh::GlobalMesh,
+    parallel::session::Session,
+    run::{self, Clock, Start},
+};
+use std::{
+    collections::BTreeMap,
+    fmt::Write,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+/// Largest accepted error of balanced energies, forces and moments.
+const BALANCE: f64 = 1e-7;
+/// Largest accepted difference of results that are equal but for rounding errors and the tolerance of the steps.
+const EQUAL: f64 = 1e-5;
+/// The same where rounding errors choose among adaptive steps.
+const ADAPTED: f64 = 3e-2;
+/// Energies in J that are none: a body that moves rigidly has rounding errors alone.
+const NONE: f64 = 1e-12;
+/// The frame of the comparison, and its units: 1 mm, 10 g, 0.1 s.
+const OTHER: Frame = Frame { angle: 0.7, units: [1e3, 1e2, 10.0], steps: 1 };
+
+/// How the jobs ended, by their messages.
+#[derive(Default)]
+struct Tally {
+    ends: BTreeMap<String, Vec<u64>>,
+    faults: Vec<String>,
+    /// The last job.
+    job: String,
+}
+
+/// Runs these scenes on the ranks of the session; on one rank in all variants. The folder has the results of one rank where there are
+/// more. Collective.
+pub fn hold(session: &Session, numbers: std::ops::Range<u64>, folder: &Path) {
+    let mut tally = Tally::default();
+    let count = numbers.clone().count();
+    for number in numbers {
+        if number % 3 == 2 {
+            Trial::<3> { session, number, folder: folder.join(number.to_string()) }.hold(&mut tally);
+        } else {
+            Trial::<2> { session, number, folder: folder.join(number.to_string()) }.hold(&mut tally);
+        }
+    }
+    if !session.is_first() {
+        return;
+    }
+    if session.ranks() == 1 {
+        for (end, numbers) in &tally.ends {
+            println!("{:5} {end}: {:?}", numbers.len(), &numbers[..numbers.len().min(8)]);
+        }
+    }
+    if count == 1 {
+        println!("{}", tally.job);
+    }
+    assert!(tally.faults.is_empty(), "{} faults\n{}", tally.faults.len(), tally.faults.join("\n"));
+}
+
+/// The results of a run.
+struct Results<const D: usize> {
+    /// Columns of the history, by their names.
+    history: BTreeMap<String, Vec<f64>>,
+    /// Displacement and velocity of the probe at the end, in the frame.
+    probe: Vec<[f64; D]>,
+    /// The largest error of forces and moments, relative to the largest ones.
+    open: [f64; 2],
+}
+
+struct Trial<'a, const D: usize> {
+    session: &'a Session,
+    number: u64,
+    folder: PathBuf,
+}
+
+impl<const D: usize> Trial<'_, D> {
+    fn hold(&self, tally: &mut Tally) {
+        let ranks = self.session.ranks();
+        let name = format!("ranks-{ranks}");
+        let end = self.run(Frame::PLAIN, &name, &Start::Anew);
+        tally.job = scene::<D>(self.number, Frame::PLAIN).job;
+        let mut fault = |what: String| tally.faults.push(format!("scene {}: {what}", self.number));
+        if ranks > 1 {
+            if !self.session.is_first() {
+                return;
+            }
+            let one = self.folder.join("ranks-1/out/job");
+            let was_completed = one.join("history.csv").exists() && one.join("completed").exists();
+            match (&end, was_completed) {
+                (Ok(()), true) => {
+                    for what in self.differences(Frame::PLAIN, "ranks-1", &name) {
+                        fault(format!("{ranks} ranks: {what}"));
+                    }
+                }
+                (Ok(()), false) => fault(format!("is completed on {ranks} ranks, but not on one")),
+                (Err((_, words)), true) => fault(format!("{ranks} ranks: {words}")),
+                (Err(_), false) => {}
+            }
+            return;
+        }
+        match &end {
+            Ok(()) => tally.ends.entry("completed".into()).or_default().push(self.number),
+            Err((exit, words)) => {
+                let known = matches!(exit, Exit::Refused | Exit::Failed);
+                if !known || !words.contains(';') && !words.contains("help:") {
+                    fault(format!("{exit:?}: {words}"));
+                }
+                let digits = |c: char| if c.is_ascii_digit() { '#' } else { c };
+                let words: String =
+                    words.lines().next().unwrap_or_default().chars().map(digits).take(110).collect();
+                tally.ends.entry(format!("{exit:?}: {words}")).or_default().push(self.number);
+                return;
+            }
+        }
+        let plain = self.results(&name);
+        std::fs::write(self.out(&name).join("completed"), "").expect("written");
+        let turnover: f64 = ["kinetic_energy", "elastic_energy", "external_work", "contact_dissipation"]
+            .iter()
+            .map(|name| largest(&plain.history[*name]))
+            .sum();
+        for (what, worst) in [
+            ("energy", largest(&plain.history["energy_imbalance"])),
+            ("forces", plain.open[0]),
+            ("moments", plain.open[1]),
+        ] {
+            if !(worst < BALANCE || turnover < NONE) {
+                fault(format!("{what}: {worst:e} out of balance"));
+            }
+        }
+        for (name, frame) in [
+            ("turned", Frame { angle: OTHER.angle, ..Frame::PLAIN }),
+            ("units", Frame { angle: 0.0, ..OTHER }),
+        ] {
+            match self.run(frame, name, &Start::Anew) {
+                Ok(()) => {
+                    for what in self.differences(frame, "ranks-1", name) {
+                        fault(format!("{name}: {what}"));
+                    }
+                }
+                Err((_, words)) => fault(format!("{name}: {words}")),
+            }
+        }
+        self.restart(&mut fault);
+        self.halve(&plain, &mut fault);
+    }
+
+    /// A restart in the middle must give the same rows.
+    fn restart(&self, fault: &mut impl FnMut(String)) {
+        let straight = std::fs::read(self.out("ranks-1").join("history.csv")).expect("a history");
+        let saved: Vec<PathBuf> = std::fs::read_dir(self.out("ranks-1"))
+            .expect("folder")
+            .map(|entry| entry.expect("entry").path())
+            .filter(|path| path.extension().is_some_and(|extension| extension == "h5"))
+            .collect();
+        let step = |path: &PathBuf| {
+            let name = path.file_stem().expect("name").to_string_lossy().into_owned();
+            name.rsplit('-').next().and_then(|digits| digits.parse::<u64>().ok()).unwrap_or(u64::MAX)
+        };
+        let Some(first) = saved.into_iter().min_by_key(step) else {
+            return fault("no checkpoint".into());
+        };
+        let mut end = self.run(Frame::PLAIN, "ranks-1", &Start::From(first));
+        if end.is_ok() {
+            let again = std::fs::read(self.out("ranks-1").join("history.csv")).expect("a history");
+            if again != straight {
+                end = Err((Exit::Internal, "the history differs".into()));
+            }
+        }
+        if let Err((_, words)) = end {
+            fault(format!("restart: {words}"));
+        }
+    }
+
+    /// Shorter steps must approach a limit.
+    fn halve(&self, plain: &Results<D>, fault: &mut impl FnMut(String)) {
+        let mut values = vec![self.sample(plain)];
+        for steps in [2, 4, 8] {
+            let name = format!("steps-{steps}");
+            match self.run(Frame { steps, ..Frame::PLAIN }, &name, &Start::Anew) {
+                Ok(()) => values.push(self.sample(&self.results(&name))),
+                // A certificate may exclude short steps.
+                Err((Exit::Refused, _)) => return,
+                Err((_, words)) => return fault(format!("steps divided by {steps}: {words}")),
+            }
+        }
+        let distance = |a: &[f64], b: &[f64]| {
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |a: f64, b| if a >= b { a } else { b })
+        };
+        let size = values[3].iter().map(|x| x.abs()).fold(0.0, f64::max);
+        let [long, _, short] = [0, 1, 2].map(|at| distance(&values[at], &values[at + 1]));
+        if !(short <= 0.8 * long + 0.05 * size) {
+            fault(format!(
+                "shorter steps do not converge: changes {long:e}, then {short:e} of {size:e}: {values:?}"
+            ));
+        }
+    }
+
+    /// The velocity and the displacement of the probe at the end; velocities count for the length of the run.
+    fn sample(&self, results: &Results<D>) -> Vec<f64> {
+        results.probe[0].to_vec()
+    }
+
+    fn out(&self, name: &str) -> PathBuf {
+        self.folder.join(name).join("out/job")
+    }
+
+    /// Runs the scene in a frame, with its files in a folder of this name. Collective.
+    fn run(&self, frame: Frame, name: &str, start: &Start) -> Result<(), (Exit, String)> {
+        let Scene { job, mesh } = scene::<D>(self.number, frame);
+        let folder = self.folder.join(name);
+        if self.session.is_first() {
+            std::fs::create_dir_all(&folder).expect("folder");
+            std::fs::write(folder.join("mesh.msh"), gmsh(&mesh)).expect("written");
+            std::fs::write(folder.join("job.toml"), &job).expect("written");
+        }
+        self.session.sum([0.0]);
+        let loaded = Job::from_text(&job, "job.toml", &folder, &[])
+            .unwrap_or_else(|error| panic!("scene {}: {error}\n{job}", self.number));
+        let clock = Clock {
+            began: Instant::now(),
+            launched: Duration::ZERO,
+            on_terminal: false,
+            logs_every_step: false,
+        };
+        match run::run(self.session, loaded, start, clock) {
+            Ok(Exit::Done) => Ok(()),
+            Ok(exit) => Err((exit, "it ended early".into())),
+            Err(error) => Err((error.exit(), error.to_string())),
+        }
+    }
+
+    fn results(&self, name: &str) -> Results<D> {
+        let read = |file: &str| table(&self.out(name).join(file));
+        let history = read("history.csv");
+        let number = |text: &String| text.parse::<f64>().unwrap_or(f64::NAN);
+        let column = |table: &BTreeMap<String, Vec<String>>, name: &str| -> Vec<f64> {
+            table[name].iter().map(number).collect()
+        };
+        let probes = read("probes.csv");
+        let vector = |quantity: &str| -> [f64; D] {
+            std::array::from_fn(|i| {
+                *column(&probes, &format!("{quantity}_{}", ["x", "y", "z"][i])).last().expect("a row")
+            })
+        };
+        Results {
+            history: history.keys().map(|name| (name.clone(), column(&history, name))).collect(),
+            probe: vec![vector("displacement"), vector("velocity")],
+            open: open_resultants::<D>(&read("resultants.csv")),
+        }
+    }
+
+    /// How the results of a frame differ from those of the plain one.
+    fn differences(&self, frame: Frame, plain: &str, other: &str) -> Vec<String> {
+        let (plain, other) = (self.results(plain), self.results(other));
+        let [metre, kilogram, second] = frame.units;
+        let joule = kilogram * metre * metre / (second * second);
+        let energies = plain.history.keys().filter(|name| {
+            name.ends_with("_energy") || name.ends_with("_dissipation") || name.as_str() == "external_work"
+        });
+        let last =
+            |results: &Results<D>, name: &str| results.history[name].last().copied().unwrap_or(f64::NAN);
+        let turnover: f64 = energies.clone().map(|name| last(&plain, name).abs()).sum();
+        let mut found = Vec::new();
+        let is_adaptive = scene::<D>(self.number, Frame::PLAIN).job.contains("adaptive");
+        let share = if is_adaptive { ADAPTED } else { EQUAL };
+        for name in energies {
+            let (expected, got) = (last(&plain, name), last(&other, name) / joule);
+            if !((got - expected).abs() <= share * turnover + NONE) {
+                found.push(format!("{name} {got:e} instead of {expected:e} of {turnover:e} J"));
+            }
+        }
+        for (at, unit) in [metre, metre / second].into_iter().enumerate() {
+            let expected = turned(frame.angle, plain.probe[at]);
+            let size = expected.iter().map(|x| x * x).sum::<f64>().sqrt();
+            for i in 0..D {
+                let got = other.probe[at][i] / unit;
+                if !((got - expected[i]).abs() <= 10.0 * share * size.max(1e-6)) {
+                    let what = ["displacement", "velocity"][at];
+                    found.push(format!("{what} {got:e} instead of {:e}", expected[i]));
+                }
+            }
+        }
+        let steps = |results: &Results<D>| results.history["step"].len();
+        if steps(&plain) != steps(&other) && !is_adaptive {
+            found.push(format!("{} steps instead of {}", steps(&other), steps(&plain)));
+        }
+        found
+    }
+}
+
+/// The largest of the magnitudes, or NaN.
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |a: f64, b| if a.is_nan() || a >= b.abs() { a } else { b.abs() })
+}
+
+/// The columns of a table.
+fn table(file: &Path) -> BTreeMap<String, Vec<String>> {
+    let text = std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let column = |at: usize| rows.iter().map(|row| row[at].to_owned()).collect();
+    names.iter().enumerate().map(|(at, name)| ((*name).to_owned(), column(at))).collect()
+}
+
+/// The largest difference of forces and moments from the rate of momentum in a step, relative to the largest ones of the run.
+fn open_resultants<const D: usize>(table: &BTreeMap<String, Vec<String>>) -> [f64; 2] {
+    let axes = ["x", "y", "z"];
+    let turns: Vec<String> =
+        if D == 2 { vec!["moment_z".into()] } else { axes.map(|axis| format!("moment_{axis}")).to_vec() };
+    let forces: Vec<String> = axes[..D].iter().map(|axis| format!("force_{axis}")).collect();
+    [forces, turns].map(|columns| {
+        let mut open = 0.0;
+        let mut size = 0.0;
+        for column in columns {
+            let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+            for ((step, source), text) in table["step"].iter().zip(&table["source"]).zip(&table[&column]) {
+                let value: f64 = text.parse().unwrap_or(f64::NAN);
+                *sums.entry(step).or_default() += if source == "momentum" { -value } else { value };
+                size = largest(&[size, value]);
+            }
+            open = largest(&[&[open], &sums.into_values().collect::<Vec<f64>>()[..]].concat());
+        }
+        if size > 0.0 || size.is_nan() { open / size } else { 0.0 }
+    })
+}
+
+/// A mesh as a Gmsh file of format 4.1.
+fn gmsh<const D: usize>(mesh: &GlobalMesh<D>) -> String {
+    let (facet, cell) = if D == 2 { (1, 2) } else { (2, 4) };
+    let names: Vec<(usize, &str)> = mesh
+        .boundaries
+        .iter()
+        .map(|boundary| (D - 1, boundary.name.as_str()))
+        .chain(mesh.regions.iter().map(|name| (D, name.as_str())))
+        .collect();
+    let mut text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n".to_owned();
+    let _ = writeln!(text, "{}", names.len());
+    for (at, (dimension, name)) in names.iter().enumerate() {
+        let _ = writeln!(text, "{dimension} {} \"{name}\"", at + 1);
+    }
+    let (boundaries, regions) = (mesh.boundaries.len(), mesh.regions.len());
+    let counts = if D == 2 { [0, boundaries, regions, 0] } else { [0, 0, boundaries, regions] };
+    let [points, curves, surfaces, volumes] = counts;
+    let _ = writeln!(text, "$EndPhysicalNames\n$Entities\n{points} {curves} {surfaces} {volumes}");
+    for at in 0..names.len() {
+        let _ = writeln!(text, "{} -1e9 -1e9 -1e9 1e9 1e9 1e9 1 {} 0", at + 1, at + 1);
+    }
+    let nodes = mesh.nodes.len();
+    let _ = writeln!(text, "$EndEntities\n$Nodes\n1 {nodes} 1 {nodes}\n{D} {} 0 {nodes}", names.len());
+    (1..=nodes).for_each(|tag| {
+        let _ = writeln!(text, "{tag}");
+    });
+    for node in &mesh.nodes {
+        let z = if D == 3 { node[D - 1] } else { 0.0 };
+        let _ = writeln!(text, "{:e} {:e} {z:e}", node[0], node[1]);
+    }
+    let mut blocks: Vec<(usize, usize, Vec<&[u32]>)> = Vec::new();
+    for boundary in &mesh.boundaries {
+        let facets = boundary.facets.iter().map(|at| &mesh.facets[*at as usize][..]).collect();
+        blocks.push((D - 1, facet, facets));
+    }
+    for region in 0..regions {
+        let cells = mesh.cells.chunks_exact(D + 1).zip(&mesh.cell_regions);
+        let own = cells.filter(|(_, of)| usize::from(**of) == region).map(|(nodes, _)| nodes).collect();
+        blocks.push((D, cell, own));
+    }
+    let count: usize = blocks.iter().map(|(.., elements)| elements.len()).sum();
+    let _ = writeln!(text, "$EndNodes\n$Elements\n{} {count} 1 {count}", blocks.len());
+    let mut tag = 0;
+    for (at, (dimension, kind, elements)) in blocks.iter().enumerate() {
+        let _ = writeln!(text, "{dimension} {} {kind} {}", at + 1, elements.len());
+        for nodes in elements {
+            tag += 1;
+            let words: Vec<String> = nodes.iter().map(|node| (node + 1).to_string()).collect();
+            let _ = writeln!(text, "{tag} {}", words.join(" "));
+        }
+    }
+    text + "$EndElements\n"
+}
