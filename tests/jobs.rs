@@ -1,4 +1,5 @@
-//! Every job under jobs/ reproduces the numbers of its `[check]` table, on one and on two ranks.
+//! Every job under jobs/ and every case under tests/cases reproduces the numbers of its `[check]` table, on one and on two ranks.
+//! The cases are problems of manuals and publications at default settings.
 
 #[path = "checked/mod.rs"]
 mod checked;
@@ -11,10 +12,11 @@ use clarke::{
     postprocessing::study::quantity,
 };
 
-/// All jobs of the repository, without studies.
+/// All jobs of the repository, without studies, and all cases.
 fn jobs() -> Vec<PathBuf> {
     let mut found = Vec::new();
-    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs")];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut folders = vec![root.join("jobs"), root.join("tests/cases")];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).expect("folder") {
             let path = entry.expect("entry").path();
@@ -74,10 +76,20 @@ fn every_job_gives_its_numbers_on_two_ranks() {
 }
 
 #[test]
+fn cases_run_at_default_settings_and_name_their_source() {
+    for file in jobs().iter().filter(|file| file.parent().is_some_and(|folder| folder.ends_with("cases"))) {
+        let text = std::fs::read_to_string(file).expect("a case");
+        let is_plain = !text.contains("[solver") && !text.contains("\ntolerance");
+        assert!(is_plain, "{} sets a parameter of the solver", file.display());
+        assert!(text.contains("accepted: "), "{} does not state the accepted error", file.display());
+    }
+}
+
+#[test]
 fn the_jobs_are_found() {
     let names: Vec<String> =
         jobs().iter().map(|job| job.file_stem().expect("name").to_string_lossy().into_owned()).collect();
-    for name in ["notched_plate", "wheel_segment", "wang_cheng_2022", "wang_cheng_cube"] {
+    for name in ["notched_plate", "wheel_segment", "wang_cheng_2022", "wang_cheng_cube", "patch_on_a_plane"] {
         assert!(names.iter().any(|found| found == name), "{name} is not among {names:?}");
     }
 }
