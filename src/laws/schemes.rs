@@ -80,9 +80,9 @@ schemes! {
     /// Second order in time. All stresses are taken at the end of the step, from a backward difference over two steps. The step has
     /// no stability bound. Suitable for smooth motions; where velocities jump (impacts, sudden loads), the solution may overshoot.
     Bdf2 = "bdf2" { order: 2, kind: TwoStep, formula: Some(bdf2::blend) }
-    /// Second order in time, for impacts and waves. All stresses are taken at the midpoint of the step, contact at its end. The total
-    /// energy of an elastic body is conserved exactly and never grows in an impact; no vibration is damped, however short. Requires a
-    /// density, fixed steps and, for contact, `redistribute_mass`. Damage, adhesion, contact memory, moving supports and obstacles
-    /// moved by forces are refused.
+    /// Second order in time, for impacts and waves. All stresses are taken at the midpoint of the step, rigid contact at its end. The
+    /// total energy of elastic bodies, of compliant foundations and of obstacles moved by forces is conserved exactly and never grows in
+    /// an impact on a rigid obstacle; no vibration is damped, however short. Requires a density, fixed steps and, for contact,
+    /// `redistribute_mass`. Damage, adhesion, contact memory and moving supports are refused.
     Midpoint = "midpoint" { order: 2, kind: Midpoint, formula: Some(midpoint::blend) }
 }

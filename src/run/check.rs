@@ -121,7 +121,7 @@ fn report<const D: usize, const S: usize>(
         output_folder: job.output_folder().display().to_string(),
         motion: match body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
             _ if !body.has_form(Form::Mass) => Motion::Slow,
-            true => Motion::Impacts,
+            true => Motion::Impacts { may_conserve: may_conserve(job, body) },
             false => Motion::Inertia,
         },
         header: header::lines(session, loaded, ready)?,
@@ -139,6 +139,15 @@ fn extent<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Vec<[f64; 2]> {
     (0..D).map(along).collect()
 }
 
+/// Whether the job can use the scheme that conserves energy in impacts.
+fn may_conserve<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) -> bool {
+    let names = body.effect_names();
+    let supports = ["damage", "adhesion", "contact_memory"].iter().all(|name| !names.contains(name));
+    let mut materials = job.region.iter().map(|region| &region.material).chain([&job.material]);
+    let is_inertial = materials.all(|material| material.density.is_some());
+    supports && is_inertial && job.time.adaptive.is_none() && body.support_motion.is_none()
+}
+
 /// Up to which step the scheme of a job is stable, and which scheme suits the job.
 fn advice(scheme: &str, bound: Option<f64>, motion: Motion) -> [String; 2] {
     let own = match bound {
@@ -146,9 +155,12 @@ fn advice(scheme: &str, bound: Option<f64>, motion: Motion) -> [String; 2] {
         None => format!("{scheme} is stable with steps of any length"),
     };
     let suits = match motion {
-        Motion::Impacts => {
+        Motion::Impacts { may_conserve: true } => {
             "contact may close in an impact: midpoint with [[contact]] redistribute_mass = true conserves the energy, implicit_euler damps \
              it; bdf2 suits bodies that touch from the start and move smoothly"
+        }
+        Motion::Impacts { may_conserve: false } => {
+            "contact may close in an impact: implicit_euler damps it; bdf2 suits bodies that touch from the start and move smoothly"
         }
         Motion::Inertia => {
             "no impacts: bdf2, of second order where loads are smooth; lagged_euler, the scheme of Wang and Cheng (2022), has the \
@@ -164,8 +176,8 @@ fn advice(scheme: &str, bound: Option<f64>, motion: Motion) -> [String; 2] {
 /// The kind of motion, as far as the job tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Motion {
-    /// Bodies with mass and contact that opens and closes.
-    Impacts,
+    /// Bodies with mass and contact that opens and closes, and whether the scheme that conserves energy is available.
+    Impacts { may_conserve: bool },
     /// Bodies with mass without such a contact.
     Inertia,
     /// Bodies without mass.
@@ -275,7 +287,9 @@ mod tests {
     fn the_scheme_that_suits_a_job_depends_on_its_motion() {
         let suits = |motion| advice("lagged_euler", Some(0.12), motion);
         assert_eq!(suits(Motion::Slow)[0], "stability  lagged_euler is stable with steps below 1.2000e-1 s");
-        assert!(suits(Motion::Impacts)[1].contains("midpoint with [[contact]] redistribute_mass = true"));
+        let impacts = |may_conserve| suits(Motion::Impacts { may_conserve })[1].clone();
+        assert!(impacts(true).contains("midpoint with [[contact]] redistribute_mass = true"));
+        assert!(!impacts(false).contains("midpoint") && impacts(false).contains("implicit_euler damps it"));
         assert!(suits(Motion::Inertia)[1].contains("no impacts: bdf2"));
     }
 

@@ -8,7 +8,11 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::{body::Body, effect::Step, state::State},
+    fem::{
+        body::Body,
+        effect::{OBSTACLE_KINETIC, Step},
+        state::State,
+    },
     io::output::history::Totals,
     job::{Job, Loaded, Time},
     linear_algebra::{sparse::Precision, tensor::larger},
@@ -64,6 +68,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if let (Some(adaptive), Some(level)) = (&mut adaptive, totals.step_level) {
             adaptive.step_level = level;
         }
+        scheme.restore_powers(totals.powers);
         if totals.single_precision_failed {
             scheme.use_double_precision();
         }
@@ -108,5 +113,10 @@ fn totals_at_start<const D: usize, const S: usize>(
 ) -> Result<Totals, Agreed> {
     let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
     let (mine, _) = session.agree(body.energy(state, rest))?;
-    Ok(Totals::at_start(mine.map_values(|values| session.sum(values))))
+    let mut energy = mine.map_values(|values| session.sum(values));
+    let motions = body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
+    for motion in motions.flat_map(|obstacle| obstacle.motions()).flatten() {
+        energy[OBSTACLE_KINETIC] += motion.kinetic_energy();
+    }
+    Ok(Totals::at_start(energy))
 }

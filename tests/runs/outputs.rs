@@ -11,7 +11,8 @@ use clarke::linear_algebra::tensor::larger;
 
 const HISTORY: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
 kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
-energy_imbalance,numerical_dissipation,contact_energy,damage_dissipation,adhesion_energy,adhesion_dissipation";
+energy_imbalance,numerical_dissipation,contact_energy,damage_dissipation,adhesion_energy,adhesion_dissipation,\
+obstacle_kinetic_energy,obstacle_work,obstacle_numerical_dissipation";
 
 fn header(results: &Results, name: &str) -> String {
     results.text(name).lines().next().expect("a header").to_owned()

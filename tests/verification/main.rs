@@ -22,6 +22,7 @@ mod inclusion;
 mod indefinite;
 mod indicator;
 mod jacobian;
+mod ledgers;
 mod manufactured_contact;
 mod manufactured;
 mod manufactured_flow;
@@ -85,6 +86,10 @@ fn scenario() {
         "patch" => patch::uniform_fields(&session),
         "energy" => energy::random_jobs(&session),
         "resultants" => resultants::all(&session),
+        "ledger_orders" => ledgers::orders(&session),
+        "bounces" => ledgers::bounces(&session),
+        "thrown_balls" => ledgers::obstacles(&session),
+        "falling_weight" => ledgers::closed_forms(&session),
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
         "damage" => damage::all(&session),

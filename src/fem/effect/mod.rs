@@ -46,8 +46,9 @@ use crate::{
 pub use crate::laws::step::{Blend, Evaluation, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    CONTACT, COUNTS, Contact, ContactAreas, ContactConditions, ContactNode, LoadedMotion, LoadedObstacle,
-    PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, choose_unknowns, contact_nodes,
+    CONTACT, COUNTS, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode, LoadedMotion,
+    LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, PointCount, PointState, Quadrature,
+    ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns, contact_nodes,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};
@@ -83,6 +84,9 @@ pub const ENERGIES: &[EnergyKind] = &[
     DAMAGE,
     STORED_IN_BONDS,
     DEBONDING,
+    OBSTACLE_KINETIC,
+    OBSTACLE_WORK,
+    OBSTACLE_NUMERICAL,
 ];
 
 const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at its declared position");

@@ -46,12 +46,18 @@ pub struct Header {
     /// For the same contacts: the stiffness in N/m against the obstacle that the last step has found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_stiffness: Vec<f64>,
+    /// For the same contacts: the resultant in N of the contact tractions in the last step.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub obstacle_resultants: Vec<f64>,
     /// For each contact whose obstacle a moment turns: angle and angular velocity in rad/s after the last step, and before it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_rotations: Vec<[f64; 4]>,
     /// For the same contacts: the stiffness in N m against the rotation that the last step has found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_rotation_stiffness: Vec<f64>,
+    /// For the same contacts: the resultant moment in N m of the contact tractions in the last step.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub obstacle_rotation_resultants: Vec<f64>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -91,8 +97,10 @@ impl Header {
             totals: *totals,
             obstacles: motions(0).map(LoadedMotion::saved).collect(),
             obstacle_stiffness: motions(0).map(LoadedMotion::stiffness).collect(),
+            obstacle_resultants: motions(0).map(LoadedMotion::resultant).collect(),
             obstacle_rotations: motions(1).map(LoadedMotion::saved).collect(),
             obstacle_rotation_stiffness: motions(1).map(LoadedMotion::stiffness).collect(),
+            obstacle_rotation_resultants: motions(1).map(LoadedMotion::resultant).collect(),
             mesh: digest(body),
             physics: identity.physics.clone(),
         }
@@ -182,12 +190,17 @@ pub fn restore<const D: usize, const S: usize>(
         kept.iter().zip(&values).for_each(|((name, _), values)| body.restore_history(name, values));
     }
     let saved = [
-        (&header.obstacles, &header.obstacle_stiffness),
-        (&header.obstacle_rotations, &header.obstacle_rotation_stiffness),
+        (&header.obstacles, &header.obstacle_stiffness, &header.obstacle_resultants),
+        (
+            &header.obstacle_rotations,
+            &header.obstacle_rotation_stiffness,
+            &header.obstacle_rotation_resultants,
+        ),
     ];
-    for (number, (motions, stiffness)) in saved.into_iter().enumerate() {
+    for (number, (motions, stiffness, resultants)) in saved.into_iter().enumerate() {
         for (at, motion) in loaded_motions(body, number).enumerate() {
             motions.get(at).into_iter().for_each(|saved| motion.restore(*saved));
+            motion.restore_resultant(resultants.get(at).copied().unwrap_or(0.0));
             motion.restore_stiffness(stiffness.get(at).copied().unwrap_or(0.0));
         }
     }

@@ -41,7 +41,7 @@ fn check_redistribution(findings: &mut Findings<'_>, contact: &str) {
         findings.fault(
             &key,
             message,
-            "use [time] scheme = \"midpoint\", \"bdf2\" or \"implicit_euler\", or delete the key",
+            "use [time] scheme = \"bdf2\" or \"implicit_euler\", or delete the key",
         );
     }
 }

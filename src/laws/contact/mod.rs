@@ -5,6 +5,7 @@
 //! combinations that are refused. This file also has the keys of the table `[[contact]]`.
 
 mod adhesion;
+mod discrete_gradient;
 mod friction_law;
 mod interface;
 mod laws;

@@ -15,11 +15,14 @@ pub struct NodeContext {
     pub penetration: f64,
     /// Length of the step in s.
     pub step_length: f64,
+    /// In steps that conserve energy `u_nu - gap` in m at the start: the pressure of a law with a potential is then its mean over the
+    /// step. `None`: the pressure is that at the end.
+    pub mean_from: Option<f64>,
 }
 
 impl NodeContext {
     /// A point with closed gap at the start of a step of 1 s, in which velocity in m/s and penetration in m are equal.
-    pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0 };
+    pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0, mean_from: None };
 
     /// The penetration in m at the end of the step, at a normal velocity in m/s.
     pub(super) fn penetration_at(&self, velocity: f64) -> f64 {

@@ -20,7 +20,8 @@ pub struct ObstacleLoad {
     #[schemars(extend("variables" = "t", "unit" = "N"), example = "min(t, 2 - t)")]
     pub force: Scalar,
     /// Mass of the obstacle, in 2D per metre of thickness. 0: the force and the contact tractions are in equilibrium in each step.
-    /// The kinetic energy of the obstacle is not part of `kinetic_energy`; implicit_euler damps its motion.
+    /// The kinetic energy of the obstacle is `obstacle_kinetic_energy` in `history.csv`; implicit_euler and lagged_euler damp its motion, by
+    /// `obstacle_numerical_dissipation`.
     #[serde(default)]
     #[schemars(extend("unit" = "kg"), range(min = 0), example = 0.5)]
     pub mass: f64,

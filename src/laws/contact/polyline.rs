@@ -111,6 +111,11 @@ impl Polyline {
         self.points.iter().take_while(|[v, p]| c * v + p <= s).count()
     }
 
+    /// The slope of this branch.
+    pub(super) fn slope_of(&self, branch: usize) -> f64 {
+        self.slopes[branch]
+    }
+
     /// Whether this branch is vertical.
     fn is_vertical(&self, branch: usize) -> bool {
         self.slopes[branch] == f64::INFINITY

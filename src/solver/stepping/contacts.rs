@@ -10,19 +10,23 @@ use crate::{
     },
 };
 
-/// Adds the energy that contact dissipated in a committed step, the numerical part, and the work on obstacles.
+/// Adds the energy that contact dissipated in a committed step, the numerical part, and the work on obstacles; adds the powers of friction
+/// and of laws of the velocity to `powers`.
 pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &State,
-    step: Step,
+    (step, with_means): (Step, bool),
     energy: &mut Energy,
+    powers: &mut Energy,
 ) -> Result<()> {
     let velocity = state.velocity.local()?;
     for contact in &body.contacts {
-        let [dissipated, numerical, work] = contact.energy_of_step(&velocity, step.length);
-        energy[CONTACT] += dissipated;
-        energy[NUMERICAL] += numerical;
-        energy[WORK] += work;
+        let own = contact.energy_of_step(&velocity, step.length, with_means);
+        energy[CONTACT] += own.dissipated + step.length * own.dissipated_power;
+        energy[NUMERICAL] += own.numerical;
+        energy[WORK] += own.work + step.length * own.driving_power;
+        powers[CONTACT] += own.dissipated_power;
+        powers[WORK] += own.driving_power;
     }
     Ok(())
 }

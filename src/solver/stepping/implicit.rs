@@ -15,7 +15,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, ENERGIES, Energy, Evaluation, Form, NUMERICAL, Peaks, Role, Step},
+        effect::{Blend, Contact, ENERGIES, Energy, Evaluation, Form, NUMERICAL, Peaks, Role, Step},
         resultants::BalancedMotion,
         space::Nodal,
         state::State,
@@ -66,6 +66,11 @@ impl Implicit {
         (self.formula)(step).length
     }
 
+    /// Whether the equations hold at the midpoint of a step.
+    pub(super) fn is_midpoint(&self) -> bool {
+        self.is_midpoint
+    }
+
     /// The part of a step at whose end its equations hold.
     fn balanced(&self, step: Step) -> Step {
         let length = 0.5 * step.length;
@@ -107,13 +112,16 @@ impl Implicit {
         self.blend
     }
 
-    /// Corrects prepared contacts for the blend from which the step starts.
+    /// Corrects prepared contacts for the blend from which the step starts, or for equations that hold at its midpoint.
     pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
         step: Step,
     ) -> Result<()> {
+        if self.is_midpoint {
+            body.contacts.iter_mut().for_each(Contact::conserve_energy);
+        }
         if self.blend.earlier == 0.0 || !body.contacts.iter().any(|c| c.law.depends_on_displacement()) {
             return Ok(());
         }

@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, Energy, Evaluation, NUMERICAL, Peaks, Step},
+        effect::{Blend, CONTACT, Energy, Evaluation, NUMERICAL, Peaks, Step, Travel, VISCOUS},
         resultants::BalancedMotion,
         state::State,
     },
@@ -102,6 +102,14 @@ impl Integrator {
         }
     }
 
+    /// The length in s that multiplies the velocity of an obstacle in a started step, in its inertia and in its displacement.
+    pub(super) fn travel(&self, step: Step) -> Travel {
+        match self {
+            Self::Implicit(scheme) if scheme.is_midpoint() => Travel::to_midpoint(step.length),
+            _ => Travel::to_end(self.blend(step.length)),
+        }
+    }
+
     /// Writes displacement, trial histories and energies of a solved step before it is committed. Collective.
     pub(super) fn finish<const D: usize, const S: usize>(
         &mut self,
@@ -150,25 +158,39 @@ impl Integrator {
         }
     }
 
+    /// Whether a started step follows a formula of second order that needs the powers before it for energies of the same order.
+    pub(super) fn averages_powers(&self) -> bool {
+        match self {
+            Self::LaggedEuler(_) => false,
+            Self::Implicit(scheme) => scheme.blend().earlier != 0.0,
+        }
+    }
+
     /// Energies of the step just committed without the work of the loads, and its largest stress and strain, over all ranks; extrapolates
-    /// a step that was solved at its midpoint to its end. Collective.
+    /// a step that was solved at its midpoint to its end. Gives the powers in W at the end of the step, of the energies that are powers
+    /// times its length. Collective.
     pub(super) fn complete<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         state: &mut State,
         step: Step,
-    ) -> Result<(Energy, Peaks)> {
+    ) -> Result<(Energy, Peaks, Energy)> {
         let (mut energy, mut peaks) = body.energy(state, step)?;
+        let mut powers = Energy::default();
+        for kind in [VISCOUS, CONTACT] {
+            powers[kind] = energy[kind] / step.length;
+        }
         match self {
             Self::LaggedEuler(scheme) => energy += scheme.explicit,
             Self::Implicit(scheme) => scheme.add_solved(&mut energy),
         }
-        add_contact_energy(body, state, step, &mut energy)?;
+        add_contact_energy(body, state, (step, self.averages_powers()), &mut energy, &mut powers)?;
         if let Self::Implicit(scheme) = self {
             energy[NUMERICAL] += scheme.momentum_term(body, state, step)?;
             peaks = peaks.or(scheme.extrapolate(body, state, step, &mut energy)?);
         }
-        Ok(over_ranks(session, energy, peaks))
+        let (energy, peaks) = over_ranks(session, energy, peaks);
+        Ok((energy, peaks, powers.map_values(|values| session.sum(values))))
     }
 }

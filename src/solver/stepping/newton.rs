@@ -294,6 +294,7 @@ impl Newton {
             solutions: 0,
             landed_on: None,
             energy: Energy::default(),
+            powers: Energy::default(),
             peaks: Peaks::default(),
         })
     }

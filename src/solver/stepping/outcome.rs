@@ -26,6 +26,8 @@ pub struct StepOutcome {
     pub landed_on: Option<&'static str>,
     /// Energies of the step, over all ranks.
     pub energy: Energy,
+    /// Powers at its end in W, over all ranks, from which the next step has means.
+    pub powers: Energy,
     /// Largest stress and strain at its end, over all ranks.
     pub peaks: Peaks,
 }

@@ -96,8 +96,17 @@ impl ErrorWorkspace {
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
         let strains = length * length * square(elastic, strained);
         let mine = [square(form, curved), strains + histories.error, square(form, &trial), histories.size];
+        let mut squares = session.sum(mine);
+        // Obstacles that forces move, alike on all ranks.
+        let motions = body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
+        for motion in motions.flat_map(|obstacle| obstacle.motions()).flatten() {
+            let unit = if form == Some(Form::Mass) { 1.0 } else { step.length };
+            let [error, size] = motion.velocity_error(curvature);
+            squares[0] += error / unit;
+            squares[2] += size / unit;
+        }
         let [velocity, stress, all_velocity, all_stress] =
-            session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
+            squares.map(|square| if square > 0.0 { square.sqrt() } else { square });
         // With mass both norms are roots of energies: a free body has a stress of rounding errors, a fixed one a velocity of
         // rounding errors. Without mass the square of a velocity norm is a power.
         let unit = if form == Some(Form::Mass) { 1.0 } else { step.length.sqrt() };

@@ -20,7 +20,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
-        effect::{LoadedMotion, Step, WORK},
+        effect::{CONTACT, Energy, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
         resultants::BalancedMotion,
         state::State,
     },
@@ -55,6 +55,8 @@ pub struct Stepper {
     solver: StepSolver,
     load: Option<DistributedVector>,
     load_is_current: bool,
+    /// Powers in W at the end of the last step, over all ranks; see [`Integrator::complete`].
+    powers: Energy,
     right_hand_side: DistributedVector,
     moving_supports: Option<MovingSupports>,
     /// The motions of obstacles that forces drive: the contact and the number of each; and the search for their velocities.
@@ -117,6 +119,7 @@ impl Stepper {
             solver: StepSolver::new(session, body, state, settings, steps)?,
             load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
             load_is_current: false,
+            powers: Energy::default(),
             right_hand_side: state.velocity.like()?,
             moving_supports: MovingSupports::new(body, state)?,
             loaded: Vec::new(),
@@ -168,6 +171,11 @@ impl Stepper {
     /// The precision of factors, if steps are condensed to the contact.
     pub fn factor_precision(&self) -> Option<Precision> {
         self.solver.factor_precision()
+    }
+
+    /// Sets the powers that the outcome of the last step of an earlier run had.
+    pub fn restore_powers(&mut self, powers: Energy) {
+        self.powers = powers;
     }
 
     /// Lets the next factors of condensed steps be in double precision.
@@ -330,16 +338,17 @@ impl Stepper {
         state: &State,
         (step, balance): (Step, &mut Balance),
     ) -> Result<StepOutcome> {
-        let blend = self.integrator.blend(step.length);
+        let (travel, balanced_time) = (self.integrator.travel(step), self.integrator.balanced_time(step));
         let tolerance = OBSTACLE_SHARE * self.solver.relative_tolerance();
         let mut all = StepOutcome::default();
         balance.start(self.loaded.len());
-        session.agree(self.loaded.iter().try_for_each(|&motion| finite_force(body, motion, step.time)))?;
+        session
+            .agree(self.loaded.iter().try_for_each(|&motion| finite_force(body, motion, balanced_time)))?;
         for evaluation in 0..EVALUATIONS {
             for (&motion, velocity) in self.loaded.iter().zip(&mut balance.velocities) {
                 let Some(motion) = loaded_motion(body, motion) else { continue };
                 *velocity =
-                    if evaluation == 0 { motion.start(blend) } else { motion.set_velocity(*velocity) };
+                    if evaluation == 0 { motion.start(travel) } else { motion.set_velocity(*velocity) };
             }
             let prepared = prepare_gaps(body, state, step);
             let prepared = prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step));
@@ -360,7 +369,7 @@ impl Stepper {
                 let [arm] = session.largest([contact.longest_arm()]);
                 let scale_of_contact = contact.scale * area * if number == 0 { 1.0 } else { arm * arm };
                 let Some(motion) = loaded_motion(body, motion) else { continue };
-                let [value, scale] = motion.unbalanced(step.time, resultant);
+                let [value, scale] = motion.unbalanced(balanced_time, resultant);
                 if let Some([velocity, earlier]) = balance.before.get(at) {
                     motion.keep_slope((value - earlier) / (balance.velocities[at] - velocity));
                 }
@@ -444,6 +453,7 @@ impl Stepper {
         if let Some(supports) = &mut self.moving_supports {
             work = supports.work(session, body, step, &self.trial, self.integrator.flow_start())?;
         }
+        let of_obstacles = self.energy_of_obstacles(body, state, step);
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         body.commit();
@@ -451,15 +461,66 @@ impl Stepper {
         let balancing = Instant::now();
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
-        (outcome.energy, outcome.peaks) = self.integrator.complete(session, body, state, step)?;
+        let mut powers;
+        (outcome.energy, outcome.peaks, powers) = self.integrator.complete(session, body, state, step)?;
         self.traffic.balance += self.passes.energy;
         outcome.energy[WORK] += work;
-        if let Some(load) = &self.load {
-            outcome.energy[WORK] += step.length * load.dot(&self.trial)?;
-            self.traffic.balance += 2 * vector_bytes(body);
+        powers[WORK] += work / step.length;
+        let [of_loads, power] = self.work_of_loads(body, state, step)?;
+        outcome.energy[WORK] += of_loads;
+        outcome.energy[NUMERICAL] += step.length * power - of_loads;
+        if !body.load.is_steady() {
+            powers[WORK] += power;
         }
+        if self.integrator.averages_powers() {
+            for kind in [VISCOUS, CONTACT, WORK] {
+                let more = 0.5 * step.length * (self.powers[kind] - powers[kind]);
+                outcome.energy[kind] += more;
+                outcome.energy[NUMERICAL] += if kind.role == Role::Work { -more } else { more };
+            }
+        }
+        (self.powers, outcome.powers) = (powers, powers);
+        outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
         Ok(())
+    }
+
+    /// Energies of the motions of obstacles in a solved step before it is committed.
+    fn energy_of_obstacles<const D: usize, const S: usize>(
+        &self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Energy {
+        let times = [self.integrator.balanced_time(step), state.time];
+        let mut energy = Energy::default();
+        for &motion in &self.loaded {
+            energy += loaded_motion(body, motion).map_or_else(Energy::default, |m| m.energy_of_step(times));
+        }
+        energy
+    }
+
+    /// The work of the loads in J in the step just committed, and their power in W in its equations. Collective.
+    fn work_of_loads<const D: usize, const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<[f64; 2]> {
+        let Some(load) = &self.load else { return Ok([0.0; 2]) };
+        let power = load.dot(&self.trial)?;
+        self.traffic.balance += 2 * vector_bytes(body);
+        // The work of steady loads is the change of their potential.
+        let is_exact = self.integrator.averages_powers() && body.load.is_steady();
+        let Some(before) = state.previous_displacement.as_ref().filter(|_| is_exact) else {
+            return Ok([step.length * power, power]);
+        };
+        // No longer needed in this step.
+        let way = &mut self.right_hand_side;
+        way.copy_from(&state.displacement)?;
+        way.add_scaled(-1.0, before)?;
+        self.traffic.balance += 7 * vector_bytes(body);
+        Ok([load.dot(way)?, power])
     }
 
     /// Loads and all other forces that are known before the step, zero at prescribed components.

@@ -2,11 +2,12 @@
 
 use super::{
     Contact,
-    point::{Point, Vectors::Body},
+    point::{Point, Unknown, Vectors::Body},
 };
 use crate::{
     error::Result,
     fem::effect::{EnergyKind, Role},
+    laws::contact::NodeContext,
     linear_algebra::tensor::larger,
 };
 
@@ -15,42 +16,80 @@ pub const CONTACT: EnergyKind = EnergyKind::new(4, Role::Dissipated, "contact_di
 /// Stored in contact (compliant foundations).
 pub const STORED_IN_CONTACT: EnergyKind = EnergyKind::new(7, Role::Stored, "contact_energy");
 
+/// Energies of a contact in a step, in J, and powers at its end, in W.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ContactEnergy {
+    /// Dissipated in impacts on rigid obstacles and by wear.
+    pub dissipated: f64,
+    /// Terms of the time scheme.
+    pub numerical: f64,
+    /// Work of the pressures of moving obstacles on the body.
+    pub work: f64,
+    /// Power that friction and laws of the velocity dissipate.
+    pub dissipated_power: f64,
+    /// Power of the friction of moving obstacles on the body.
+    pub driving_power: f64,
+}
+
 impl<const D: usize> Contact<D> {
-    /// Energy in J that a step of this length dissipated, its numerical part, and the work of the obstacle on the body, from
-    /// velocities at the end of the step (with ghosts).
+    /// The energies of a step of this length, from velocities at its end (with ghosts). `with_means`: pressures are means over the step
+    /// where the obstacle moves or wear grows, as fits a formula of second order.
     ///
-    /// With the penetrations `d`, the energy `e` of the law and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
-    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored energy, work on the obstacle, numerical part. Friction `q` on an obstacle
-    /// with the velocity `w` absorbs `k q . v = k q . (v - w) + k q . w`: dissipation, work on the obstacle. Where the gap grows by wear,
-    /// `p` times this growth is dissipated.
-    pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> [f64; 3] {
-        let mut sums = [0.0; 3];
+    /// The pressure takes up `k p v`. With the penetrations `d`, the energy `e` of the law, a gap that grows by `g` and wear by `h`,
+    /// `k p v + numerical = (e(d_n) - e(d_{n-1})) + p g + p h`: stored energy, work on the obstacle, dissipation. Where the law stores
+    /// nothing, as a rigid obstacle, `p (d_n - d_{n-1})` is dissipated. Friction `q` on an obstacle with the velocity `w` absorbs
+    /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle.
+    pub fn energy_of_step(&self, velocity: &[f64], length: f64, with_means: bool) -> ContactEnergy {
+        let mut sum = ContactEnergy::default();
         for point in &self.points {
             let v = point.normal_component(Body, velocity);
             let pressure = point.pressure_at(&self.law, Body, velocity);
-            let work = length * pressure * v;
+            if !self.law.depends_on_displacement() {
+                sum.dissipated_power += point.weight * pressure * v;
+                continue;
+            }
+            let mean = if with_means { 0.5 * (pressure + self.pressure_before(point)) } else { pressure };
             let change = point.context.step_length * v;
             let after = point.context.penetration + change;
-            let mismatch = length * v - change - point.blend_offset;
-            let energies = self.law.energy(after).zip(self.law.energy(point.penetration_before));
-            let stored = energies.map(|(after, before)| after - before);
-            let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
-            let numerical = match stored {
-                None => 0.0,
-                Some(stored) if pressure == 0.0 => stored,
-                Some(stored) => stored - pressure * (after - before) - pressure * mismatch,
+            // Without an obstacle at the start, or at the end, nothing is exchanged there.
+            let times = |pressure: f64, way: f64| {
+                if pressure == 0.0 || !way.is_finite() { 0.0 } else { pressure * way }
             };
-            let stored = stored.unwrap_or(0.0);
-            let given = if pressure == 0.0 { 0.0 } else { pressure * point.growth };
-            sums[0] += point.weight * (work - stored + numerical - given);
-            sums[1] += point.weight * numerical;
-            sums[2] -= point.weight * given;
+            let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
+            let energies = self.law.energy(after).zip(self.law.energy(point.penetration_before));
+            let (stored, lost) = match energies {
+                Some((after, before)) => (after - before, 0.0),
+                None => (0.0, times(pressure, after - before)),
+            };
+            // The growth of the wear that this step has seen, which is no longer stored.
+            let worn = if self.wear.is_some() {
+                (change + point.blend_offset) - point.growth - (after - before)
+            } else {
+                0.0
+            };
+            let dissipated = lost + times(mean, worn);
+            let given = times(mean, point.growth);
+            sum.dissipated += point.weight * dissipated;
+            sum.work -= point.weight * given;
+            sum.numerical += point.weight * (stored + dissipated + given - length * pressure * v);
         }
         if let Some(friction) = &self.friction {
-            sums[0] += length * friction.power(velocity);
-            sums[2] += length * friction.driving_power();
+            sum.dissipated_power += friction.power(velocity);
+            sum.driving_power += friction.driving_power();
         }
-        sums
+        sum
+    }
+
+    /// Pressure in Pa at a point before the step.
+    fn pressure_before(&self, point: &Point<D>) -> f64 {
+        if point.unknown == Unknown::Held {
+            return 0.0;
+        }
+        if self.law.has_vertical_parts() {
+            return point.pressure_before;
+        }
+        let context = NodeContext { penetration: point.penetration_before, ..NodeContext::AT_THE_GAP };
+        self.law.pressure(0.0, context)
     }
 
     /// Largest penetration in m of points on this rank at `time`; minus infinity where none can touch the obstacle. A gap that

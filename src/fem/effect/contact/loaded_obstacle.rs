@@ -5,25 +5,66 @@
 //! body: `x = x~ + k' w` and `m (w - w~) / k' = F + R`, with the blends `x~` and `w~` of earlier states and the length `k'` of the
 //! scheme. `R` depends on `w`, through the gaps at the end of the step. The same holds for the angle, the angular velocity, the moment of
 //! inertia and the moments about the centre.
+//!
+//! Where the equations of a step hold at its midpoint, `m (w_m - w_{n-1}) / (k / 2) = F + R` and `x_n = x_{n-1} + k w_m`; the velocity is
+//! extrapolated, `w_n = 2 w_m - w_{n-1}`, except that of an obstacle without mass.
+//!
+//! Energy: with the inertia force `I = m (w - w~) / k'` of the step, `I = F + R`, and
+//! `d(1/2 m w^2) = F~ dx + R~ dx + numerical`, `numerical = d(1/2 m w^2) - I dx + (F - F~) dx + (R - R~) dx`, where `F~` and `R~` are the
+//! forces of the step or, for a formula of second order, their means over it. `R~ dx` is minus the work of the obstacle on the body.
 
 use crate::{
-    fem::effect::Blend,
+    fem::effect::{Blend, Curvature, Energy, EnergyKind, Role, WORK},
     laws::{contact::ObstacleLoad, expression::Scalar},
     linear_algebra::tensor::{Vector, add_scaled, cross, norm},
 };
+
+/// Kinetic energy of the obstacles that forces and moments move.
+pub const OBSTACLE_KINETIC: EnergyKind = EnergyKind::new(11, Role::Stored, "obstacle_kinetic_energy");
+/// Work of the forces and moments on obstacles.
+pub const OBSTACLE_WORK: EnergyKind = EnergyKind::new(12, Role::Work, "obstacle_work");
+/// Terms of the time scheme in the motions of obstacles.
+pub const OBSTACLE_NUMERICAL: EnergyKind =
+    EnergyKind::new(13, Role::Numerical, "obstacle_numerical_dissipation");
+
+/// How a motion proceeds in a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Travel {
+    /// The start of the step: the velocity changes by the length of the blend times its rate.
+    blend: Blend,
+    /// The length in s that multiplies the velocity in the displacement.
+    way: f64,
+    /// Whether the equations hold at the midpoint of the step.
+    is_midpoint: bool,
+}
+
+impl Travel {
+    /// A step whose equations hold at its end.
+    pub fn to_end(blend: Blend) -> Self {
+        Self { blend, way: blend.length, is_midpoint: false }
+    }
+
+    /// A step of this length in s whose equations hold at its midpoint.
+    pub fn to_midpoint(length: f64) -> Self {
+        Self { blend: Blend::euler(0.5 * length), way: length, is_midpoint: true }
+    }
+}
 
 /// A motion with one degree of freedom and the force, or the moment, that drives it.
 #[derive(Debug)]
 pub struct LoadedMotion {
     force: Scalar,
     mass: f64,
-    /// Displacement in m (angle) and velocity in m/s (rad/s) after the last step, before it, and at the end of the current one.
+    /// Displacement in m (angle) and velocity in m/s (rad/s) after the last step, and before it.
     converged: [f64; 2],
     earlier: [f64; 2],
+    /// Displacement at the end of the current step, and the velocity in its equations.
     trial: [f64; 2],
+    /// Resultant in N (N m) of the contact tractions in the last step and in the current one.
+    resultant: [f64; 2],
     /// By how much the resultant falls per displacement, in N/m, as found in the last step and in the current one; 0 before.
     stiffness: [f64; 2],
-    blend: Blend,
+    travel: Travel,
 }
 
 /// An obstacle with the force and the moment that move it.
@@ -120,7 +161,8 @@ impl LoadedMotion {
     fn new(force: Scalar, mass: f64, velocity: f64) -> Self {
         let start = [0.0, velocity];
         let (converged, earlier, trial) = (start, start, start);
-        Self { force, mass, converged, earlier, trial, stiffness: [0.0; 2], blend: Blend::euler(0.0) }
+        let travel = Travel::to_end(Blend::euler(0.0));
+        Self { force, mass, converged, earlier, trial, resultant: [0.0; 2], stiffness: [0.0; 2], travel }
     }
 
     /// The force as a function of time.
@@ -144,6 +186,16 @@ impl LoadedMotion {
         (self.converged, self.earlier, self.trial) = ([x, w], [y, v], [x, w]);
     }
 
+    /// The resultant in N of the contact tractions in the last step, 0 before, for checkpoints.
+    pub fn resultant(&self) -> f64 {
+        self.resultant[0]
+    }
+
+    /// Sets what [`resultant`](Self::resultant) gave.
+    pub fn restore_resultant(&mut self, resultant: f64) {
+        self.resultant = [resultant; 2];
+    }
+
     /// The stiffness of the contact in N/m as the last step has found it, 0 before, for checkpoints.
     pub fn stiffness(&self) -> f64 {
         self.stiffness[0]
@@ -156,35 +208,36 @@ impl LoadedMotion {
 
     /// The slope of [`unbalanced`](Self::unbalanced) in N s/m that the last step has found, if it has.
     pub fn expected_slope(&self) -> Option<f64> {
-        (self.stiffness[0] > 0.0).then(|| self.inertia() + self.blend.length * self.stiffness[0])
+        (self.stiffness[0] > 0.0).then(|| self.inertia() + self.travel.way * self.stiffness[0])
     }
 
     /// Keeps the slope in N s/m between the last two velocities of a step for the next one.
     pub fn keep_slope(&mut self, slope: f64) {
-        let stiffness = (slope - self.inertia()) / self.blend.length;
+        let stiffness = (slope - self.inertia()) / self.travel.way;
         if stiffness > 0.0 && stiffness.is_finite() {
             self.stiffness[1] = stiffness;
         }
     }
 
     /// Starts a step; returns the velocity in m/s after the last one.
-    pub fn start(&mut self, blend: Blend) -> f64 {
-        self.blend = blend;
+    pub fn start(&mut self, travel: Travel) -> f64 {
+        self.travel = travel;
         self.stiffness[1] = self.stiffness[0];
         self.set_velocity(self.converged[1])
     }
 
-    /// Sets the velocity in m/s at the end of the step.
+    /// Sets the velocity in m/s in the equations of the step.
     pub fn set_velocity(&mut self, velocity: f64) -> f64 {
-        let start = self.blend.of(self.converged[0], self.earlier[0]);
-        self.trial = [start + self.blend.length * velocity, velocity];
+        let Travel { blend, way, .. } = self.travel;
+        self.trial = [blend.of(self.converged[0], self.earlier[0]) + way * velocity, velocity];
         velocity
     }
 
-    /// `m (w - w~) / k' - F - R` in N at the end of a step at `time`, given the resultant `R` in N, and the largest of the terms.
-    pub fn unbalanced(&self, time: f64, resultant: f64) -> [f64; 2] {
-        let before = self.blend.of(self.converged[1], self.earlier[1]);
-        let momentum = [self.trial[1], before].map(|velocity| self.mass * velocity / self.blend.length);
+    /// `m (w - w~) / k' - F - R` in N where the equations of a step hold, at `time`, given the resultant `R` in N, and the largest of
+    /// the terms.
+    pub fn unbalanced(&mut self, time: f64, resultant: f64) -> [f64; 2] {
+        self.resultant[1] = resultant;
+        let momentum = self.momentum_rates();
         let force = self.force.evaluate(time, &[]);
         let terms = [momentum[0], momentum[1], force, resultant];
         [
@@ -193,20 +246,70 @@ impl LoadedMotion {
         ]
     }
 
+    /// `m w / k'` and `m w~ / k'` in N.
+    fn momentum_rates(&self) -> [f64; 2] {
+        let Travel { blend, .. } = self.travel;
+        let before = blend.of(self.converged[1], self.earlier[1]);
+        [self.trial[1], before].map(|velocity| self.mass * velocity / blend.length)
+    }
+
     /// `m / k'` in kg/s.
     pub fn inertia(&self) -> f64 {
-        self.mass / self.blend.length
+        self.mass / self.travel.blend.length
+    }
+
+    /// Displacement and velocity at the end of the step.
+    fn end(&self) -> [f64; 2] {
+        let [displacement, velocity] = self.trial;
+        let extrapolates = self.travel.is_midpoint && self.mass > 0.0;
+        [displacement, if extrapolates { 2.0 * velocity - self.converged[1] } else { velocity }]
+    }
+
+    /// Kinetic energy in J after the last step.
+    pub fn kinetic_energy(&self) -> f64 {
+        0.5 * self.mass * self.converged[1] * self.converged[1]
+    }
+
+    /// Energies of the solved step before it is committed, given the times in s at which its equations and those of the step before
+    /// hold; the work of the contact tractions counts as work.
+    pub fn energy_of_step(&self, times: [f64; 2]) -> Energy {
+        let [displacement, velocity] = self.end();
+        let (way, kinetic) = (displacement - self.converged[0], 0.5 * self.mass * velocity * velocity);
+        let [momentum, before] = self.momentum_rates();
+        let [resultant_before, resultant] = self.resultant;
+        let force = self.force.evaluate(times[0], &[]);
+        let [mean_force, mean_resultant] = if self.travel.blend.earlier == 0.0 {
+            [force, resultant]
+        } else {
+            [0.5 * (force + self.force.evaluate(times[1], &[])), 0.5 * (resultant + resultant_before)]
+        };
+        let open = (force - mean_force) + (resultant - mean_resultant) - (momentum - before);
+        Energy::from([
+            (OBSTACLE_KINETIC, kinetic),
+            (OBSTACLE_WORK, mean_force * way),
+            (WORK, mean_resultant * way),
+            (OBSTACLE_NUMERICAL, kinetic - self.kinetic_energy() + open * way),
+        ])
+    }
+
+    /// Squares of the error of the velocity in a solved step and of the velocity itself, both times the mass, in J.
+    pub fn velocity_error(&self, curvature: Curvature) -> [f64; 2] {
+        let [_, velocity] = self.trial;
+        let error = curvature.error([velocity, self.converged[1], self.earlier[1]]);
+        [error, velocity].map(|velocity| self.mass * velocity * velocity)
     }
 
     fn commit(&mut self) {
-        (self.earlier, self.converged) = (self.converged, self.trial);
+        (self.earlier, self.converged) = (self.converged, self.end());
         self.stiffness[0] = self.stiffness[1];
+        self.resultant[0] = self.resultant[1];
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::effect::Step;
 
     fn falling() -> LoadedMotion {
         LoadedMotion::new(Scalar::Number(6.0), 3.0, 1.0)
@@ -230,7 +333,7 @@ mod tests {
         );
         let [falling, turning] = disc.motions_mut().map(|motion| motion.expect("both"));
         for motion in [falling, turning] {
-            motion.start(Blend::euler(0.5));
+            motion.start(Travel::to_end(Blend::euler(0.5)));
             motion.set_velocity(2.0);
         }
         assert_eq!(disc.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
@@ -244,13 +347,13 @@ mod tests {
     #[test]
     fn the_slope_of_a_step_is_expected_in_the_next_one() {
         let mut obstacle = falling();
-        obstacle.start(Blend::euler(0.5));
+        obstacle.start(Travel::to_end(Blend::euler(0.5)));
         assert_eq!(obstacle.expected_slope(), None);
         // 3 kg / 0.5 s and 8 N/m over 0.5 s.
         obstacle.keep_slope(10.0);
         assert_eq!(obstacle.expected_slope(), None, "the step may be repeated");
         obstacle.commit();
-        obstacle.start(Blend::euler(0.25));
+        obstacle.start(Travel::to_end(Blend::euler(0.25)));
         assert_eq!(obstacle.expected_slope(), Some(12.0 + 2.0));
         obstacle.keep_slope(f64::NAN);
         obstacle.keep_slope(1.0);
@@ -258,14 +361,14 @@ mod tests {
         assert_eq!(obstacle.stiffness(), 8.0, "less than the inertia: not a slope");
         let mut other = falling();
         other.restore_stiffness(obstacle.stiffness());
-        other.start(Blend::euler(0.25));
+        other.start(Travel::to_end(Blend::euler(0.25)));
         assert_eq!(other.expected_slope(), Some(14.0));
     }
 
     #[test]
     fn steps_of_both_schemes_by_hand() {
         let mut obstacle = falling();
-        assert_eq!(obstacle.start(Blend::euler(0.5)), 1.0);
+        assert_eq!(obstacle.start(Travel::to_end(Blend::euler(0.5))), 1.0);
         obstacle.set_velocity(2.0);
         // 3 kg (2 - 1) m/s / 0.5 s = 6 N.
         assert_eq!(obstacle.unbalanced(0.5, 0.0), [0.0, 12.0]);
@@ -273,7 +376,7 @@ mod tests {
         obstacle.commit();
         assert_eq!(obstacle.motion(), [1.0, 2.0]);
         // The second-order formula: x~ = 4/3 1, w~ = 4/3 2 - 1/3 1 = 7/3, k' = 1/3 s; 3 m/s are 3 (3 - 7/3) / (1/3) = 6 N.
-        obstacle.start(Blend { length: 1.0 / 3.0, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 });
+        obstacle.start(Travel::to_end(Blend { length: 1.0 / 3.0, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }));
         obstacle.set_velocity(3.0);
         assert!(obstacle.unbalanced(1.0, 0.0)[0].abs() < 1e-13);
         obstacle.commit();
@@ -281,5 +384,52 @@ mod tests {
         let mut other = falling();
         other.restore(obstacle.saved());
         assert_eq!(other.saved(), obstacle.saved());
+    }
+
+    #[test]
+    fn a_step_through_its_midpoint_loses_no_energy_and_others_lose_what_they_state() {
+        let mut obstacle = falling();
+        // 3 kg from 1 m/s under 6 N + 3 N for 0.5 s: 2.5 m/s, 0.875 m on the way.
+        obstacle.start(Travel::to_midpoint(0.5));
+        obstacle.set_velocity(1.75);
+        assert_eq!(obstacle.unbalanced(0.25, 3.0)[0], 0.0);
+        let energy = obstacle.energy_of_step([0.25, f64::NAN]);
+        let values = [OBSTACLE_KINETIC, OBSTACLE_WORK, WORK, OBSTACLE_NUMERICAL].map(|kind| energy[kind]);
+        assert_eq!(values, [9.375, 5.25, 2.625, 0.0]);
+        obstacle.commit();
+        assert_eq!((obstacle.motion(), obstacle.resultant()), ([0.875, 2.5], 3.0));
+        // Implicit Euler to 4 m/s: 3 kg 1.5 m/s / 0.5 s = 9 N over 2 m; 1/2 3 kg (1.5 m/s)^2 are lost.
+        obstacle.start(Travel::to_end(Blend::euler(0.5)));
+        obstacle.set_velocity(4.0);
+        assert_eq!(obstacle.unbalanced(1.0, 3.0)[0], 0.0);
+        let energy = obstacle.energy_of_step([1.0, f64::NAN]);
+        let values = [OBSTACLE_KINETIC, OBSTACLE_WORK, WORK, OBSTACLE_NUMERICAL].map(|kind| energy[kind]);
+        assert_eq!(values, [24.0, 12.0, 6.0, -3.375]);
+        // The second-order formula takes means of forces over the step.
+        obstacle.start(Travel::to_end(Blend { length: 0.5, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }));
+        obstacle.set_velocity(4.0);
+        obstacle.unbalanced(1.0, 7.0);
+        let way = obstacle.trial[0] - obstacle.converged[0];
+        let energy = obstacle.energy_of_step([1.0, 0.5]);
+        assert!(
+            (energy[WORK] - 5.0 * way).abs() < 1e-14 && (energy[OBSTACLE_WORK] - 6.0 * way).abs() < 1e-14
+        );
+        // One without mass has the velocity of the midpoint.
+        let mut light = LoadedMotion { mass: 0.0, ..falling() };
+        light.start(Travel::to_midpoint(0.5));
+        light.set_velocity(1.75);
+        light.commit();
+        assert_eq!(light.motion(), [0.875, 1.75]);
+    }
+
+    #[test]
+    fn velocities_off_the_straight_line_are_errors() {
+        let mut obstacle = falling();
+        obstacle.restore([0.0, 2.0, 0.0, 1.0]);
+        obstacle.start(Travel::to_end(Blend::euler(0.5)));
+        obstacle.set_velocity(7.0);
+        let step = Step { time: 1.0, length: 0.5, previous_length: 0.5 };
+        // Half of 7 - (2 + 1) m/s, 3 kg.
+        assert_eq!(obstacle.velocity_error(Curvature::of(step)), [12.0, 147.0]);
     }
 }

@@ -53,8 +53,10 @@ use std::collections::BTreeSet;
 pub use crate::laws::contact::Quadrature;
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
-pub use energy::{CONTACT, STORED_IN_CONTACT};
-pub use loaded_obstacle::{LoadedMotion, LoadedObstacle};
+pub use energy::{CONTACT, ContactEnergy, STORED_IN_CONTACT};
+pub use loaded_obstacle::{
+    LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, Travel,
+};
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use unknowns::choose_unknowns;

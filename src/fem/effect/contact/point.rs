@@ -70,6 +70,8 @@ pub(super) struct Point<const D: usize> {
     pub growth: f64,
     /// Contribution of the blend of a two-step scheme to the penetration, in m.
     pub blend_offset: f64,
+    /// Pressure in Pa before the step, where the unknown is the parameter.
+    pub pressure_before: f64,
     /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
     pub pressure: f64,
     /// Ratio of the change of velocity to the change of the unknown, at the last linearisation: `c V'(s)`.
@@ -99,6 +101,7 @@ impl<const D: usize> Point<D> {
             worn: [0.0; 2],
             growth: 0.0,
             blend_offset: 0.0,
+            pressure_before: 0.0,
             pressure: 0.0,
             theta: 1.0,
             slope: 0.0,

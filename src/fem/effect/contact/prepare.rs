@@ -33,7 +33,8 @@ impl<const D: usize> Contact<D> {
             let before = self.gap.at(time - length, &before, &point.normal)?;
             let along = point.normal_component(Body, displacement);
             let [worn, worn_before] = point.worn;
-            point.context = NodeContext { penetration: along - gap - worn, step_length: length };
+            point.context =
+                NodeContext { penetration: along - gap - worn, step_length: length, mean_from: None };
             point.penetration_before = along - before - worn_before;
             point.blend_offset = 0.0;
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
@@ -84,10 +85,20 @@ impl<const D: usize> Contact<D> {
         self.set_obstacle_velocities(Rate { time: step.time, before: [recent, earlier] })
     }
 
+    /// To be called after [`Contact::prepare`]: lets pressures of laws with a potential be their means over the step, which conserve
+    /// energy.
+    pub fn conserve_energy(&mut self) {
+        for point in &mut self.points {
+            point.context.mean_from =
+                Some(point.penetration_before).filter(|penetration| penetration.is_finite());
+        }
+    }
+
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
     pub fn restore_pressures(&mut self, traction: &[f64]) {
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             point.pressure = point.along(Body, traction);
+            point.pressure_before = point.pressure;
         }
         if let Some(friction) = &mut self.friction {
             friction.restore_pressures(&self.points, traction);

@@ -2,15 +2,29 @@
 //!
 //! `-sigma_nu = stiffness * max(u_nu - gap, 0)^exponent`. Within a step of length `k` that starts with the penetration `d`
 //! it is a law of the velocity, `p(r) = stiffness * max(d + k r, 0)^exponent`, which rises: its relaxed monotonicity
-//! constant is 0.
+//! constant is 0. In steps that conserve energy the pressure is its mean over the step ([`discrete_gradient`]).
 
-use crate::laws::contact::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::laws::contact::{
+    discrete_gradient::{self, Potential},
+    normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response},
+};
 use crate::{
     error::Result,
     laws::{expression::Scalar, law::increasing_root},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Nodes and weights of Gauss's rule of degree 9 on the interval from 0 to 1.
+const GAUSS: [[f64; 2]; 5] = [
+    [0.046_910_077_030_668, 0.118_463_442_528_094_5],
+    [0.230_765_344_947_158_45, 0.239_314_335_249_683_23],
+    [0.5, 0.284_444_444_444_444_44],
+    [0.769_234_655_052_841_5, 0.239_314_335_249_683_23],
+    [0.953_089_922_969_332, 0.118_463_442_528_094_5],
+];
+/// Share of the penetration below which its change is too small for a difference of potentials.
+const SMALL: f64 = 0.1;
 
 /// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -56,6 +70,11 @@ impl Compliance {
         self.stiffness * self.exponent * penetration.powf(self.exponent - 1.0)
     }
 
+    /// Stored energy in J/m² at a penetration in m.
+    fn potential_at(&self, penetration: f64) -> f64 {
+        self.pressure_at(penetration) * penetration.max(0.0) / (self.exponent + 1.0)
+    }
+
     /// Where `d + ratio p(d) = excess`: monotone and convex.
     fn penetration(&self, excess: f64, ratio: f64) -> f64 {
         if self.exponent == 1.0 {
@@ -64,6 +83,27 @@ impl Compliance {
         increasing_root(0.0, excess, excess, |at| {
             [at + ratio * self.pressure_at(at) - excess, 1.0 + ratio * self.stiffness_at(at)]
         })
+    }
+}
+
+impl Potential for Compliance {
+    fn mean(&self, before: f64, after: f64) -> [f64; 2] {
+        let (change, deeper) = (after - before, before.max(after));
+        if deeper <= 0.0 {
+            return [0.0; 2];
+        }
+        if change.abs() < SMALL * deeper || (self.exponent == 1.0 && before.min(after) >= 0.0) {
+            // Of a power with a small relative change the rule has the precision of the numbers.
+            return GAUSS.iter().fold([0.0; 2], |[mean, slope], [share, weight]| {
+                let between = before + share * change;
+                [
+                    mean + weight * self.pressure_at(between),
+                    slope + weight * share * self.stiffness_at(between),
+                ]
+            });
+        }
+        let mean = (self.potential_at(after) - self.potential_at(before)) / change;
+        [mean, (self.pressure_at(after) - mean) / change]
     }
 }
 
@@ -85,6 +125,9 @@ impl NormalParameters for Compliance {
 
 impl Response for Compliance {
     fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
+        if let Some(before) = node.mean_from {
+            return discrete_gradient::resolve(self, s, c, node, before);
+        }
         let k = node.step_length;
         let excess = node.penetration_at(s / c);
         if excess > 0.0 {
@@ -99,11 +142,15 @@ impl Response for Compliance {
     }
 
     fn pressure(&self, velocity: f64, node: NodeContext) -> f64 {
-        self.pressure_at(node.penetration_at(velocity))
+        let after = node.penetration_at(velocity);
+        node.mean_from.map_or_else(|| self.pressure_at(after), |before| self.mean(before, after)[0])
     }
 
     fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
-        node.step_length * self.stiffness_at(node.penetration_at(velocity))
+        let after = node.penetration_at(velocity);
+        let slope =
+            node.mean_from.map_or_else(|| self.stiffness_at(after), |before| self.mean(before, after)[1]);
+        node.step_length * slope
     }
 
     fn depends_on_displacement(&self) -> bool {
@@ -115,7 +162,7 @@ impl Response for Compliance {
     }
 
     fn energy(&self, penetration: f64) -> Option<f64> {
-        Some(self.pressure_at(penetration) * penetration.max(0.0) / (self.exponent + 1.0))
+        Some(self.potential_at(penetration))
     }
 
     fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
@@ -140,7 +187,7 @@ mod tests {
             [0.0, 50.0, 12.5]
         );
         // d + 0.5 * 100 d = 1.02 with d = 0.02.
-        let node = NodeContext { penetration: 0.02, step_length: 1.0 };
+        let node = NodeContext { penetration: 0.02, step_length: 1.0, mean_from: None };
         let found = law.resolve(2.0, 2.0, node);
         assert!((found.pressure - 2.0).abs() < 1e-14 && found.velocity.abs() < 1e-14);
         assert!((found.derivative - 1.0 / 102.0).abs() < 1e-16);
@@ -154,7 +201,7 @@ mod tests {
             exponent in 1.0f64..2.0, stiffness in 0.1f64..1e4, start in -1.0f64..1.0, s in -1e3f64..1e3, c in 0.1f64..100.0,
         ) {
             let law = Compliance { stiffness, exponent, gap: None };
-            let node = NodeContext { penetration: start, step_length: 0.1 };
+            let node = NodeContext { penetration: start, step_length: 0.1, mean_from: None };
             let found = law.resolve(s, c, node);
             let open = c * found.velocity + law.pressure(found.velocity, node) - s;
             let size = s.abs() + c * found.velocity.abs() + (1.0 + law.stiffness_at(start.max(0.0)) ) * 1e-2;

@@ -6,9 +6,11 @@
 //!
 //! Within a step of length `k` that starts with the penetration `d0` it is a law of the velocity, `g(d0 + k v)`, whose steepest
 //! decrease is `k` times that of `g`. The parameter `s = c v + p` is that of the polyline over `d` with `c / k` in place of `c`:
-//! `(c / k) d + p = s + c d0 / k`.
+//! `(c / k) d + p = s + c d0 / k`. In steps that conserve energy the pressure is its mean over the step ([`discrete_gradient`]); that of
+//! a rigid obstacle behind the last corner remains the one at the end.
 
 use crate::laws::contact::{
+    discrete_gradient::{self, Potential, Vertical},
     normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response},
     polyline::Polyline,
 };
@@ -102,11 +104,55 @@ impl PenetrationLaw {
     }
 }
 
+impl Potential for PenetrationLaw {
+    fn mean(&self, before: f64, after: f64) -> [f64; 2] {
+        let (low, high) = (before.min(after), before.max(after));
+        // Without rounding, also of small changes, as a sum over the corners between.
+        let corners = self.graph.corners();
+        let first = corners.iter().take_while(|corner| corner[0] <= low).count();
+        let count = corners[first..].iter().take_while(|corner| corner[0] < high).count();
+        let slope = |branch: usize| Some(self.graph.slope_of(branch)).filter(|slope| slope.is_finite());
+        let at = |branch: usize, penetration: f64| {
+            let [from, pressure] = corners[branch.saturating_sub(1)];
+            pressure + slope(branch).map_or(0.0, |slope| slope * (penetration - from))
+        };
+        if count == 0 {
+            return [at(first, 0.5 * (before + after)), 0.5 * slope(first).unwrap_or(0.0)];
+        }
+        let (mut sum, mut from) = (0.0, low);
+        for branch in first..=first + count {
+            let to = if branch < first + count { corners[branch][0] } else { high };
+            sum += at(branch, 0.5 * (from + to)) * (to - from);
+            from = to;
+        }
+        let mean = sum / (high - low);
+        let own = if after > before { at(first + count, after) } else { at(first, after) };
+        [mean, (own - mean) / (after - before)]
+    }
+
+    fn vertical_parts(&self, before: f64) -> Vertical {
+        let corners = self.graph.corners();
+        let jump = corners.windows(2).find(|pair| pair[0][0] == before && pair[1][0] == before);
+        let last = corners[corners.len() - 1][0];
+        let is_rigid = self.graph.slope_of(corners.len()) == f64::INFINITY;
+        Vertical { jump: jump.map(|pair| [pair[0][1], pair[1][1]]), wall: is_rigid.then_some(last) }
+    }
+
+    fn steepest_decrease(&self) -> f64 {
+        self.graph.monotonicity_constant(1.0)
+    }
+}
+
 impl Response for PenetrationLaw {
     fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
         let k = node.step_length;
         if node.penetration == f64::NEG_INFINITY {
             return Resolved::free(s, c);
+        }
+        if let Some(before) = node.mean_from {
+            let found = discrete_gradient::resolve(self, s, c, node, before);
+            let branch = self.branch(found.velocity, node).max(found.branch);
+            return Resolved { branch, ..found };
         }
         let parameter = c / k;
         let of_graph = self.graph.resolve(s + parameter * node.penetration, parameter, node);
@@ -119,6 +165,9 @@ impl Response for PenetrationLaw {
     }
 
     fn pressure(&self, velocity: f64, node: NodeContext) -> f64 {
+        if let Some(before) = node.mean_from {
+            return self.mean(before, node.penetration_at(velocity))[0];
+        }
         match self.branch(velocity, node) {
             0 => 0.0,
             _ => self.graph.pressure(node.penetration_at(velocity), node),
@@ -126,7 +175,9 @@ impl Response for PenetrationLaw {
     }
 
     fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
-        node.step_length * self.graph.slope(node.penetration_at(velocity), node)
+        let after = node.penetration_at(velocity);
+        let own = || self.graph.slope(after, node);
+        node.step_length * node.mean_from.map_or_else(own, |before| self.mean(before, after)[1])
     }
 
     fn branch(&self, velocity: f64, node: NodeContext) -> usize {
@@ -136,6 +187,9 @@ impl Response for PenetrationLaw {
     fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, [width, height]: [f64; 2]) -> f64 {
         if node.penetration == f64::NEG_INFINITY {
             return pressure.abs() / height;
+        }
+        if let Some(before) = node.mean_from {
+            return discrete_gradient::distance(self, [velocity, pressure], (node, before), [width, height]);
         }
         self.graph.distance(node.penetration_at(velocity), pressure, node, [node.step_length * width, height])
     }
@@ -195,7 +249,7 @@ mod tests {
     #[test]
     fn glue_stretches_tears_and_lets_go_by_hand() {
         let law = glue(1e4);
-        let at = |penetration| NodeContext { penetration, step_length: 0.5 };
+        let at = |penetration| NodeContext { penetration, step_length: 0.5, mean_from: None };
         // 1 mm/s for 0.5 s from the obstacle: 0.5 mm away, 1 Pa, slope 2 Pa / 1 mm * 0.5 s.
         assert!((law.pressure(-1e-3, at(0.0)) + 1.0).abs() < 1e-15);
         assert!((law.slope(-1e-3, at(0.0)) - 1e3).abs() < 1e-9);
@@ -230,7 +284,7 @@ mod tests {
     #[test]
     fn a_rigid_obstacle_behind_the_glue_bears_any_pressure() {
         let law = glue(f64::INFINITY);
-        let node = NodeContext { penetration: -5e-4, step_length: 0.5 };
+        let node = NodeContext { penetration: -5e-4, step_length: 0.5, mean_from: None };
         let found = law.resolve(1e4 * 1e-3 + 30.0, 1e4, node);
         assert!((found.velocity - 1e-3).abs() < 1e-15 && (found.pressure - 30.0).abs() < 1e-11, "{found:?}");
         assert_eq!((found.derivative, found.branch), (0.0, 3));
@@ -251,7 +305,7 @@ mod tests {
             s in -50.0f64..50.0, penetration in -8e-3f64..2e-3, length in 0.01f64..2.0, more in 1.05f64..5.0,
         ) {
             let law = glue(1e4);
-            let node = NodeContext { penetration, step_length: length };
+            let node = NodeContext { penetration, step_length: length, mean_from: None };
             let c = more * law.monotonicity_constant(length) + 0.1;
             let found = law.resolve(s, c, node);
             prop_assert!((c * found.velocity + found.pressure - s).abs() < 1e-12 * (1.0 + s.abs()));
