@@ -102,6 +102,19 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "double-cantilever",
+        name: "strengths",
+        job: "verification/double_cantilever",
+        columns: Columns::Variants,
+        pictured: false,
+        runs: &[
+            with("57 MPa, 1 mm", &[]),
+            with("57 MPa, 0.5 mm", &["mesh.rectangle.cells=[200, 3]"]),
+            with("57 MPa, 0.5 mm, 200 steps", &["mesh.rectangle.cells=[200, 3]", "time.step=0.005"]),
+            with("1.7 MPa, 1 mm", &["contact.0.adhesion.strength=1.7e6"]),
+        ],
+    },
+    Table {
         page: "coulomb-limit",
         name: "sticking",
         job: "verification/coulomb_limit",

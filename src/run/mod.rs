@@ -1,5 +1,6 @@
 //! Runs a job: builds only what the job contains, then takes the steps.
 
+mod bonds;
 mod build;
 mod check;
 mod deadline;

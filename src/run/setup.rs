@@ -1,6 +1,6 @@
 //! Sets a job up for a run or for `solver check`, without touching the output folder.
 
-use super::{build, obstacles, restored::transfer, steps, validate::refuse_free_bodies};
+use super::{bonds, build, obstacles, restored::transfer, steps, validate::refuse_free_bodies};
 use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
@@ -43,7 +43,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let (mut body, mut state) = build::body::<D, S>(session, job, mesh)?;
     let began_from = transfer(session, loaded, &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;
-    let warnings = obstacles::warnings(session, job, &body, &state)?;
+    let mut warnings = obstacles::warnings(session, job, &body, &state)?;
+    warnings.extend(bonds::warnings(session, job, &body));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };
     let scheme = Stepper::new(session, &mut body, &state, settings);

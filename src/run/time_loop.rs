@@ -88,6 +88,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         simulation,
         certificates,
         landed: 0,
+        fallen: 0,
         outputs,
         log,
         columns,
@@ -114,6 +115,8 @@ struct Run<'a, const D: usize, const S: usize> {
     certificates: Certificates,
     /// Logged lines about the times that steps landed on.
     landed: u64,
+    /// Logged lines about steps that passed unstable states.
+    fallen: u64,
     outputs: Outputs<D, S>,
     log: Log,
     /// What lines of the log tell of a step.
@@ -207,6 +210,12 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         if let Some(what) = outcome.landed_on.filter(|_| self.landed < LOGGED_STEPS) {
             self.landed += 1;
             self.log.quiet_line(format!("step {step} ends at t = {time:.9} s: {what}"));
+        }
+        if outcome.fell && self.fallen < LOGGED_STEPS {
+            self.fallen += 1;
+            self.log.quiet_line(format!(
+                "step {step}, t = {time:.6e} s: passes unstable states; a jump adds to numerical_dissipation"
+            ));
         }
         let every = if self.clock.logs_every_step { 1 } else { last.div_ceil(LOGGED_STEPS).max(1) };
         if !(step.is_multiple_of(every) || step == last) {

@@ -1,6 +1,6 @@
 //! Vertical parts of contact graphs: rest at a jump, rigid obstacles; and foundations that store energy.
 
-use crate::{case::Case, results::assert_same_answer};
+use crate::{case::Case, launch, results::assert_same_answer};
 use clarke::linear_algebra::tensor::larger;
 
 #[test]
@@ -356,5 +356,28 @@ fn a_profile_has_no_gap_where_there_is_no_contact() {
     let gaps = profile.words("gap");
     for (x, gap) in profile.numbers("x").iter().zip(gaps) {
         assert_eq!(gap.is_empty(), *x > 0.101 && *x < 0.299, "{gap} at {x}");
+    }
+}
+
+#[test]
+fn cells_that_are_too_large_for_the_bonds_are_warned_of_on_any_number_of_ranks() {
+    let warning = "nodes on the boundary bottom are up to";
+    for ranks in [1, 2] {
+        let check = |cells: &str, order: &str, strength: &str| {
+            let case = Case::of("verification/double_cantilever")
+                .set("mesh.rectangle.cells", cells)
+                .set("mesh.order", order)
+                .set("contact.0.adhesion.strength", strength);
+            let job = case.written();
+            launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0)
+        };
+        // E G / strength^2 = 11.66 mm; with the thickness 1.5 mm the zone is 11.66^(1/4) 1.5^(3/4) = 2.50 mm long, a third of it 0.83 mm.
+        check("[100, 2]", "1", "57e6").says(warning).says("only 2.5e-3 m long").says("at most 8.3e-4 m");
+        for (cells, order, strength) in
+            [("[100, 2]", "2", "57e6"), ("[200, 2]", "1", "57e6"), ("[100, 2]", "1", "20e6")]
+        {
+            let fine = check(cells, order, strength).stdout;
+            assert!(!fine.contains(warning), "{cells} {order} {strength}: {fine}");
+        }
     }
 }

@@ -492,3 +492,19 @@ fn a_new_start_removes_the_checkpoints_of_an_earlier_run() {
     outcome.says("checkpoint-12.h5 of an earlier run");
     assert_eq!(case.results().checkpoints(), [5, 4]);
 }
+
+#[test]
+fn a_restarted_run_across_jumps_of_a_crack_is_the_straight_run_to_the_last_bit() {
+    let make = || {
+        Case::of("verification/double_cantilever")
+            .set("mesh.rectangle.cells", "[50, 1]")
+            .set("time.step", "0.0625")
+            .set("checkpoint.every", "4")
+            .set("output.fields", "{ every = 8 }")
+            .set("output.probe", "[{ name = 'middle', point = [0.05, 0.001] }]")
+            .set("output.profile", "[{ on = 'bottom' }]")
+    };
+    for ranks in [1, 2] {
+        compare_with_straight(make, ranks, "a crack that jumps");
+    }
+}

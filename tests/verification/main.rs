@@ -23,6 +23,7 @@ mod indefinite;
 mod indicator;
 mod jacobian;
 mod ledgers;
+mod limit_loads;
 mod manufactured_contact;
 mod manufactured;
 mod manufactured_flow;
@@ -115,6 +116,7 @@ fn scenario() {
         "rejected_steps" => rejected_steps::in_the_plane(&session),
         "failed_set_up" => rejected_steps::after_failures(&session),
         "softening" => softening::all(&session),
+        "limit_loads" => limit_loads::all(&session),
         "branches" => branches::passed(&session),
         "unloading" => unloading::all(&session),
         "orders_space" => orders::space(&session),

@@ -51,6 +51,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         cells.chain(surface.map(|e| e.name()))
     }
 
+    /// Whether these include effects at the surface.
+    pub fn softens_at_surface(&self) -> bool {
+        !self.is_explicit() && self.surface_effects.iter().any(|e| e.softens())
+    }
+
     /// Energies of a solved step that is not yet committed; writes trial histories, unless they are those of this displacement.
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
         let evaluation = self.evaluation;

@@ -193,11 +193,12 @@ impl<const D: usize> Adhesion<D> {
             let Some((_, point)) = group.first() else { continue };
             point.add(-square, &pull, forces);
             if let Some(tangents) = &mut tangents {
+                let slope = tangents.softening() * slope;
                 // The bonding depends on the displacement. Traction and gradient of the drive are parallel unless a length is truncated.
                 let tangent = std::array::from_fn(|i| {
                     add_scaled(&tangent[i], -2.0 * bonding * slope * pull[i], &gradient).map(|t| length * t)
                 });
-                tangents.push_node(point.node, &tangent, !truncated || *slope == 0.0);
+                tangents.push_node(point.node, &tangent, !truncated || slope == 0.0);
             }
         }
     }

@@ -78,8 +78,9 @@ impl Damage {
             }
             batch.stress.set(lane, add_scaled(&batch.stress.lane(lane), damage, &sound));
             if let Some(tangents) = &mut outcome.tangents {
-                let (tangent, flows) = tangents.entry::<S>(batch.first_point + lane);
+                let slope = tangents.softening() * slope;
                 let growth = Growth { damage, slope, length: evolution.blend.length };
+                let (tangent, flows) = tangents.entry::<S>(batch.first_point + lane);
                 weaken_tangent(law, growth, &sound, tangent);
                 if flows && slope != 0.0 {
                     tangents.mark_skew();

@@ -3,8 +3,10 @@ use crate::laws::material::Tangent;
 /// The part of the Jacobian of an implicit step that the constant matrix does not contain: for points of cells that flow or are damaged, the
 /// derivative of the stress by the strain rate beyond that of elasticity, in Pa s; for nodes with adhesion or contact memory, the
 /// derivative of minus the force by the velocity, in N s/m.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Tangents {
+    /// The share of the softening, see [`Tangents::softening`].
+    softening: f64,
     points: Vec<u32>,
     values: Vec<f64>,
     nodes: Vec<u32>,
@@ -12,7 +14,31 @@ pub struct Tangents {
     skew: bool,
 }
 
+impl Default for Tangents {
+    fn default() -> Self {
+        Self {
+            softening: 1.0,
+            points: Vec::new(),
+            values: Vec::new(),
+            nodes: Vec::new(),
+            nodal: Vec::new(),
+            skew: false,
+        }
+    }
+}
+
 impl Tangents {
+    /// The share of the change of damage and bonding with the displacement that the matrices take into account. With 1 they are the
+    /// derivatives; with 0 they are secants of constant damage and bonding, which are never negative.
+    pub fn softening(&self) -> f64 {
+        self.softening
+    }
+
+    /// Sets this share for all matrices added from now on.
+    pub fn set_softening(&mut self, share: f64) {
+        self.softening = share;
+    }
+
     /// Removes all points and nodes, and reserves room for so many points of cells; the system provides the memory when it is written.
     pub fn restart<const S: usize>(&mut self, points: usize) {
         self.skew = false;

@@ -188,6 +188,18 @@ impl ProjectedKsp {
         })
     }
 
+    /// As [`ProjectedKsp::solve`], but ends as indefinite where CG finds negative curvature.
+    pub fn solve_if_definite(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<ProjectedOutcome> {
+        self.solve_on_subspace(operator, right_hand_side, |solver, stale| {
+            solver.solve_by_cg(right_hand_side, solution, stale)
+        })
+    }
+
     /// As [`ProjectedKsp::solve`] for a `P B` that is not symmetric, by GMRES.
     pub fn solve_unsymmetric(
         &mut self,
@@ -274,7 +286,23 @@ impl ProjectedKsp {
         solution: &mut DistributedVector,
         stale: bool,
     ) -> Result<ProjectedOutcome> {
-        let (target, share) = self.target(right_hand_side)?;
+        let outcome = self.solve_by_cg(right_hand_side, solution, stale)?;
+        if !outcome.indefinite {
+            return Ok(outcome);
+        }
+        let (_, share) = self.target(right_hand_side)?;
+        let gmres = self.gmres(share, self.tolerances.2)?;
+        let second = gmres.solve(right_hand_side, solution)?;
+        Ok(ProjectedOutcome { linear: outcome.linear.followed_by(second), ..outcome })
+    }
+
+    fn solve_by_cg(
+        &mut self,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+        stale: bool,
+    ) -> Result<ProjectedOutcome> {
+        let (target, _) = self.target(right_hand_side)?;
         let iterations = self.tolerances.2;
         let first = if stale { self.refresh_threshold.min(iterations) } else { iterations };
         let mut outcome = ProjectedOutcome { linear: NOTHING, indefinite: false, refreshed: false };
@@ -293,12 +321,7 @@ impl ProjectedKsp {
             self.ksp.start(false)?;
             outcome.linear = outcome.linear.followed_by(rest);
         }
-        if !INDEFINITE.contains(&outcome.linear.reason) {
-            return Ok(outcome);
-        }
-        let gmres = self.gmres(share, iterations)?;
-        let second = gmres.solve(right_hand_side, solution)?;
-        Ok(ProjectedOutcome { linear: outcome.linear.followed_by(second), indefinite: true, ..outcome })
+        Ok(ProjectedOutcome { indefinite: INDEFINITE.contains(&outcome.linear.reason), ..outcome })
     }
 
     fn solve_by_gmres(

@@ -311,6 +311,7 @@ impl Condensed {
                 newton_iterations: sum.newton_iterations + outcome.newton_iterations,
                 linear_iterations: sum.linear_iterations + outcome.linear_iterations,
                 indefinite_solves: sum.indefinite_solves + outcome.indefinite_solves,
+                fell: sum.fell || outcome.fell,
                 ..outcome
             };
             // All velocities.

@@ -3,7 +3,9 @@
 use crate::{
     error::{Error, Result},
     fem::effect::Contact,
-    linear_algebra::petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator},
+    linear_algebra::petsc::{
+        DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator, ProjectedOutcome,
+    },
     parallel::session::Session,
 };
 
@@ -46,6 +48,9 @@ pub trait CellForces {
 
     /// Sets a velocity as the point of linearisation.
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()>;
+
+    /// Sets the share of softening in the derivative: see [`Tangents::softening`](crate::fem::effect::Tangents::softening).
+    fn set_softening(&mut self, share: f64);
 
     /// Whether the derivative is symmetric in this rank's cells.
     fn is_symmetric(&self) -> bool;
@@ -116,6 +121,8 @@ pub struct SolveCounts {
     pub refreshed: usize,
     /// Linear systems that were not symmetric: some point slides with a friction bound that depends on the pressure.
     pub coupled: usize,
+    /// Linearisations that were not positive definite where the energy was minimised.
+    pub unstable: usize,
     /// A hash of the branches of all points for each linearisation; different sets of branches have different hashes.
     pub sets: Vec<f64>,
 }
@@ -164,7 +171,31 @@ fn add_contact<const D: usize>(
     out.add_scaled(1.0, forces)
 }
 
+/// Whether the linearised equations have a solution that lowers the energy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Curvature {
+    Positive,
+    Negative,
+}
+
 impl<const D: usize> ContactEquations<'_, D> {
+    /// Sets the share of softening in the derivatives of all laws: with 0 they are those of a convex energy.
+    pub(super) fn set_softening(&mut self, share: f64) {
+        if let Some(cells) = &mut self.cells {
+            cells.set_softening(share);
+        }
+        self.contacts.iter_mut().for_each(|contact| contact.set_softening(share));
+    }
+
+    /// As [`NonlinearProblem::solve_jacobian`], where the derivative is positive definite; otherwise `direction` is not changed.
+    pub(super) fn solve_if_definite(
+        &mut self,
+        residual: &DistributedVector,
+        direction: &mut DistributedVector,
+    ) -> Result<Curvature> {
+        self.solve_linearised(residual, direction, ProjectedKsp::solve_if_definite)
+    }
+
     /// Writes the residual at the mapped velocities.
     fn write_residual(&mut self, residual: &mut DistributedVector) -> Result<()> {
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
@@ -259,6 +290,26 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         residual: &DistributedVector,
         direction: &mut DistributedVector,
     ) -> Result<()> {
+        self.solve_linearised(residual, direction, ProjectedKsp::solve).map(|_| ())
+    }
+}
+
+/// A solver of symmetric linear equations.
+type SymmetricSolve = fn(
+    &mut ProjectedKsp,
+    &mut dyn ProjectedOperator,
+    &DistributedVector,
+    &mut DistributedVector,
+) -> Result<ProjectedOutcome>;
+
+impl<const D: usize> ContactEquations<'_, D> {
+    /// Solves the linearised equations, which negative curvature may end early if `solve` does.
+    fn solve_linearised(
+        &mut self,
+        residual: &DistributedVector,
+        direction: &mut DistributedVector,
+        solve: SymmetricSolve,
+    ) -> Result<Curvature> {
         let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
         let is_unsymmetric = cells.is_some()
@@ -277,12 +328,15 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             self.counts.coupled += 1;
             self.linear_solver.solve_unsymmetric(&mut operator, open, velocity)?
         } else {
-            self.linear_solver.solve(&mut operator, open, velocity)?
+            solve(self.linear_solver, &mut operator, open, velocity)?
         };
         self.counts.linear_iterations += outcome.linear.iterations;
         self.counts.indefinite += usize::from(outcome.indefinite);
         self.counts.refreshed += usize::from(outcome.refreshed);
         if !outcome.linear.converged() {
+            if outcome.indefinite {
+                return Ok(Curvature::Negative);
+            }
             return Err(Error::Failed(outcome.linear.description().into()));
         }
         direction.copy_from(velocity)?;
@@ -293,7 +347,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         }
         let (open, mut direction) = (open.owned()?, direction.owned_mut()?);
         self.contacts.iter().for_each(|contact| contact.unmap_direction(&open, &mut direction));
-        Ok(())
+        Ok(Curvature::Positive)
     }
 }
 

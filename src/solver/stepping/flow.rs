@@ -62,6 +62,15 @@ impl Flow {
         FlowForces { flow: self, cells, start, symmetric }
     }
 
+    /// Sets the share of softening in the derivatives.
+    fn set_softening(&mut self, share: f64) {
+        if self.tangents.softening() != share {
+            self.tangents.set_softening(share);
+            self.evaluated_tangents.set_softening(share);
+            self.is_fresh = false;
+        }
+    }
+
     /// Adds the sum over all ranks to `out`, without prescribed components.
     fn add_to_free_components<const D: usize>(
         &mut self,
@@ -129,6 +138,10 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
         std::mem::swap(tangents, evaluated_tangents);
         *is_fresh = false;
         Ok(())
+    }
+
+    fn set_softening(&mut self, share: f64) {
+        self.flow.set_softening(share);
     }
 
     fn is_symmetric(&self) -> bool {

@@ -6,6 +6,7 @@ mod bounded;
 mod condensed;
 mod condensed_matrix;
 mod contacts;
+mod descent;
 mod cost;
 mod time_dependent_data;
 mod equations;

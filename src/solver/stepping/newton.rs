@@ -4,20 +4,21 @@ use super::{
     StepOutcome,
     bounded::Bounded,
     contacts::restore_pressures,
+    descent::{Descent, MAX_DIRECTIONS},
     equations::{CellForces, ContactEquations, Scratch, SolveCounts, cycle_message},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
-    problem::{REMEDY, StepProblem, System},
+    problem::{REMEDY, SOFTENING_REMEDY, StepProblem, System},
 };
 use crate::{
-    error::Result,
+    error::{Error, Result},
     fem::{
         body::Body,
         effect::{COUNTS, Contact, Energy, Peaks, PointCount},
     },
     linear_algebra::{
-        petsc::{DistributedVector, NonlinearOutcome, ProjectedKsp, Snes, has_option},
+        petsc::{DistributedVector, ProjectedKsp, Snes, has_option},
         tensor::larger,
     },
     parallel::session::Session,
@@ -40,6 +41,10 @@ pub(super) struct Newton {
     pub scales: Vec<[f64; 2]>,
     /// The steepest decrease of each contact's friction with the sliding speed, at the pressures of the last attempt.
     steepest_decreases: Vec<f64>,
+    /// The minimisation of energies, once it was needed.
+    descent: Option<Descent>,
+    /// Whether it solved the last equations.
+    has_descended: bool,
     /// Counts of the work done for the step.
     counts: SolveCounts,
     /// The velocity from which the step was started.
@@ -59,8 +64,13 @@ const LINEAR_SHARE: f64 = 0.3;
 /// The first linear solves of a step reduce their residual only by this factor, while branches may still change.
 const LINEAR_REDUCTION: f64 = 1e-3;
 
+/// The same for all linear solves of a descent: near its end each direction then squares the error.
+const DESCENT_REDUCTION: f64 = 1e-6;
+
 /// Fixed-point iterations after which an attempt fails.
 const MAX_FIXED_POINT_ITERATIONS: usize = 200;
+
+const NO_MINIMUM: &str = "no minimum of the energy was found";
 
 const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance is the largest accepted value";
 
@@ -92,6 +102,8 @@ impl Newton {
             branches_after: Vec::new(),
             scales: Vec::new(),
             steepest_decreases: Vec::new(),
+            descent: None,
+            has_descended: false,
             // Longer solutions enlarge the list.
             counts: SolveCounts { sets: Vec::with_capacity(128), ..SolveCounts::default() },
             start: like.like()?,
@@ -118,7 +130,8 @@ impl Newton {
         self.linear_solver.set_tolerances(LINEAR_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
         self.start.copy_from(trial)?;
         write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
-        let mut fallbacks = self.conditions(&problem.body.contacts).fallbacks();
+        let conditions = self.conditions(problem.body);
+        let mut fallbacks = conditions.fallbacks();
         let mut next = fallbacks.next();
         // With these parameters, whatever those of the last step were: a restarted run does not know them.
         if let Some(first) = next {
@@ -127,7 +140,9 @@ impl Newton {
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let (mut iterations, mut failure) = (0, String::new());
         loop {
-            let Some(fallback) = next else { return Err(problem.failed(&failure, REMEDY)) };
+            let Some(fallback) = next else {
+                return Err(explain_failure(problem, &failure, conditions.softens));
+            };
             self.set_graph_parameters(&mut problem.body.contacts, fallback);
             let attempt = self.attempt(problem, system, fallback, trial)?;
             iterations += attempt.iterations;
@@ -147,13 +162,17 @@ impl Newton {
         }
     }
 
-    fn conditions<const D: usize>(&self, contacts: &[Contact<D>]) -> Conditions {
+    fn conditions<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Conditions {
+        let contacts = &body.contacts;
         let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
+        let flows = self.flow.is_some();
         Conditions {
             follows_pressure: contacts.iter().any(follows),
             friction: self.settings.friction,
             has_user_search: self.has_user_search,
-            interior_is_linear: self.flow.is_none() && !contacts.iter().any(Contact::needs_ghosts),
+            interior_is_linear: !flows && !contacts.iter().any(Contact::needs_ghosts),
+            softens: (flows && body.softening().next().is_some()) || contacts.iter().any(decreases),
+            has_bonds: flows && body.softens_at_surface(),
         }
     }
 
@@ -179,12 +198,12 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<Attempt> {
         if fallback.iteration == FrictionIteration::Newton {
-            return self.iterate(problem, system, fallback.search, trial);
+            return self.iterate(problem, system, fallback, trial);
         }
         let mut sum = 0;
         for _ in 0..MAX_FIXED_POINT_ITERATIONS {
             problem.body.contacts.iter_mut().for_each(Contact::update_pressures);
-            let Attempt { iterations, failure } = self.iterate(problem, system, fallback.search, trial)?;
+            let Attempt { iterations, failure } = self.iterate(problem, system, fallback, trial)?;
             if failure.is_some() {
                 return Ok(Attempt { iterations: sum + iterations, failure });
             }
@@ -204,10 +223,21 @@ impl Newton {
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
-        search: Search,
+        fallback: Fallback,
         trial: &mut DistributedVector,
     ) -> Result<Attempt> {
-        let session = problem.session;
+        let (session, search) = (problem.session, fallback.search);
+        self.has_descended = search == Search::Descent;
+        if self.has_descended {
+            let tolerance = LINEAR_SHARE * system.tolerance;
+            self.linear_solver.set_tolerances(DESCENT_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
+            let mut descent = match self.descent.take() {
+                Some(descent) => descent,
+                None => Descent::new(trial)?,
+            };
+            descent.has_other_start = self.writes_steady_start(problem, trial, &mut descent.other_start)?;
+            self.descent = Some(descent);
+        }
         {
             let mut unknowns = trial.owned_mut()?;
             problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
@@ -215,6 +245,8 @@ impl Newton {
         if !self.has_user_search {
             self.snes.search_along_steps(search != Search::FullSteps)?;
         }
+        let is_coupled = fallback.iteration == FrictionIteration::Newton
+            && problem.body.contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure()));
         self.counts.sets.clear();
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = match (&mut self.flow, problem.flow_start) {
@@ -237,17 +269,31 @@ impl Newton {
         // body.
         let tolerances = (system.tolerance, self.settings.tolerance);
         let limit = self.settings.max_newton_iterations as usize;
-        let solved = self.snes.solve(&mut equations, trial, tolerances, limit);
+        // Friction that follows the pressure has no energy: the descent converges soon, or not at all.
+        let descent = self.descent.as_mut().filter(|_| search == Search::Descent);
+        let solved = if let Some(descent) = descent {
+            let solved = descent.solve(
+                &mut equations,
+                trial,
+                tolerances,
+                if is_coupled { limit } else { MAX_DIRECTIONS },
+            );
+            equations.set_softening(1.0);
+            solved.map(|converged| (!converged).then_some(NO_MINIMUM))
+        } else {
+            let solved = self.snes.solve(&mut equations, trial, tolerances, limit);
+            solved.map(|outcome| (!outcome.converged()).then(|| outcome.description()))
+        };
         self.counts = equations.counts;
         let iterations = self.counts.sets.len();
-        let not_converged = !matches!(&solved, Ok(outcome) if outcome.converged());
+        let not_converged = !matches!(&solved, Ok(None));
         // All ranks take the same branch, on whichever rank the failure occurred.
         let [not_converged] = session.largest([f64::from(u8::from(not_converged))]);
         let failure = if not_converged == 0.0 {
             None
         } else {
             match session.agree(solved) {
-                Ok(outcome) => Some(explain(&outcome, &self.counts)),
+                Ok(reason) => Some(explain(reason.unwrap_or("another rank failed"), &self.counts)),
                 Err(error) if error.is_failure() => Some(error.to_string()),
                 Err(error) => return Err(error.into()),
             }
@@ -259,6 +305,27 @@ impl Newton {
             problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
         }
         Ok(Attempt { iterations, failure })
+    }
+
+    /// Writes the unknowns of the velocity before the last step, with that of the supports in this one: after a sudden change it is a
+    /// better start than the extrapolation, which repeats the change. Returns whether there is such a velocity: Newton's method must
+    /// have its unknowns in the whole body. Collective.
+    fn writes_steady_start<const D: usize, const S: usize>(
+        &self,
+        problem: &StepProblem<'_, D, S>,
+        trial: &DistributedVector,
+        start: &mut DistributedVector,
+    ) -> Result<bool> {
+        if self.flow.is_none() || problem.state.step < 2 {
+            return Ok(false);
+        }
+        start.copy_from(&problem.state.previous_velocity)?;
+        start.add_scaled(-1.0, trial)?;
+        problem.body.held.clear(&mut start.owned_mut()?);
+        start.add_scaled(1.0, trial)?;
+        let mut unknowns = start.owned_mut()?;
+        problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+        Ok(true)
     }
 
     /// Checks that the velocity in `trial` and the pressures of the contacts lie on the graphs, and summarises the work of the
@@ -291,6 +358,7 @@ impl Newton {
             points: PointCount::from_array(session.sum(points)),
             indefinite_solves: self.counts.indefinite,
             inclusion_residual: inclusion,
+            fell: self.has_descended && self.counts.unstable > 0,
             solutions: 0,
             landed_on: None,
             energy: Energy::default(),
@@ -306,7 +374,11 @@ impl Newton {
         body: &Body<D, S>,
         velocity: &DistributedVector,
     ) -> Result<f64> {
-        let residual = self.bounded.as_ref().map_or(self.snes.residual(), Bounded::residual);
+        let residual = match (&self.bounded, &self.descent) {
+            (Some(bounded), _) => bounded.residual(),
+            (None, Some(descent)) if self.has_descended => &descent.residual,
+            _ => self.snes.residual(),
+        };
         let (velocity, residual) = (velocity.local()?, residual.owned()?);
         let mut largest = 0.0;
         for contact in &body.contacts {
@@ -318,9 +390,30 @@ impl Newton {
     }
 }
 
+/// The failure of a step, which may lie at laws that soften.
+fn explain_failure<const D: usize, const S: usize>(
+    problem: &StepProblem<'_, D, S>,
+    why: &str,
+    softens: bool,
+) -> Error {
+    if !softens {
+        return problem.failed(why, REMEDY);
+    }
+    let contacts = problem.body.contacts.iter().any(decreases).then_some("contact or friction");
+    let names: Vec<&str> = problem.body.softening().chain(contacts).collect();
+    let why = format!("{why}; forces of {} fall here as the body moves", names.join(", "));
+    problem.failed(&why, SOFTENING_REMEDY)
+}
+
+/// Whether pressure or friction of a contact decrease with the motion.
+fn decreases<const D: usize>(contact: &Contact<D>) -> bool {
+    let friction = contact.friction();
+    contact.monotonicity_constant() > 0.0 || friction.is_some_and(|law| law.steepest_decrease() > 0.0)
+}
+
 /// The reason why Newton's method failed, as a message.
-fn explain(outcome: &NonlinearOutcome, counts: &SolveCounts) -> String {
-    let reason = outcome.description().to_owned();
+fn explain(reason: &str, counts: &SolveCounts) -> String {
+    let reason = reason.to_owned();
     counts.period().map_or(reason.clone(), |period| format!("{reason}; {}", cycle_message(period)))
 }
 

@@ -64,3 +64,7 @@ impl System<'_> {
 /// A remedy if a solver does not converge.
 pub(super) const REMEDY: &str =
     "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
+
+/// The same where laws soften: shorter steps help only if something resists fast motions.
+pub(super) const SOFTENING_REMEDY: &str = "give the body a density or a viscosity and try a smaller [time] step, refine the mesh where these forces fall, \
+     or lower the `strength` of bonds";

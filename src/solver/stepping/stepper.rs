@@ -359,6 +359,7 @@ impl Stepper {
                 linear_iterations: all.linear_iterations + outcome.linear_iterations,
                 active_changes: all.active_changes + outcome.active_changes,
                 indefinite_solves: all.indefinite_solves + outcome.indefinite_solves,
+                fell: all.fell || outcome.fell,
                 ..outcome
             };
             for (at, &motion) in self.loaded.iter().enumerate() {

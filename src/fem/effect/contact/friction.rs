@@ -228,6 +228,18 @@ impl<const D: usize> Friction<D> {
         }
     }
 
+    /// Keeps only this share of the slopes of decreasing branches in the derivatives.
+    pub(super) fn keep_share_of_decreases(&mut self, share: f64) {
+        let scale = self.scale;
+        let decreases = |point: &&mut TangentialPoint<D>| point.tangent.slopes[0] < 0.0 && share < 1.0;
+        for Tangent { theta, slopes, .. } in
+            self.points.iter_mut().filter(decreases).map(|point| &mut point.tangent)
+        {
+            slopes[0] *= share;
+            theta[0] = scale / (scale + slopes[0]);
+        }
+    }
+
     /// Converts a change of the unknowns into the change of the velocities, after `points` have computed the change of pressures.
     pub(super) fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let scale = self.scale;

@@ -96,6 +96,8 @@ pub struct Contact<const D: usize> {
     friction: Option<Friction<D>>,
     needs_ghosts: bool,
     derivatives: Derivatives,
+    /// The share of the slopes of decreasing branches in the derivatives.
+    softening: f64,
 }
 
 /// The derivatives of the laws that the points store. PETSc calls the functions that compute and use them, so debug builds check
@@ -154,6 +156,7 @@ impl<const D: usize> Contact<D> {
             friction: None,
             needs_ghosts,
             derivatives: Derivatives::Unknown,
+            softening: 1.0,
         })
     }
 

@@ -97,18 +97,29 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Sets the share of the slopes of decreasing branches in the derivatives: with 1 these are the derivatives of the graphs, with 0
+    /// decreasing branches count as constant, so that no derivative is negative.
+    pub fn set_softening(&mut self, share: f64) {
+        self.softening = share;
+    }
+
     /// Computes the derivatives of the laws at these unknowns, and converts `velocity`, a copy of the unknowns, into velocities as
     /// [`map`](Self::map) does.
     pub fn linearise_parameters(&mut self, unknowns: &[f64], velocity: &mut [f64]) {
         self.map(velocity);
-        let (law, scale) = (&self.law, self.scale);
+        let (law, scale, softening) = (&self.law, self.scale, self.softening);
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let derivative = point.resolve(law, scale, point.along(Newton, unknowns)).derivative;
             point.theta = scale * derivative;
             point.slope = if derivative > 0.0 { 1.0 / derivative - scale } else { 0.0 };
+            if softening < 1.0 && point.slope < 0.0 {
+                point.slope *= softening;
+                point.theta = scale / (scale + point.slope);
+            }
         }
         if let Some(friction) = &mut self.friction {
             friction.linearise(&self.points, unknowns);
+            friction.keep_share_of_decreases(softening);
         }
         self.derivatives = Derivatives::Linearised;
     }
@@ -117,6 +128,7 @@ impl<const D: usize> Contact<D> {
     pub fn linearise_velocities(&mut self, velocity: &[f64]) {
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Velocity) {
             point.slope = self.law.slope(point.normal_component(Newton, velocity), point.context);
+            point.slope *= if point.slope < 0.0 { self.softening } else { 1.0 };
         }
     }
 

@@ -161,6 +161,7 @@ fn add_work(sum: StepOutcome, last: StepOutcome) -> StepOutcome {
         newton_iterations: sum.newton_iterations + last.newton_iterations,
         linear_iterations: sum.linear_iterations + last.linear_iterations,
         indefinite_solves: sum.indefinite_solves + last.indefinite_solves,
+        fell: sum.fell || last.fell,
         ..last
     }
 }
