@@ -75,6 +75,9 @@ enum Command {
         /// Print the result as one JSON object.
         #[arg(long)]
         json: bool,
+        /// Allow PETSc options that write files or load code.
+        #[arg(long)]
+        trust: bool,
     },
     /// Print the meaning, unit, range and default of the keys of a job file (describe study: of a study file).
     Describe {
@@ -103,6 +106,9 @@ enum Command {
         /// The file to write.
         #[arg(short = 'o', value_name = "FILE.h5")]
         output: PathBuf,
+        /// Overwrite the file if it exists.
+        #[arg(long)]
+        force: bool,
     },
     /// Run a study of accuracy and cost.
     Study {
@@ -177,6 +183,9 @@ struct RunArguments {
     /// Start even if the output folder contains results of another job or an unfinished run, and overwrite them.
     #[arg(long, conflicts_with = "restart")]
     force: bool,
+    /// Allow PETSc options that write files or load code. Only for jobs whose origin you trust.
+    #[arg(long)]
+    trust: bool,
 }
 
 /// Executes the command line and returns the exit code.
@@ -205,7 +214,7 @@ pub fn main() -> ExitCode {
 fn dispatch(cli: Cli) -> Result<Exit> {
     match cli.command {
         Some(Command::Run(arguments)) => run_job(&arguments),
-        Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
+        Some(Command::Check { job, overrides, json, trust }) => check(&job, &overrides, (json, trust)),
         Some(Command::Describe { table, json, markdown }) => {
             let form = [(json, Form::Json), (markdown, Form::Markdown)];
             let table = Some(table.join(".")).filter(|table| !table.is_empty());
@@ -214,7 +223,13 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Inspect { file }) if partitioned::is_one(&file) => say(&partitioned::inspect(&file)?),
         Some(Command::Inspect { file }) if is_mesh(&file) => say(&gmsh::inspect(&file)?),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
-        Some(Command::Partition { mesh, parts, output }) => partition(&mesh, parts, &output),
+        Some(Command::Partition { mesh, parts, output, force }) => {
+            if !force && output.symlink_metadata().is_ok() {
+                let remedy = "name another file with -o, or overwrite it with --force";
+                return Err(Error::Refused(format!("{} exists; {remedy}", output.display())));
+            }
+            partition(&mesh, parts, &output)
+        }
         Some(Command::Study { study, overrides, ablate, part }) => {
             run_study(&study, &overrides, ablate, part)
         }
@@ -462,7 +477,10 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
     }
     in_session(|session, clock| {
         let colour = std::io::stderr().is_terminal();
-        let load = |job: &PathBuf| Job::load_coloured(job, &arguments.overrides, colour);
+        let load = |job: &PathBuf| {
+            let loaded = Job::load_coloured(job, &arguments.overrides, colour)?;
+            Ok(loaded.trusted(arguments.trust))
+        };
         // All jobs are checked before the first one runs.
         let stages = arguments.jobs.iter().map(load).collect::<Result<Vec<Loaded>>>().and_then(stages);
         let clock = Clock { on_terminal: !arguments.quiet, logs_every_step: arguments.verbose, ..clock };
@@ -496,9 +514,9 @@ fn stages(stages: Vec<Loaded>) -> Result<Vec<Loaded>> {
     Ok(stages)
 }
 
-fn check(job: &Path, overrides: &[String], json: bool) -> Result<Exit> {
+fn check(job: &Path, overrides: &[String], (json, is_trusted): (bool, bool)) -> Result<Exit> {
     on_all_ranks(job, overrides, |session, loaded, _| {
-        let report = run::check(session, loaded)?;
+        let report = run::check(session, loaded.trusted(is_trusted))?;
         if session.is_first() {
             print(&if json { report.json()? } else { report.text() });
         }

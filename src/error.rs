@@ -1,4 +1,4 @@
-//! Errors and exit codes.
+//! Errors and exit codes, and what all readers of files refuse.
 
 /// Exit codes, which are part of the public interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,5 +95,34 @@ impl Error {
 impl From<Error> for Exit {
     fn from(error: Error) -> Self {
         error.exit
+    }
+}
+
+/// Refuses to open what is neither a file nor a folder: a reader would wait for a pipe or a device, perhaps for ever.
+pub(crate) fn regular_file(path: &std::path::Path) -> std::io::Result<std::fs::Metadata> {
+    let found = std::fs::metadata(path)?;
+    if found.is_file() || found.is_dir() {
+        return Ok(found);
+    }
+    Err(std::io::Error::other("it is a device or a pipe, not a file: copy its contents to a file"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::regular_file;
+
+    #[test]
+    fn pipes_and_devices_are_refused_before_they_are_opened() {
+        let folder = tempfile::tempdir().expect("folder");
+        let pipe = folder.path().join("pipe");
+        rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR)
+            .expect("pipe");
+        for path in [pipe.as_path(), std::path::Path::new("/dev/null"), std::path::Path::new("/dev/zero")] {
+            let said = regular_file(path).expect_err("refused").to_string();
+            assert!(said.contains("a device or a pipe"), "{said}");
+        }
+        std::fs::write(folder.path().join("file"), "1").expect("written");
+        assert_eq!(regular_file(&folder.path().join("file")).expect("a file").len(), 1);
+        assert!(regular_file(&folder.path().join("nowhere")).is_err());
     }
 }

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use super::{Job, MeshSource};
 use crate::error::{Error, Result};
 
-/// Keys that, like all keys below them, do not affect the results. A mesh file is among them, because several files may contain the
-/// same mesh: the code that reads the mesh compares its contents.
+/// Keys that, like all keys below them, do not affect the results. The files of a mesh and of a start state are among them, because
+/// several files may have the same contents: the code that reads them compares these.
 const NO_PHYSICS: &[&str] = &[
     "about",
     "check",
     "checkpoint",
+    "initial.from",
     "mesh.box.partition",
     "mesh.file",
     "mesh.rectangle.partition",
@@ -66,6 +67,21 @@ impl Job {
         let mut job = self.clone();
         job.output.folder = Some(PathBuf::from("."));
         toml::to_string(&job).map_err(|error| Error::Internal(format!("the job can't be written: {error}")))
+    }
+
+    /// As [`to_toml`](Self::to_toml), with the names of files only, so that it stays the same where folders are moved. Without the
+    /// start state, which is known by its digest.
+    pub fn to_toml_without_places(&self) -> Result<String> {
+        let mut job = self.clone();
+        let name = |path: &Path| PathBuf::from(path.file_name().unwrap_or_default());
+        if let MeshSource::File(path) = &mut job.mesh.source {
+            *path = name(path);
+        }
+        for (_, shape) in job.shapes_mut() {
+            shape.surface.iter_mut().for_each(|surface| surface.file = name(&surface.file));
+        }
+        job.initial.iter_mut().for_each(|initial| initial.from = None);
+        job.to_toml()
     }
 
     /// All keys that affect the results, joined by dots, with their values as TOML.

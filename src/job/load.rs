@@ -6,6 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use super::petsc_options::reaches_beyond_the_run;
 use super::report::{Fault, Place, Texts};
 use super::schema::Kind;
 use super::semantic::{self, MeshNames};
@@ -23,6 +24,8 @@ pub struct Loaded {
     pub job: Job,
     /// Warnings.
     pub warnings: Vec<String>,
+    /// Whether options of PETSc may write files and load code.
+    is_trusted: bool,
     root: Node,
     texts: Texts,
 }
@@ -110,13 +113,38 @@ impl Loaded {
             .into_iter()
             .map(|[key, message, help]| Fault::new(root.deepest(&key).at.clone(), message, "").help(help));
         let faults: Vec<Fault> = unread.collect();
-        if faults.is_empty() { Ok(Self { job, warnings, root, texts }) } else { Err(texts.refuse(faults)) }
+        if faults.is_empty() {
+            Ok(Self { job, warnings, is_trusted: false, root, texts })
+        } else {
+            Err(texts.refuse(faults))
+        }
     }
 
     /// A refusal at the position of `key_path` (`contact.0.on`), or of the innermost existing table on this path.
     pub fn fault(&self, key_path: &str, message: impl Into<String>, help: impl AsRef<str>) -> Error {
         let place = self.root.deepest(key_path).at.clone();
         self.texts.refuse(vec![Fault::new(place, message, "").help(help)])
+    }
+
+    /// The job, whose options of PETSc may write files and load code if it `is_trusted`.
+    pub fn trusted(self, is_trusted: bool) -> Self {
+        Self { is_trusted, ..self }
+    }
+
+    /// Refuses options of PETSc that write files or load code, unless the job is trusted.
+    pub fn refuse_untrusted(&self) -> Result<()> {
+        let options = self.job.solver.petsc.iter().filter(|_| !self.is_trusted);
+        for (name, value) in options {
+            if let Some(what) = reaches_beyond_the_run(name, value) {
+                let help = "delete it, or allow it for a job that you trust: solver run JOB --trust";
+                return Err(self.fault(
+                    &format!("solver.petsc.{name}"),
+                    format!("this option of PETSc {what}"),
+                    help,
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Checks the job against a mesh that was read from a file; adds warnings to [`Loaded::warnings`].

@@ -8,6 +8,7 @@ mod describe;
 mod document;
 mod effective;
 mod load;
+mod petsc_options;
 mod report;
 mod schema;
 mod semantic;

@@ -1,6 +1,7 @@
 //! STL files of the surfaces of obstacles, which are read with the job.
 
 use super::Job;
+use crate::error::regular_file;
 use crate::laws::contact::{Gap, Shape};
 use std::path::Path;
 
@@ -36,11 +37,11 @@ pub(super) fn read(job: &mut Job) -> Vec<[String; 3]> {
 /// The bytes of a file; an error is a message and a remedy.
 fn contents(path: &Path) -> Result<Vec<u8>, [String; 2]> {
     let place = path.display();
-    let size = std::fs::metadata(path).map(|data| data.len());
-    if size.as_ref().is_ok_and(|size| *size > LARGEST) {
+    let data = regular_file(path);
+    if data.as_ref().is_ok_and(|data| data.len() > LARGEST) {
         return Err([format!("{place} has more than {LARGEST} bytes"), "use fewer triangles".into()]);
     }
-    std::fs::read(path).map_err(|error| {
+    data.and_then(|_| std::fs::read(path)).map_err(|error| {
         let help = "a relative path starts from the folder of the job file";
         [format!("cannot read {place}: {error}"), help.into()]
     })

@@ -5,6 +5,7 @@
 
 use super::report::Fault;
 use super::source::{Node, Value};
+use crate::error::regular_file;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -43,11 +44,11 @@ fn named(table: &std::collections::BTreeMap<String, Node>) -> Option<(&str, usiz
 /// The expression of a column of a file; an error is a message and a remedy.
 fn read(path: &Path, column: usize) -> Result<String, [String; 2]> {
     let place = path.display();
-    let size = std::fs::metadata(path).map(|data| data.len());
-    if size.as_ref().is_ok_and(|size| *size > LARGEST) {
+    let data = regular_file(path);
+    if data.as_ref().is_ok_and(|data| data.len() > LARGEST) {
         return Err([format!("the table {place} has more than {LARGEST} bytes"), "use fewer points".into()]);
     }
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = data.and_then(|_| std::fs::read_to_string(path)).map_err(|error| {
         [
             format!("cannot read {place}: {error}"),
             "a relative path starts from the folder of the job file".into(),

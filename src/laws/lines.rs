@@ -1,6 +1,32 @@
 //! Lines of text for a terminal.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, iter::Peekable, str::Chars};
+
+/// The text without control characters other than ends of lines, so that names and titles of a job can't command a terminal; a
+/// whole escape sequence is left out.
+pub(crate) fn plain(text: &str) -> Cow<'_, str> {
+    let is_control = |c: char| c.is_control() && c != '\n';
+    if !text.contains(is_control) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::new();
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        let introduces =
+            |rest: &mut Peekable<Chars<'_>>, sign| c == '\u{1b}' && rest.next_if_eq(&sign).is_some();
+        if c == '\u{9b}' || introduces(&mut rest, '[') {
+            rest.by_ref().find(|c| ('@'..='~').contains(c));
+        } else if introduces(&mut rest, ']') {
+            // A command to the operating system, such as the title of the window.
+            rest.by_ref().find(|c| matches!(c, '\u{7}' | '\u{1b}' | '\u{9c}'));
+        } else if c == '\t' {
+            out.push(' ');
+        } else if !is_control(c) {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
 
 /// Longest line, in characters.
 pub(crate) const WIDTH: usize = 100;
@@ -42,6 +68,13 @@ mod tests {
         assert!(lines[0].starts_with("certified  words") && lines[1].starts_with("           words"));
         let words: Vec<&str> = lines.iter().flat_map(|line| line.split_whitespace()).collect();
         assert_eq!(words, long.split_whitespace().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn escape_sequences_are_left_out() {
+        let text = "a \u{1b}[31mred\u{1b}[0m title\u{7}\tof\u{9b}2J \u{1b}]0;window\u{7}two\nlines\r\u{1b}";
+        assert_eq!(plain(text), "a red title of two\nlines");
+        assert!(matches!(plain("µ, two\nlines"), Cow::Borrowed(_)));
     }
 
     #[test]

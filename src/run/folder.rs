@@ -3,27 +3,58 @@
 use super::{Start, summary::SUMMARY};
 use crate::{
     error::{Error, Result},
-    io::output::{checkpoint_folder::list, log::Log},
+    io::output::{
+        checkpoint::{start_state_of, state_digest},
+        checkpoint_folder::list,
+        log::Log,
+    },
     job::{Job, differing_keys},
 };
 use rustix::fs::{Access, access};
-use std::{io::ErrorKind, path::Path};
+use std::{
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
 
 /// The file that every run writes and locks.
 const LOG: &str = "run.log";
 
+/// Files that a run overwrites, beside its job.toml.
+const OVERWRITTEN: [&str; 7] =
+    ["history.csv", "resultants.csv", "probes.csv", "profiles.csv", "fields.vtkhdf", "fields.xdmf", SUMMARY];
+
 /// Largest number of differing keys that a refusal lists; further ones are counted.
 const SHOWN: usize = 8;
 
-/// Locks the folder for this run if it exists, and refuses one in which the run must not start. On one rank, before anything in it
-/// is read; changes no file.
-pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<()> {
+/// Locks the folder for this run if it exists, and refuses one in which the run must not start; returns its checkpoints, which a new
+/// start removes. On one rank, before anything in it is read; changes no file.
+pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<Vec<PathBuf>> {
     let folder = job.output_folder();
     refuse_unwritable(folder)?;
     log.lock(&folder.join(LOG), false)?;
+    refuse_own_start_state(job, start)?;
     refuse_foreign(job, start)?;
     let remedy = "continue it with --restart, or discard it and start again with --force";
-    if *start == Start::Anew { refuse_unfinished(folder, remedy) } else { Ok(()) }
+    if *start == Start::Anew {
+        refuse_unfinished(folder, remedy)?;
+    }
+    Ok(list(folder)?.into_iter().map(|(_, path)| path).collect())
+}
+
+/// Refuses a new start from a state in the output folder, whose checkpoints the start removes.
+fn refuse_own_start_state(job: &Job, start: &Start) -> Result<()> {
+    let from = job.initial.as_ref().and_then(|initial| initial.from.as_deref());
+    let Some(from) = from.filter(|_| !start.is_restart()) else { return Ok(()) };
+    let (folder, from_folder) = (job.output_folder(), if from.is_dir() { Some(from) } else { from.parent() });
+    let place = |path: &Path| path.canonicalize().ok();
+    if place(folder).is_none_or(|folder| from_folder.and_then(place) != Some(folder)) {
+        return Ok(());
+    }
+    Err(Error::Refused(format!(
+        "{}: [initial] from names a state in the output folder, whose checkpoints a new start removes; choose another [output] folder, \
+         or continue the run with --restart",
+        folder.display()
+    )))
 }
 
 /// The starts of stages; none for a stage that is complete. Stages that are continued begin with the first one that is not; the later
@@ -42,6 +73,7 @@ pub(super) fn starts(stages: &[&Job], start: &Start) -> Result<Vec<Option<Start>
             (true, true) => Some(Start::Anew),
         };
         has_begun |= found.is_some();
+        found.iter().try_for_each(|start| refuse_own_start_state(job, start))?;
         if found == Some(Start::Anew) {
             let remedy = if are_continued {
                 "its start state has changed or will change; to discard the run, start all stages again with --force"
@@ -59,28 +91,38 @@ pub(super) fn starts(stages: &[&Job], start: &Start) -> Result<Vec<Option<Start>
 /// Where a stage of several goes on: `None` if its folder holds its complete results.
 fn continuation(job: &Job) -> Result<Option<Start>> {
     let folder = job.output_folder();
-    if began_before_its_start(job)? {
-        return Ok(Some(Start::Anew));
-    }
-    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_default();
-    let summary: serde_json::Value = serde_json::from_str(&read(SUMMARY)).unwrap_or_default();
-    if summary["status"] == "completed" && read("job.toml") == job.to_toml()? {
+    let start_state = start_state(job)?;
+    let summary: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join(SUMMARY)).unwrap_or_default())
+            .unwrap_or_default();
+    let is_complete =
+        summary["status"] == "completed" && summary["start_state"].as_str() == start_state.as_deref();
+    if is_complete && is_of(folder, job)? {
         return Ok(None);
     }
-    Ok(Some(if list(folder)?.is_empty() { Start::Anew } else { Start::Newest }))
+    let newest = list(folder)?.into_iter().next();
+    let goes_on = newest.is_some_and(|(_, file)| start_state_of(&file) == start_state);
+    Ok(Some(if goes_on { Start::Newest } else { Start::Anew }))
 }
 
-/// Whether the state from which a job starts was written after the results in the folder of the job were begun.
-fn began_before_its_start(job: &Job) -> Result<bool> {
+/// Whether the results in a folder are those of this job, wherever its files are.
+fn is_of(folder: &Path, job: &Job) -> Result<bool> {
+    let text = std::fs::read_to_string(folder.join("job.toml")).unwrap_or_default();
+    match Job::from_text(&text, "job.toml", folder, &[]) {
+        Ok(there) => Ok(there.job.to_toml_without_places()? == job.to_toml_without_places()?),
+        Err(_) => Ok(false),
+    }
+}
+
+/// The digest of the state from which a job starts; `None` if it starts from none, or if the state is not there yet. Times of files are
+/// not compared: copies may keep them.
+fn start_state(job: &Job) -> Result<Option<String>> {
     let Some(from) = job.initial.as_ref().and_then(|initial| initial.from.as_deref()) else {
-        return Ok(false);
+        return Ok(None);
     };
     let file =
         if from.is_dir() { list(from)?.into_iter().next().map(|(_, file)| file) } else { Some(from.into()) };
-    let written = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
-    let begun = written(&job.output_folder().join("job.toml"));
-    let start = file.and_then(|file| written(&file));
-    Ok(begun.zip(start).is_some_and(|(begun, start)| start > begun))
+    Ok(file.and_then(|file| state_digest(&file).ok()))
 }
 
 /// Refuses a folder that can't be written or created. On one rank; changes no file.
@@ -119,13 +161,16 @@ fn refuse_unfinished(folder: &Path, remedy: &str) -> Result<()> {
     )))
 }
 
-/// Refuses a folder with the results of another job, or with a job.toml that no run wrote.
+/// Refuses a folder with the results of another job, or with files that no run wrote.
 fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     let folder = job.output_folder();
     let file = folder.join("job.toml");
     // The newest checkpoint of the folder is compared with the job when it is read.
-    if matches!(start, Start::Over | Start::Newest) || !file.exists() {
+    if matches!(start, Start::Over | Start::Newest) {
         return Ok(());
+    }
+    if !file.exists() {
+        return if folder.join(LOG).exists() { Ok(()) } else { refuse_own_files(folder) };
     }
     let is_restart = start.is_restart();
     let remedy = if is_restart {
@@ -148,6 +193,13 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     if file_name(&there) != file_name(job) && !is_restart {
         differing.insert(0, "mesh.file".into());
     }
+    let start_name = |job: &Job| {
+        let from = job.initial.as_ref().and_then(|initial| initial.from.as_deref());
+        from.and_then(Path::file_name).map(std::ffi::OsStr::to_owned)
+    };
+    if start_name(&there) != start_name(job) {
+        differing.insert(0, "initial.from".into());
+    }
     if there.about != job.about && !is_restart {
         differing.insert(0, "about".into());
     }
@@ -163,13 +215,34 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     ))
 }
 
+/// Refuses a folder without a run but with files that a run would overwrite.
+fn refuse_own_files(folder: &Path) -> Result<()> {
+    match OVERWRITTEN.iter().find(|name| folder.join(name).symlink_metadata().is_ok()) {
+        Some(name) => Err(Error::Refused(format!(
+            "{}: the folder contains {name}, which no run has written and which would be overwritten; choose another [output] folder, or \
+             overwrite the file with --force",
+            folder.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// Creates the output folder, locks it for this run, opens the log and removes the summary of an earlier run, so that this summary
-/// is not
-/// mistaken for that of this run; a new start also removes the checkpoints. On one rank.
-pub(super) fn prepare_folder(folder: &Path, is_restart: bool, log: &mut Log) -> Result<()> {
+/// is not mistaken for that of this run. A new start also removes the checkpoints found when the folder was claimed (`None` for a
+/// restart), and is refused if there are others: another run wrote them. On one rank.
+pub(super) fn prepare_folder(folder: &Path, claimed: Option<&[PathBuf]>, log: &mut Log) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
     let file = folder.join(LOG);
     log.lock(&file, true)?;
+    let there = list(folder)?;
+    if let Some((_, new)) = claimed.and_then(|claimed| there.iter().find(|(_, path)| !claimed.contains(path)))
+    {
+        return Err(Error::Refused(format!(
+            "{}: another run wrote it while this one was prepared; continue that run with --restart, or choose another [output] folder",
+            new.display()
+        )));
+    }
+    let is_restart = claimed.is_none();
     log.open(&file, is_restart)?;
     let summary = folder.join(SUMMARY);
     match std::fs::remove_file(&summary) {
@@ -177,7 +250,7 @@ pub(super) fn prepare_folder(folder: &Path, is_restart: bool, log: &mut Log) -> 
         _ => {}
     }
     if !is_restart {
-        for (_, path) in list(folder)? {
+        for (_, path) in there {
             std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;
             log.line(format!("removed {} of an earlier run", path.display()));
         }
@@ -222,6 +295,32 @@ mod tests {
             let said = refused(summary, &[checkpoint, 2]).expect("refused");
             assert!(said.contains(words) && said.contains("--restart") && said.contains("--force"), "{said}");
         }
+    }
+
+    #[test]
+    fn a_checkpoint_that_appears_behind_the_claim_is_not_removed() {
+        let folder = folder(None, &[4]);
+        let mut log = Log::new(false, false);
+        let claimed = [folder.path().join("checkpoint-4.h5")];
+        write(folder.path().join("checkpoint-6.h5"), "").expect("written");
+        let said = prepare_folder(folder.path(), Some(&claimed), &mut log).expect_err("refused").to_string();
+        assert!(said.contains("checkpoint-6.h5") && said.contains("another run"), "{said}");
+        assert_eq!(list(folder.path()).expect("listed").len(), 2);
+        prepare_folder(folder.path(), None, &mut log).expect("a restart");
+        std::fs::remove_file(folder.path().join("checkpoint-6.h5")).expect("removed");
+        prepare_folder(folder.path(), Some(&claimed), &mut log).expect("a new start");
+        assert_eq!(list(folder.path()).expect("listed").len(), 0);
+    }
+
+    #[test]
+    fn files_of_the_user_are_not_overwritten() {
+        let folder = folder(None, &[]);
+        refuse_own_files(folder.path()).expect("nothing there");
+        write(folder.path().join("notes.txt"), "").expect("written");
+        refuse_own_files(folder.path()).expect("no file of a run");
+        write(folder.path().join("history.csv"), "").expect("written");
+        let said = refuse_own_files(folder.path()).expect_err("refused").to_string();
+        assert!(said.contains("history.csv") && said.contains("--force"), "{said}");
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod header;
 mod validate;
 mod inventory;
 mod materials;
+mod memory;
 mod obstacles;
 mod outputs;
 mod phases;
@@ -58,6 +59,7 @@ macro_rules! on_the_mesh {
 
 /// Runs a job to its end or to a request to stop. Collective.
 pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Result<Exit, Agreed> {
+    session.agree(loaded.refuse_untrusted())?;
     on_the_mesh!(session, loaded, time_loop::run, start, clock)
 }
 
@@ -71,6 +73,7 @@ pub fn run_stages(
     clock: Clock,
 ) -> Result<Exit, Agreed> {
     let mut clock = clock;
+    session.agree(stages.iter().try_for_each(Loaded::refuse_untrusted))?;
     let jobs: Vec<&Job> = stages.iter().map(|stage| &stage.job).collect();
     let starts = session.on_first(|| folder::starts(&jobs, start))?;
     // The first rank alone reads the folders.
@@ -97,5 +100,6 @@ pub fn run_stages(
 
 /// Sets a job up as a run does and reports on it, without steps and without files. Collective.
 pub fn check(session: &Session, loaded: Loaded) -> Result<Report, Agreed> {
+    session.agree(loaded.refuse_untrusted())?;
     on_the_mesh!(session, loaded, check::check)
 }

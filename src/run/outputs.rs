@@ -98,6 +98,12 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             History::open(&folder, step)
         };
         let history = session.on_first(tables)?;
+        let of_history = history.iter().flat_map(History::faults);
+        of_history
+            .chain(resultants.faults())
+            .chain(probes.faults())
+            .chain(profiles.faults())
+            .for_each(|fault| log.warning(fault));
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
         let spent = start.elapsed();
         let checkpoints = 0;
@@ -206,7 +212,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         self.profiles.flush()
     }
 
-    /// Writes a checkpoint and removes the oldest. Collective.
+    /// Writes a checkpoint and removes the oldest. It does not depend on fields: if these can't be written, the checkpoint is,
+    /// and the failure of the fields is returned. Collective.
     pub(super) fn checkpoint(
         &mut self,
         session: &Session,
@@ -215,8 +222,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         totals: &Totals,
     ) -> Result<PathBuf> {
         let start = Instant::now();
-        // A restart continues the files, which must therefore be complete up to this step.
-        self.fields.write_out()?;
+        // A restart continues the files, which should therefore be complete up to this step.
+        let fields = if self.fields.write_failed() { Ok(()) } else { self.fields.write_out() };
         session.agree(self.flush())?;
         let path = checkpoint_path(&self.folder, state.step);
         let header = Header::new(session, &self.identity, body, state, totals);
@@ -226,6 +233,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             prune(&self.folder, self.keep)
         })?;
         self.spent += start.elapsed();
+        fields?;
         Ok(path)
     }
 

@@ -68,14 +68,22 @@ pub(super) fn restore<const D: usize, const S: usize>(
     ))))
 }
 
-/// Reads the state that a job starts from, if it names one, into body and state; returns a line for the log. Components that supports
+/// The state of another run from which a run starts.
+pub(super) struct StartState {
+    /// The digest of its checkpoint.
+    pub digest: String,
+    /// The line of the log about it.
+    pub words: String,
+}
+
+/// Reads the state that a job starts from, if it names one, into body and state. Components that supports
 /// hold keep the displacement and have the velocity of the supports. Collective.
 pub(super) fn transfer<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     body: &mut Body<D, S>,
     state: &mut State,
-) -> Result<Option<String>> {
+) -> Result<Option<StartState>> {
     let Some(from) = loaded.job.initial.as_ref().and_then(|initial| initial.from.as_deref()) else {
         return Ok(None);
     };
@@ -88,8 +96,12 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         session.agree(newest.ok_or_else(none))?
     } else {
         let is_there = session.total(usize::from(session.is_first() && from.is_file())) > 0;
-        let none =
-            || fault(format!("{} does not exist", from.display()), "name a checkpoint or an output folder");
+        let none = || {
+            fault(
+                format!("{} does not exist or is no regular file", from.display()),
+                "name a checkpoint or an output folder",
+            )
+        };
         session.agree(if is_there { Ok(()) } else { Err(none()) })?;
         from.to_owned()
     };
@@ -110,7 +122,7 @@ pub(super) fn transfer<const D: usize, const S: usize>(
             words += &format!("; {what}: {}", names.join(", "));
         }
     }
-    Ok(Some(words))
+    Ok(Some(StartState { digest: found.digest, words }))
 }
 
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.

@@ -1,8 +1,8 @@
 //! Each rank's part of a job's mesh, whether generated or read.
 
-use super::validate::validate;
+use super::{memory::require_for_cells, validate::validate};
 use crate::{
-    error::{Error, Result},
+    error::{Error, Result, regular_file},
     io::partitioned::{self, PartitionedFile},
     job::{self, Loaded, MeshSource, Partition},
     mesh::{
@@ -78,6 +78,7 @@ fn generated<const D: usize, G: Grid<D>>(
     order: usize,
 ) -> Result<Mesh<D>, Agreed> {
     let grid = session.agree(grid)?;
+    require_for_cells(session, D, grid.counts()[1].unwrap_or(usize::MAX))?;
     let large = grid.counts()[1].is_none_or(|cells| cells > MOST_CELLS_ON_ONE_RANK);
     if partition == Partition::Grid || (partition == Partition::Auto && large) {
         let piece = session.agree(grid.part(session.rank(), session.ranks()))?;
@@ -86,9 +87,9 @@ fn generated<const D: usize, G: Grid<D>>(
     split(session, session.on_first(|| grid.whole())?, order)
 }
 
-/// Refuses a mesh file that does not exist, at its key in the job.
+/// Refuses a mesh file that does not exist or is no file, at its key in the job.
 fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
-    std::fs::metadata(path).map(drop).map_err(|error| {
+    regular_file(path).map(drop).map_err(|error| {
         let help = "a relative path starts from the folder of the job file";
         loaded.fault("mesh.file", format!("cannot read {}: {error}", path.display()), help)
     })

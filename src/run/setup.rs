@@ -1,6 +1,14 @@
 //! Sets a job up for a run or for `solver check`, without touching the output folder.
 
-use super::{bonds, build, obstacles, restored::transfer, steps, validate::refuse_free_bodies};
+use super::{
+    Inventory, bonds, build,
+    estimate::Estimate,
+    memory::require_for_run,
+    obstacles,
+    restored::{StartState, transfer},
+    steps,
+    validate::refuse_free_bodies,
+};
 use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
@@ -11,7 +19,7 @@ use crate::{
     parallel::session::Session,
     solver::{
         certificate::{Certificates, Verdict},
-        stepping::{Stepper, StepperSettings},
+        stepping::{ProblemSize, Stepper, StepperSettings},
     },
 };
 
@@ -25,8 +33,8 @@ pub(super) struct Setup<const D: usize, const S: usize> {
     pub verdict: Verdict,
     /// Warnings about the initial state.
     pub warnings: Vec<String>,
-    /// The line of the log about the state of another run from which this one starts, if there is one.
-    pub began_from: Option<String>,
+    /// The state of another run from which this one starts, if there is one.
+    pub began_from: Option<StartState>,
 }
 
 /// Sets a job up on its mesh, which was checked against the job. Collective.
@@ -57,6 +65,11 @@ pub(super) fn setup<const D: usize, const S: usize>(
         _ => error.into(),
     })?;
     let longest = steps::longest_step(job);
+    let steps = steps::landings(job).steps_after(0.0, longest);
+    let problem = ProblemSize::of(session, &body, steps, job.solver.factor_precision)?;
+    let inventory = Inventory::of(session, &body, &scheme);
+    let estimate = Estimate::new(session, &body, &inventory, scheme.preconditioner().0, problem);
+    require_for_run(session, &estimate)?;
     let matrix = scheme.matrix(session, &mut body, longest);
     let mut matrix = session.agree(matrix).map_err(|error| match error.exit() {
         Exit::Internal => loaded.fault(

@@ -61,6 +61,9 @@ pub struct Summary {
     pub linear_iterations: u64,
     /// The checkpoint that this run continued from.
     pub restarted_from: Option<String>,
+    /// The digest of the checkpoint from which the run started; present if it started from one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_state: Option<String>,
     /// Largest von Mises norm of sigma at the end, in Pa.
     pub final_von_mises: f64,
     /// Largest stress and strain after any step.

@@ -50,19 +50,22 @@ pub(super) fn run<const D: usize, const S: usize>(
     let job = &loaded.job;
     let folder = job.output_folder();
     let mut log = Log::new(session.is_first(), clock.on_terminal);
-    session.on_first(|| claim_folder(job, start, &mut log))?;
+    let claimed = session.on_first(|| claim_folder(job, start, &mut log))?.unwrap_or_default();
     let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let is_restart = start.is_restart();
-    let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
+    let start_state = ready.began_from.as_ref().map(|state| state.digest.clone());
+    let physics = session.agree(job.physics())?;
+    let identity = Identity { version: super::VERSION.into(), physics, start_state };
     let candidates = candidates(session, start, folder)?;
     let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
-    session.on_first(|| prepare_folder(folder, is_restart, &mut log))?;
+    session.on_first(|| prepare_folder(folder, (!is_restart).then_some(&claimed[..]), &mut log))?;
     if let Some(restored) = &restored {
         restored.faults.iter().for_each(|fault| log.warning(fault));
         log.line(&restored.words);
-    } else if let Some(words) = &ready.began_from {
-        log.line(words);
+    } else if let Some(state) = &ready.began_from {
+        log.line(&state.words);
     }
+    let start_state = identity.start_state.clone();
     session.agree(header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
@@ -96,6 +99,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         clock,
         deadline,
         setup,
+        start_state,
         stepping,
     };
     let ended = run.advance();
@@ -126,6 +130,8 @@ struct Run<'a, const D: usize, const S: usize> {
     clock: Clock,
     deadline: Deadline,
     setup: Duration,
+    /// The digest of the checkpoint from which the run started, if it started from one.
+    start_state: Option<String>,
     /// When the steps began, and the number of the step before them.
     stepping: (Instant, u64),
 }
@@ -352,6 +358,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             newton_iterations: totals.newton_iterations,
             linear_iterations: totals.linear_iterations,
             restarted_from,
+            start_state: self.start_state.clone(),
             final_von_mises: session.largest([von_mises])[0],
             peaks: totals.peaks,
             of_fields,

@@ -137,7 +137,7 @@ fn a_device_that_is_always_full_ends_the_run_in_words() {
         let case = saving().set("mesh.rectangle.cells", "[200, 4]").set("output.profile", profiles);
         std::fs::create_dir_all(case.folder().join("out")).expect("folder");
         std::os::unix::fs::symlink("/dev/full", case.folder().join("out").join(name)).expect("link");
-        let outcome = case.run_with(RANKS, &[]).expect(1);
+        let outcome = case.run_with(RANKS, &["--force"]).expect(1);
         outcome.says(&format!("out/{name}")).says("No space left on device");
     }
 }

@@ -80,6 +80,20 @@ fn meshes_that_claim_more_than_their_file_can_hold_are_refused_before_memory_is_
 }
 
 #[test]
+fn a_mesh_that_does_not_fit_in_the_memory_ends_with_the_sum_that_is_needed() {
+    let case = Case::square(4).set("mesh.rectangle.cells", "[4000, 4000]");
+    for ranks in ["1", "2"] {
+        let mut command = Command::new("mpirun");
+        command.args(["--oversubscribe", "--bind-to", "none", "-n", ranks, "sh", "-c"]);
+        command.arg(format!("ulimit -v {MEMORY}; exec \"$0\" check \"$1\""));
+        command.arg(env!("CARGO_BIN_EXE_solver")).arg(case.written());
+        let outcome = Running::spawn(command).wait().expect(1);
+        outcome.says("not enough memory").says("32000000 cells").says("11.2 GB").says("are available");
+        assert_eq!(outcome.stderr.matches("not enough memory").count(), 1, "{}", outcome.stderr);
+    }
+}
+
+#[test]
 fn a_device_is_no_mesh() {
     let case = Case::square(4).without("mesh.rectangle").set("mesh.file", "'/dev/zero'");
     refused(&case.written()).says("cannot read /dev/zero").says("not a file");

@@ -35,6 +35,20 @@ const REFUSED: &[(&[&str], &[&str])] = &[
         &["check", "JOB", "--set", "solver.petsc.ksp_type=nothing"],
         &["Unable to find requested KSP type nothing"],
     ),
+    (
+        &["check", "JOB", "--set", "solver.petsc.log_view=':log'"],
+        &["this option of PETSc writes a file", "--trust"],
+    ),
+    (&["run", "JOB", "--set", "solver.petsc.dll_append='a.so'"], &["loads code", "--trust"]),
+    (
+        &["partition", "tests/meshes/square_ascii.msh", "-n", "2", "-o", "Cargo.lock"],
+        &["Cargo.lock exists", "--force"],
+    ),
+    (
+        &["JOB", "--set", "output.folder=OUT", "--restart", "/dev/zero"],
+        &["/dev/zero: it is a device or a pipe"],
+    ),
+    (&["check", "JOB", "--set", "mesh={file='/dev/zero'}"], &["/dev/zero: it is a device or a pipe"]),
     (&["check", "nowhere.toml", "--json"], &["cannot read nowhere.toml"]),
     (&["describe", "contat"], &["did you mean `contact`?"]),
     (&["describe", "poisson_ratio"], &["try solver describe material.elasticity.poisson_ratio"]),

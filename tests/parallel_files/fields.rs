@@ -142,6 +142,28 @@ pub fn write_solid(world: &impl Communicator, folder: &Path) {
     file.close().expect("close");
 }
 
+/// Writes batches of many small steps, so that the metadata of a batch exceeds the threshold from which HDF5 writes it by default.
+pub fn write_many(world: &impl Communicator, folder: &Path) {
+    let part = Part::new(world);
+    let mut file = FieldFile::create(folder, world, part.mesh(), 0).expect("create");
+    let names: Vec<String> = (0..MANY_FIELDS).map(|number| format!("field_{number}")).collect();
+    let values: Vec<f64> = part.cell_ids.iter().map(|id| *id as f64).collect();
+    let field = |name| Field { name, place: Place::Cell, shape: Shape::Scalar, values: &values };
+    let fields: Vec<Field> = names.iter().map(|name| field(name.as_str())).collect();
+    let mut step = 0;
+    for batch in MANY_STEPS {
+        for _ in 0..batch {
+            file.write_step(f64::from(step), &fields).expect("step");
+            step += 1;
+        }
+        file.write_out().expect("written");
+    }
+    file.close().expect("close");
+}
+
+const MANY_FIELDS: usize = 20;
+const MANY_STEPS: [u32; 8] = [1, 250, 220, 250, 250, 130, 250, 220];
+
 fn close_to(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= 1e-12 * (1.0 + expected.abs())
 }
@@ -215,6 +237,15 @@ fn fields_of_all_steps_stand_in_the_file_whatever_the_number_of_ranks() {
             assert!(words.contains(part), "{words}");
         }
     }
+}
+
+#[test]
+fn the_metadata_of_many_steps_are_not_written_amid_a_transfer() {
+    let folder = tempfile::tempdir().expect("folder");
+    mpirun::run(1, "fields_many", folder.path());
+    let words = inspect(&folder.path().join("fields.vtkhdf")).expect("inspect");
+    let steps: u32 = MANY_STEPS.iter().sum();
+    assert!(words.contains(&format!("steps: {steps}")), "{words}");
 }
 
 #[test]

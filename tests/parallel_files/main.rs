@@ -34,6 +34,7 @@ fn scenario() {
         "checkpoint_damage" => checkpoints::damage(&world, &folder),
         "fields_write" => fields::write(&world, &folder, 0),
         "fields_write_packed" => fields::write(&world, &folder, 9),
+        "fields_many" => fields::write_many(&world, &folder),
         "fields_die" => fields::die(&world, &folder),
         "fields_solid" => fields::write_solid(&world, &folder),
         "fields_resume" => fields::resume(&world, &folder),

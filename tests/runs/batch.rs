@@ -39,7 +39,7 @@ impl Submission {
         let submission = Self { case, job };
         submission.command("squeue", "echo 2099-01-01T00:00:00");
         submission.command("scontrol", "echo \"$@\" >>\"${0%/*}/submitted\"");
-        submission.command("qsub", "echo \"$@\" >>\"${0%/*}/submitted\"");
+        submission.command("qsub", "echo \"$@\" \"RESTART=$RESTART JOB=$JOB\" >>\"${0%/*}/submitted\"");
         submission.command(
             "qstat",
             "echo '    Resource_List.walltime = 01:00:00'; echo '    Resource_List.select = 1'",
@@ -113,6 +113,7 @@ fn a_job_that_is_submitted_to_pbs_again_continues_from_the_folder_that_it_names(
         submission.run("pbs.sh", &[], &variables).expect(3).says("submitting again");
         let submitted = submission.submitted().expect("a submission");
         assert!(submitted.contains("RESTART=yes"), "{submitted}");
+        assert!(submitted.contains(&format!("JOB={job}")) && !submitted.contains(&format!("-v JOB={job}")));
         let again = [&variables[..], &[("RESTART", "yes")]].concat();
         let checkpoint = submission.path(folder).join("checkpoint-1.h5");
         submission
@@ -120,4 +121,22 @@ fn a_job_that_is_submitted_to_pbs_again_continues_from_the_folder_that_it_names(
             .expect(3)
             .says(&format!("continuing from {}", checkpoint.display()));
     }
+}
+
+#[test]
+fn the_margin_of_a_pbs_job_counts_from_its_start_and_paths_may_contain_commas() {
+    let submission = Submission::new("", "output.folder = \"a, b\"");
+    let job = submission.path("a, job.toml");
+    fs::rename(&submission.job, &job).expect("renamed");
+    submission.command("slow", "sleep 2; exec \"$@\"");
+    submission.command("timeout", "echo \"runs for $4 s\"; shift 4; exec \"$@\"");
+    let (here, job) = (submission.case.folder().display().to_string(), job.display().to_string());
+    let variables =
+        [("PBS_O_WORKDIR", here.as_str()), ("PBS_JOBID", "7"), ("JOB", &job), ("LAUNCHER", "slow")];
+    let outcome = submission.run("pbs.sh", &[], &variables).expect(3);
+    let seconds = outcome.stdout.split_once("runs for ").and_then(|(_, rest)| rest.split_once(" s"));
+    let seconds: u64 = seconds.and_then(|(number, _)| number.parse().ok()).expect("seconds");
+    assert!(seconds <= 3600 - 120 - 2, "{seconds}");
+    assert!(submission.submitted().expect("a submission").contains(&format!("JOB={job}")));
+    assert!(submission.path("a, b/checkpoint-1.h5").is_file());
 }

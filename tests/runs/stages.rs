@@ -202,10 +202,37 @@ fn stages_that_were_stopped_go_on_with_the_first_one_that_is_not_complete() {
     launch::run(2, &both(&[])).expect(2).says("the folder holds a run that was stopped").says("--restart");
     assert_eq!(first.results().text("run.log"), log);
     // A new start state leaves nothing to continue.
-    launch::run(1, &["run", &one, "--force"]).expect(0);
+    launch::run(3, &["run", &one, "--force"]).expect(0);
     launch::run(2, &both(&["--restart"])).expect(2).says("its start state has changed");
     launch::run(2, &both(&["--force"])).expect(0);
     assert_eq!(straight, tables.map(|name| second.results().text(name)));
+}
+
+#[test]
+fn copied_stages_go_on_whatever_the_times_of_their_files() {
+    let first = first("lagged_euler");
+    let second = second("lagged_euler", &out(&first)).set("checkpoint.every", "4");
+    let [one, two] = [&first, &second].map(|case| case.written().display().to_string());
+    let restart = ["run", &one, &two, "--restart"];
+    launch::run(2, &["run", &one, &two]).expect(0);
+    // As a copy without times would: the start state seems younger than the results.
+    let start = out(&first) + "/checkpoint-8.h5";
+    let copy = std::fs::read(&start).expect("read");
+    std::fs::write(&start, copy).expect("written");
+    let outcome = launch::run(2, &restart).expect(0);
+    assert_eq!(outcome.stdout.matches("completed before").count(), 2, "{}", outcome.stdout);
+    // Another start state of the same age: as if copied with its times.
+    let age = std::fs::metadata(&start).and_then(|data| data.modified()).expect("age");
+    launch::run(1, &["run", &one, "--force"]).expect(0);
+    let file = std::fs::OpenOptions::new().append(true).open(&start).expect("opened");
+    file.set_modified(age - std::time::Duration::from_secs(3600)).expect("set");
+    let outcome = launch::run(2, &restart).expect(0);
+    assert_eq!(outcome.stdout.matches("completed before").count(), 1, "{}", outcome.stdout);
+    // A new start would remove the state from which it starts.
+    let own = format!("{:?}", out(&second));
+    let own = second.set("initial.from", &own);
+    own.run_with(1, &["--force"]).expect(2).says("names a state in the output folder");
+    assert!(own.results().path("checkpoint-8.h5").is_file());
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{
     checkpoint_file::{self, Checkpoint, RowSet, Table},
     history::Totals,
+    seal,
 };
 use crate::{
     error::{Error, Exit, Result},
@@ -58,6 +59,9 @@ pub struct Header {
     /// For the same contacts: the resultant moment in N m of the contact tractions in the last step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_rotation_resultants: Vec<f64>,
+    /// The digest of the checkpoint from which the run started, if it started from one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_state: Option<String>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -71,6 +75,8 @@ pub struct Identity {
     pub version: String,
     /// The keys of the job that affect the results, with their values.
     pub physics: BTreeMap<String, String>,
+    /// The digest of the checkpoint from which the run started, if it started from one.
+    pub start_state: Option<String>,
 }
 
 impl Header {
@@ -101,10 +107,23 @@ impl Header {
             obstacle_rotations: motions(1).map(LoadedMotion::saved).collect(),
             obstacle_rotation_stiffness: motions(1).map(LoadedMotion::stiffness).collect(),
             obstacle_rotation_resultants: motions(1).map(LoadedMotion::resultant).collect(),
+            start_state: identity.start_state.clone(),
             mesh: digest(body),
             physics: identity.physics.clone(),
         }
     }
+}
+
+/// The digest of a checkpoint, by which a run that starts from it knows it. On one rank.
+pub fn state_digest(path: &Path) -> Result<String> {
+    Ok(format!("{:016x}", seal::recorded_digest(path, seal::CHECKPOINT)?))
+}
+
+/// The digest of the checkpoint from which the run that wrote this one started; `None` if it started from none, or if the file cannot
+/// be read. On one rank.
+pub fn start_state_of(path: &Path) -> Option<String> {
+    let header = hdf5::File::open(path).and_then(|file| file.dataset("header")?.read_raw::<u8>()).ok()?;
+    serde_json::from_slice::<Header>(&header).ok()?.start_state
 }
 
 /// Saves the state with its header. Collective, with the same outcome on all ranks.
@@ -211,6 +230,8 @@ pub fn restore<const D: usize, const S: usize>(
 /// The part of the state of another run that this job can use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transferred {
+    /// The digest of the checkpoint.
+    pub digest: String,
     /// Number of steps of that run.
     pub step: u64,
     /// Its time in s.
@@ -279,7 +300,8 @@ pub fn transfer<const D: usize, const S: usize>(
     if has_stress(&header.physics) && !has_stress(physics) {
         dropped.push("initial stress of materials without viscoplasticity".into());
     }
-    let mut found = Transferred { step: header.step, time: header.time, dropped, at_rest };
+    let digest = session.agree(state_digest(path))?;
+    let mut found = Transferred { digest, step: header.step, time: header.time, dropped, at_rest };
     transfer_motions(&header, physics, body, &mut found);
     Ok(found)
 }
@@ -382,6 +404,13 @@ fn check_mesh<const D: usize, const S: usize>(
     body: &Body<D, S>,
 ) -> Result<Header> {
     let header = read_header(path, bytes)?;
+    if header.start_state.is_some() && header.start_state != identity.start_state {
+        return refuse(
+            "the state from which the run started has changed since the checkpoint was written; restore that state, or start the run \
+             again without --restart"
+                .into(),
+        );
+    }
     if header.mesh != digest(body) || header.dimension != D {
         let words =
             "the checkpoint belongs to another mesh; a run can start only from a state on its own mesh";

@@ -24,7 +24,7 @@ use super::field::{
     view_columns,
 };
 use super::field_slab::Slab;
-use super::parallel_file::{Element, ParallelFile};
+use super::parallel_file::{Element, METADATA_BYTES, ParallelFile};
 use super::xdmf;
 use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::Vector;
@@ -42,6 +42,8 @@ const STEPS_PER_CHUNK: usize = 256;
 const WAITING_BYTES: u64 = 1 << 24;
 /// Upper bound of the bytes of a table in the file besides its numbers.
 const TABLE_BYTES: u64 = 1 << 10;
+const _: () =
+    assert!(WAITING_BYTES <= METADATA_BYTES / 2, "the tables of buffered steps are flushed in time");
 /// The tables of offsets, which are zero because the mesh does not change.
 const STATIC_OFFSETS: [&str; 4] = ["PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"];
 

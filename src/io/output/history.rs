@@ -231,6 +231,11 @@ impl History {
         ))
     }
 
+    /// What the table that is continued lacks.
+    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
+        self.0.faults()
+    }
+
     /// Flushes all rows to the file.
     pub fn flush(&mut self) -> Result<()> {
         self.0.flush()

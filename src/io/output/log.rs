@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    laws::lines::wrapped,
+    laws::lines::{plain, wrapped},
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 use std::{
@@ -62,7 +62,8 @@ impl Log {
         if !self.is_active {
             return;
         }
-        let words = wrapped(words.as_ref(), WORDS);
+        let words = plain(words.as_ref());
+        let words = wrapped(&words, WORDS);
         match &self.bar {
             Some(bar) => bar.suspend(|| print_line(&words)),
             None if self.on_terminal => print_line(&words),
@@ -86,10 +87,11 @@ impl Log {
     /// Writes lines to the file and, where no progress bar moves, to the terminal.
     pub(crate) fn quiet_line(&mut self, words: impl AsRef<str>) {
         if self.is_active {
+            let words = plain(words.as_ref());
             if self.bar.is_none() && self.on_terminal {
-                print_line(words.as_ref());
+                print_line(&words);
             }
-            self.file_line(words.as_ref());
+            self.file_line(&words);
         }
     }
 

@@ -4,7 +4,7 @@ pub mod checkpoint;
 pub mod checkpoint_file;
 pub mod checkpoint_folder;
 pub mod checksum;
-mod csv;
+pub(crate) mod csv;
 pub mod error_indicator;
 mod field;
 pub(crate) mod field_list;

@@ -8,6 +8,10 @@
 //! Metadata carries checksums (superblock 2). Superblock 3 is avoided on purpose: it marks a file that is
 //! open for writing, so that nobody could open the results of a process that died.
 //!
+//! HDF5 writes changed metadata once its amount exceeds a threshold, also amid a collective transfer of numbers. There, HDF5 1.10
+//! and 1.12 write it with an MPI type that is not set, and fail with `MPI_ERR_TYPE`. The threshold is therefore as high as HDF5
+//! allows, above what a file changes between two flushes (see [`METADATA_BYTES`]).
+//!
 //! After a failed write, for instance on a full disk, a file is abandoned and never closed: on closing, HDF5 would write its
 //! remaining data,
 //! some ranks would fail again, and the others would wait for them for ever. For the same reason ranks check the free space before
@@ -19,6 +23,7 @@ use super::free_space;
 use crate::error::{Error, Result};
 use crate::parallel::agreement::{Agreed, agree};
 use hdf5::Location;
+use hdf5::plist::file_access::{FileAccessBuilder, MetadataCacheConfig};
 use hdf5::types::{FixedAscii, TypeDescriptor};
 use mpi::collective::SystemOperation;
 use mpi::raw::AsRaw;
@@ -38,6 +43,10 @@ static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 pub fn was_abandoned() -> bool {
     GIVEN_UP.load(Ordering::Relaxed)
 }
+
+/// Largest number of bytes of changed metadata for which HDF5 waits for a flush: the upper limit of HDF5. Whoever adds many tables
+/// flushes before their metadata reaches this size.
+pub(super) const METADATA_BYTES: u64 = 1 << 25;
 
 /// The longest text an attribute holds, in bytes.
 pub(super) const LONGEST_TEXT: usize = 256;
@@ -80,7 +89,7 @@ impl ParallelFile {
             lacks.map_err(|why| Error::Failed(format!("cannot write {}: {why}. {ROOM}", path.display()))),
         )?;
         let made = hdf5::FileBuilder::new()
-            .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
+            .with_fapl(|access| shared(access, &communicator).libver_v18())
             .with_fcpl(|layout| layout.userblock(reserved))
             .create(path);
         let file = agree(&communicator, made.map_err(|error| Error::unwritable(path, error)))?;
@@ -90,8 +99,7 @@ impl ParallelFile {
     /// Opens an existing file for reading.
     pub fn open_readonly(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
-        let opened =
-            hdf5::FileBuilder::new().with_fapl(|access| access.mpio(communicator.as_raw(), None)).open(path);
+        let opened = hdf5::FileBuilder::new().with_fapl(|access| shared(access, &communicator)).open(path);
         let file = agree(&communicator, opened.map_err(|error| Error::unreadable(path, error)))?;
         Ok(Self::new(file, communicator, path))
     }
@@ -100,7 +108,7 @@ impl ParallelFile {
     pub fn open_append(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
         let opened = hdf5::FileBuilder::new()
-            .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
+            .with_fapl(|access| shared(access, &communicator).libver_v18())
             .open_rw(path);
         let file = agree(&communicator, opened.map_err(|error| Error::unwritable(path, error)))?;
         Ok(Self::new(file, communicator, path))
@@ -262,4 +270,16 @@ impl ParallelFile {
         let explain = |error| Error::Failed(format!("{}: cannot {doing}: {error}", self.path.display()));
         agree(&self.communicator, result.map_err(explain))
     }
+}
+
+/// Access by all ranks of a communicator.
+fn shared<'a>(
+    access: &'a mut FileAccessBuilder,
+    communicator: &SimpleCommunicator,
+) -> &'a mut FileAccessBuilder {
+    let cache = MetadataCacheConfig {
+        dirty_bytes_threshold: METADATA_BYTES as usize,
+        ..MetadataCacheConfig::default()
+    };
+    access.mpio(communicator.as_raw(), None).mdc_config(&cache)
 }

@@ -1,6 +1,6 @@
 //! `probes.csv`: displacement and velocity at points of the body, with one row per step and probe.
 
-use super::csv::{CsvFile, Numbers, Time};
+use super::csv::{CsvFile, Numbers, Time, entry};
 use crate::{
     error::{Error, Result},
     fem::{space::Simplex, state::State},
@@ -21,6 +21,7 @@ const INSIDE: f64 = -1e-9;
 /// The probes of a job; each is evaluated by one rank.
 #[derive(Debug)]
 pub(crate) struct Probes<const D: usize> {
+    /// The names as entries of the table.
     names: Vec<String>,
     /// Local nodes and the values of their shape functions, on the rank that evaluates.
     places: Vec<Option<Vec<(u32, f64)>>>,
@@ -46,7 +47,7 @@ impl<const D: usize> Probes<D> {
             places.push(here.filter(|_| owner == mine));
         }
         Ok(Self {
-            names: probes.iter().map(|probe| probe.name.clone()).collect(),
+            names: probes.iter().map(|probe| entry(&probe.name)).collect(),
             places,
             file: None,
             room: Default::default(),
@@ -98,6 +99,11 @@ impl<const D: usize> Probes<D> {
             file.row(format_args!("{},{},{name},{}", state.step, Time(state.time), Numbers(values)))?;
         }
         Ok(())
+    }
+
+    /// What the table that is continued lacks.
+    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
+        self.file.iter().flat_map(CsvFile::faults)
     }
 
     /// Flushes all rows to the file.

@@ -1,6 +1,6 @@
 //! `profiles.csv`: values along boundaries, with one row per facet node, output time and profile.
 
-use super::csv::{CsvFile, Numbers, Time};
+use super::csv::{CsvFile, Numbers, Time, entry};
 use crate::{
     error::Result,
     fem::{
@@ -19,6 +19,7 @@ use std::{collections::HashMap, path::Path};
 /// A boundary whose values are written.
 #[derive(Debug)]
 struct Profile<const D: usize> {
+    /// The name of the boundary as an entry of the table.
     name: String,
     facets: Vec<u32>,
     points: Vec<SurfacePoint<D>>,
@@ -52,7 +53,7 @@ impl<const D: usize> Profiles<D> {
         let prepare = |(name, contacts): &(String, Vec<usize>)| {
             let facets = body.mesh.boundary(name).map(|b| b.facets.clone()).unwrap_or_default();
             let points = surface_points(session, &body.mesh, &facets)?;
-            Ok(Profile { name: name.clone(), facets, points, contacts: contacts.clone() })
+            Ok(Profile { name: entry(name), facets, points, contacts: contacts.clone() })
         };
         let contacts = || boundaries.iter().flat_map(|(_, contacts)| contacts).map(|at| &body.contacts[*at]);
         let with = Columns {
@@ -126,6 +127,11 @@ impl<const D: usize> Profiles<D> {
             session.agree(written)?;
         }
         Ok(())
+    }
+
+    /// What the table that is continued lacks.
+    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
+        self.file.iter().flat_map(CsvFile::faults)
     }
 
     /// Flushes all rows to the file.

@@ -1,6 +1,6 @@
 //! `resultants.csv`: forces and moments on the body, with one row per step and source.
 
-use super::csv::{CsvFile, Numbers, Time};
+use super::csv::{CsvFile, Numbers, Time, entry};
 use crate::{
     error::Result,
     fem::{
@@ -22,7 +22,7 @@ use std::{
 #[derive(Debug)]
 pub(crate) struct ResultantTable<const D: usize> {
     resultants: Resultants<D>,
-    /// A name for each source, no two alike.
+    /// A name for each source, no two alike, as entries of the table.
     names: Vec<String>,
     /// Whether there are columns of contacts, and of friction.
     with: Columns,
@@ -53,6 +53,7 @@ impl<const D: usize> ResultantTable<D> {
             let same = |number: usize| if number == 1 { name.clone() } else { format!("{name} ({number})") };
             names.extend((1..).map(same).find(|name| !names.contains(name)));
         }
+        let names = names.iter().map(|name| entry(name)).collect();
         let friction = job.contact.iter().any(|contact| contact.friction.is_some());
         let loads = || job.contact.iter().filter_map(|contact| contact.obstacle_load.as_ref());
         let motions =
@@ -117,6 +118,11 @@ impl<const D: usize> ResultantTable<D> {
         session.agree(written)
     }
 
+    /// What the table that is continued lacks.
+    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
+        self.file.iter().flat_map(CsvFile::faults)
+    }
+
     /// Flushes all rows to the file.
     pub(crate) fn flush(&mut self) -> Result<()> {
         self.file.as_mut().map_or(Ok(()), CsvFile::flush)
@@ -137,7 +143,7 @@ fn name(job: &Job, source: Source) -> String {
         Source::BodyForce => return "body_force".into(),
         Source::Momentum => return "momentum".into(),
     };
-    format!("{kind} {}", on.join("+").replace([',', '"', '\n', '\r'], "_"))
+    format!("{kind} {}", on.join("+"))
 }
 
 /// The names of all sources that a run of the job may have.

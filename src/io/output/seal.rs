@@ -16,7 +16,7 @@
 //! distributed over the ranks.
 
 use super::redistribution::first_of_part;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, regular_file};
 use crate::parallel::agreement::{Agreed, agree};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives};
@@ -76,6 +76,11 @@ pub fn verify_alone(path: &Path, kind: Kind) -> Result<()> {
     compare(path, kind, found, expected)
 }
 
+/// The digest that the seal of a file records, by which the file is known wherever it is; nothing else is read.
+pub fn recorded_digest(path: &Path, kind: Kind) -> Result<u64> {
+    read_seal(path, kind).map(|(_, digest)| digest)
+}
+
 /// Whether the file starts with the seal of this kind.
 pub fn is_sealed(path: &Path, kind: Kind) -> bool {
     starts_with(path, kind.magic)
@@ -88,7 +93,8 @@ pub fn is_hdf5(path: &Path) -> bool {
 
 fn starts_with<const N: usize>(path: &Path, bytes: &[u8; N]) -> bool {
     let mut start = [0; N];
-    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *bytes
+    let opened = regular_file(path).and_then(|_| File::open(path));
+    opened.and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *bytes
 }
 
 fn compare(path: &Path, kind: Kind, found: u64, expected: u64) -> Result<()> {
@@ -122,7 +128,7 @@ fn stamp(path: &Path, kind: Kind, length: u64, digest: u64) -> io::Result<()> {
 /// Length of the file and digest of the bytes after the seal.
 fn read_seal(path: &Path, kind: Kind) -> Result<(u64, u64)> {
     let unreadable = |error| Error::unreadable(path, error);
-    let mut file = File::open(path).map_err(unreadable)?;
+    let mut file = regular_file(path).and_then(|_| File::open(path)).map_err(unreadable)?;
     let found = file.metadata().map_err(unreadable)?.len();
     let mut block = [0; SEAL_BYTES as usize];
     if let Err(error) = file.read_exact(&mut block) {

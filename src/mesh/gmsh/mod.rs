@@ -12,7 +12,7 @@ mod inspect;
 mod points;
 
 use super::GlobalMesh;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, regular_file};
 use document::Document;
 pub use inspect::inspect;
 use std::path::Path;
@@ -31,11 +31,8 @@ pub enum AnyMesh {
 /// Tetrahedra give a mesh in space, otherwise triangles give a mesh in the plane. Entities whose cells are all negatively oriented
 /// are reoriented; nodes without a cell are dropped. Of cells of second order the nodes on edges are kept if edges are curved.
 pub fn read(path: &Path) -> Result<AnyMesh> {
-    let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
-    if !facts.is_file() && !facts.is_dir() {
-        return Err(Error::unreadable(path, "it is a device or a pipe, not a file"));
-    }
-    let bytes = std::fs::read(path).map_err(|error| Error::unreadable(path, error))?;
+    let bytes = regular_file(path).and_then(|_| std::fs::read(path));
+    let bytes = bytes.map_err(|error| Error::unreadable(path, error))?;
     parse(&bytes).map_err(|error| Error::Refused(format!("{}: {error}", path.display())))
 }
 

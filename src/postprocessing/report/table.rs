@@ -1,6 +1,7 @@
 //! Reads the tables that a run writes.
 
 use crate::error::{Error, Result};
+use crate::io::output::csv::records;
 use std::path::Path;
 
 /// Columns of numbers and text.
@@ -16,35 +17,34 @@ impl Table {
     /// Reads a table whose column `named`, if it has one, contains text and all others numbers; empty entries of a table with such a
     /// column are NaN. An incomplete last row, left by a run that was interrupted, is ignored.
     pub(super) fn read(path: &Path, named: &str) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))?;
-        Self::parse(&text, named).map_err(|words| Error::unreadable(path, words))
+        let bytes = std::fs::read(path).map_err(|error| Error::unreadable(path, error))?;
+        Self::parse(&bytes, named).map_err(|words| Error::unreadable(path, words))
     }
 
-    fn parse(text: &str, named: &str) -> std::result::Result<Self, String> {
-        let mut lines = text.lines().enumerate().peekable();
-        let (_, first) = lines.next().ok_or("it is empty")?;
-        let header: Vec<String> = first.split(',').map(|name| name.trim().to_owned()).collect();
+    fn parse(bytes: &[u8], named: &str) -> std::result::Result<Self, String> {
+        let mut records = records(bytes).peekable();
+        let first = records.next().ok_or("it is empty")?;
+        let header: Vec<String> = first.entries.iter().map(|name| name.trim().to_owned()).collect();
         let mut table = Self { header, ..Self::default() };
-        while let Some((at, line)) = lines.next() {
-            match table.row(line, named) {
+        while let Some(record) = records.next() {
+            match table.row(&record.entries, named) {
                 Ok(()) => {}
-                Err(_) if lines.peek().is_none() => {}
-                Err(words) => return Err(format!("line {}: {words}", at + 1)),
+                Err(_) if records.peek().is_none() => {}
+                Err(words) => return Err(format!("line {}: {words}", record.line)),
             }
         }
         Ok(table)
     }
 
-    fn row(&mut self, line: &str, named: &str) -> std::result::Result<(), String> {
-        let cells: Vec<&str> = line.split(',').collect();
+    fn row(&mut self, cells: &[String], named: &str) -> std::result::Result<(), String> {
         if cells.len() != self.header.len() {
             return Err(format!("{} columns, the header has {}", cells.len(), self.header.len()));
         }
         let mut row = Vec::with_capacity(cells.len());
         let mut word = String::new();
-        for (name, cell) in self.header.iter().zip(&cells) {
+        for (name, cell) in self.header.iter().zip(cells) {
             if name == named {
-                word = (*cell).to_owned();
+                word.clone_from(cell);
                 row.push(0.0);
             } else if cell.is_empty() && !named.is_empty() {
                 row.push(f64::NAN);
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn rows_are_found_by_name_and_last_time() {
         let text = "time,profile,x\n0,left,1\n0,right,2\n1,left,3\n1,left,4\n1,right,5\n";
-        let table = Table::parse(text, "profile").expect("table");
+        let table = Table::parse(text.as_bytes(), "profile").expect("table");
         assert_eq!(table.names(), ["left", "right"]);
         assert_eq!(table.of("left").last("time").column("x"), Some(vec![3.0, 4.0]));
         assert_eq!(table.column("y"), None);
@@ -143,17 +143,17 @@ mod tests {
 
     #[test]
     fn empty_entries_are_not_numbers_and_none_at_all_without_names() {
-        let table = Table::parse("step,source,area\n1,top,\n1,left,2\n", "source").expect("table");
+        let table = Table::parse(b"step,source,area\n1,top,\n1,left,2\n", "source").expect("table");
         assert!(table.of("top").column("area").expect("a column")[0].is_nan());
         assert_eq!(table.of("left").column("area"), Some(vec![2.0]));
-        assert!(Table::parse("step,area\n1,\n2,1\n", "").is_err());
+        assert!(Table::parse(b"step,area\n1,\n2,1\n", "").is_err());
     }
 
     #[test]
     fn a_cut_last_row_is_skipped_and_any_other_fault_is_named_with_its_line() {
-        assert_eq!(Table::parse("step,time\n1,0.5\n2", "").expect("table").len(), 1);
-        let fault = Table::parse("step,time\n1,half\n2,1\n", "").expect_err("fault");
+        assert_eq!(Table::parse(b"step,time\n1,0.5\n2", "").expect("table").len(), 1);
+        let fault = Table::parse(b"step,time\n1,half\n2,1\n", "").expect_err("fault");
         assert!(fault.contains("line 2") && fault.contains("half"), "{fault}");
-        assert!(Table::parse("", "").is_err());
+        assert!(Table::parse(b"", "").is_err());
     }
 }

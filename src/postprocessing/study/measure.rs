@@ -9,6 +9,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    io::output::csv::records,
     linear_algebra::tensor::larger,
     parallel::session::Session,
 };
@@ -238,16 +239,16 @@ fn value_at(rows: &[(f64, f64)], time: f64) -> Option<f64> {
 /// Time and value in the rows of a probe.
 fn column(folder: &Path, probe: &ProbeError) -> Result<Vec<(f64, f64)>> {
     let path = folder.join("probes.csv");
-    let text = std::fs::read_to_string(&path).map_err(|error| Error::unreadable(&path, error))?;
-    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
-    let header = lines.next().unwrap_or_default();
+    let bytes = std::fs::read(&path).map_err(|error| Error::unreadable(&path, error))?;
+    let mut rows = records(&bytes).map(|record| record.entries);
+    let header = rows.next().unwrap_or_default();
     let place = |name: &str| {
         let found = header.iter().position(|column| *column == name);
         found.ok_or_else(|| Error::Failed(format!("{}: no column `{name}`", path.display())))
     };
     let (time, name, value) = (place("time")?, place("probe")?, place(&probe.value)?);
-    let number = |row: &[&str], at: usize| row.get(at).and_then(|text| text.parse::<f64>().ok());
-    let rows = lines.filter(|row| row.get(name).is_some_and(|word| *word == probe.name));
+    let number = |row: &[String], at: usize| row.get(at).and_then(|text| text.parse::<f64>().ok());
+    let rows = rows.filter(|row| row.get(name).is_some_and(|word| *word == probe.name));
     Ok(rows.filter_map(|row| Some((number(&row, time)?, number(&row, value)?))).collect())
 }
 

@@ -1,6 +1,6 @@
 //! Quantities of a finished run by name, as in `[check]` of a job.
 
-use crate::linear_algebra::tensor::larger;
+use crate::{io::output::csv::records, linear_algebra::tensor::larger};
 use std::path::Path;
 
 /// The quantity in the output folder of a run, if it exists.
@@ -37,15 +37,16 @@ pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
 
 /// The numbers of a column in the rows in which another column contains this word (in all rows without a filter).
 fn column(folder: &Path, table: &str, filter: Option<(&str, &str)>, name: &str) -> Option<Vec<f64>> {
-    let text = std::fs::read_to_string(folder.join(table)).ok()?;
-    let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let bytes = std::fs::read(folder.join(table)).ok()?;
+    let mut rows = records(&bytes).map(|record| record.entries);
     let header = rows.next()?;
     let place = |name: &str| header.iter().position(|column| *column == name);
     let (wanted, filter) = match filter {
         Some((column, word)) => (place(name)?, Some((place(column)?, word))),
         None => (place(name)?, None),
     };
-    let kept = rows.filter(|row| filter.is_none_or(|(column, word)| row.get(column) == Some(&word)));
+    let kept = rows
+        .filter(|row| filter.is_none_or(|(column, word)| row.get(column).is_some_and(|entry| entry == word)));
     kept.map(|row| row.get(wanted)?.parse().ok()).collect()
 }
 
@@ -72,7 +73,7 @@ mod tests {
         );
         write("history.csv", "step,work\n1,2.5\n2,3.5\n");
         write("resultants.csv", "step,source,force_x\n1,contact low,7\n1,momentum,9\n2,contact low,-3\n");
-        write("probes.csv", "step,probe,velocity_y\n1,a,1\n1,b,2\n2,a,3\n2,b,4\n");
+        write("probes.csv", "step,probe,velocity_y\n1,\"a, '\",1\n1,b,2\n2,\"a, '\",3\n2,b,4\n");
         write("profiles.csv", "time,profile,x,pressure\n1,low,0,9\n2,low,0,-1\n2,low,1,5\n2,top,0,7\n");
         let cases = [
             ("max_von_mises", 4.5),
@@ -81,9 +82,9 @@ mod tests {
             ("history.min.work", 2.5),
             ("resultant.contact low.force_x", -3.0),
             ("resultant.contact low.max.force_x", 7.0),
-            ("probe.a.velocity_y", 3.0),
+            ("probe.a, '.velocity_y", 3.0),
             ("probe.b.min.velocity_y", 2.0),
-            ("probe.a.max.velocity_y", 3.0),
+            ("probe.a, '.max.velocity_y", 3.0),
             ("profile.low.max.pressure", 5.0),
             ("profile.low.min.pressure", -1.0),
             ("profile.low.first.pressure", -1.0),

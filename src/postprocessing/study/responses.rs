@@ -1,7 +1,7 @@
 //! Responses: quantities of the finished runs.
 
 use super::{plan::Plan, quantity::quantity, results::Results};
-use crate::{laws::nearest::nearest, parallel::session::Session};
+use crate::{io::output::csv::records, laws::nearest::nearest, parallel::session::Session};
 use std::path::Path;
 
 /// Adds the responses of the completed runs; a quantity that a run does not have is an error of this run. Collective.
@@ -50,7 +50,7 @@ fn near(folder: &Path, name: &str) -> Option<String> {
         numbers(&summary, "", &mut known);
         return nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
     }
-    known.extend(read(table).lines().next().unwrap_or_default().split(',').map(str::to_owned));
+    known.extend(records(read(table).as_bytes()).next().into_iter().flat_map(|header| header.entries));
     nearest(column, known.iter().map(String::as_str)).map(|near| format!("{prefix}.{near}"))
 }
 

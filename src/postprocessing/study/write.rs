@@ -3,6 +3,7 @@
 use super::{orders::Refined, plan::Plan, plot, results::Results, table};
 use crate::{
     error::{Error, Result},
+    io::output::csv::entry,
     postprocessing::drawing::picture::Picture,
 };
 use std::path::Path;
@@ -43,7 +44,7 @@ fn over_time(results: &Results) -> String {
     for run in &results.runs {
         for (norm, place) in results.norms.iter().zip(&run.places) {
             for [time, error] in &place.over_time {
-                out.push_str(&format!("{},{},{time:e},{error:e}\n", run.name, norm.name));
+                out.push_str(&format!("{},{},{time:e},{error:e}\n", entry(&run.name), entry(&norm.name)));
             }
         }
     }
@@ -54,23 +55,24 @@ fn over_time(results: &Results) -> String {
 fn responses(results: &Results) -> String {
     let header = ["run"].into_iter().chain(results.sweep.iter().map(String::as_str));
     let header = header.chain(["status"]).chain(results.response.iter().map(String::as_str));
-    let mut out = line(header.map(str::to_owned));
+    let mut out = line(header.map(entry));
     for run in &results.runs {
-        let swept =
-            (0..results.sweep.len()).map(|at| run.sweep.get(at).map_or(String::new(), |value| value.text()));
+        let swept = (0..results.sweep.len())
+            .map(|at| run.sweep.get(at).map_or(String::new(), |value| cell(&value.text())));
         let values = run.response.iter().map(|value| number(*value));
-        out += &line([run.name.clone()].into_iter().chain(swept).chain([run.status.clone()]).chain(values));
+        out += &line([entry(&run.name)].into_iter().chain(swept).chain([entry(&run.status)]).chain(values));
     }
     out
 }
 
-/// A line of a CSV file; fields with separators are quoted.
-fn line(fields: impl Iterator<Item = String>) -> String {
-    let quoted = fields.map(|field| match field.contains([',', '"', '\n']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field,
-    });
-    quoted.collect::<Vec<_>>().join(",") + "\n"
+/// A line of a CSV file with these entries.
+fn line(entries: impl Iterator<Item = String>) -> String {
+    entries.collect::<Vec<_>>().join(",") + "\n"
+}
+
+/// A value of a key as an entry: a number as it is, and text.
+fn cell(value: &str) -> String {
+    if value.parse::<f64>().is_ok() { value.to_owned() } else { entry(value) }
 }
 
 /// A row for each run and norm; a run without errors has one row.
@@ -79,13 +81,13 @@ fn csv(results: &Results) -> String {
     for run in &results.runs {
         let cells: Vec<String> = run.cells.iter().map(u32::to_string).collect();
         let named = [
-            run.name.clone(),
-            run.scheme.clone(),
+            entry(&run.name),
+            entry(&run.scheme),
             cells.join("x"),
             run.step.to_string(),
             number(run.adaptive),
             format!("{:e}", run.tolerance),
-            run.status.clone(),
+            entry(&run.status),
         ];
         let seconds = |pick: fn(&super::record::Seconds) -> f64| number(run.seconds.as_ref().map(pick));
         let cost = [
@@ -104,7 +106,7 @@ fn csv(results: &Results) -> String {
             let order = |what: Refined| error.orders.iter().find(|order| order.refined == what);
             let shown = |what: Refined| number(order(what).map(|order| order.observed));
             let measured = [
-                norm.name.clone(),
+                entry(&norm.name),
                 number(Some(error.error)),
                 number(error.relative),
                 number(error.of_steps),
@@ -165,8 +167,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_with_separators_are_quoted() {
-        let fields = ["a", "if(t<1,2,3)", "\"x\""].map(str::to_owned);
-        assert_eq!(line(fields.into_iter()), "a,\"if(t<1,2,3)\",\"\"\"x\"\"\"\n");
+    fn swept_values_are_numbers_or_text_that_is_no_formula() {
+        let values = ["a", "-1.5", "if(t<1,2,3)", "\"x\"", "-1 + t"];
+        assert_eq!(
+            line(values.iter().map(|value| cell(value))),
+            "a,-1.5,\"if(t<1,2,3)\",\"\"\"x\"\"\",'-1 + t\n"
+        );
     }
 }
