@@ -100,3 +100,29 @@ fn a_step_that_cant_be_solved_at_the_smallest_length_ends_the_run() {
     outcome.says("failed");
     assert_eq!(case.results().summary()["status"], "failed");
 }
+
+#[test]
+fn a_stress_that_relaxes_to_a_small_share_keeps_its_accuracy_at_the_default_tolerance() {
+    // A stretched bar that creeps with 1e-3/s (stress / 10 Pa)^4: s' = -E rate (s / 10 Pa)^4.
+    let exact = (1e-3 + 3.0 * 1000.0 * 1e-3 * 1e-4 * 1e4f64).powf(-1.0 / 3.0);
+    for scheme in ["implicit_euler", "bdf2"] {
+        let case = Case::of("stress_relaxation")
+            .without("material.viscosity")
+            .set("material.hypothesis", "'plane_stress'")
+            .set(
+                "material.viscoplasticity",
+                "{ norton = { rate = 1e-3, reference_stress = 10.0, exponent = 4.0 } }",
+            )
+            .set("support", "[{ on = ['left'], fix = ['x'] }, { on = ['right'], fix = ['x'] }, { on = ['bottom'], fix = ['y'] }]")
+            .set("initial.displacement", "['0.01*x', '-0.0025*y']")
+            .set("time.scheme", &format!("'{scheme}'"))
+            .set("time.step", "1e-3")
+            .set("time.end", "1e4")
+            .set("time.adaptive", "{ smallest_step = 1e-6, largest_step = 1e3 }");
+        let results = case.run(1);
+        let force = results.table("resultants.csv").only("source", "support left").last("force_x").abs();
+        let steps = results.number("steps");
+        assert!(steps < 500.0, "{scheme}: {steps} steps");
+        assert!((force / exact - 1.0).abs() < 0.01, "{scheme}: {force} instead of {exact}");
+    }
+}

@@ -33,3 +33,4 @@ mod schemes;
 mod signals;
 mod stages;
 mod surfaces;
+mod wear;

@@ -63,7 +63,7 @@ pub use load::{Gravity, Load, Traction, WORK};
 pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use redistributed_mass::RedistributedMass;
-pub use step_error::{Curvature, StressError};
+pub use step_error::{CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, StressError};
 pub use support::{SupportMotion, Supports};
 pub use surface::{SurfaceEffect, SurfaceForce};
 pub use tangents::Tangents;

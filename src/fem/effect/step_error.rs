@@ -58,6 +58,33 @@ impl StressError {
     }
 }
 
+/// Squares of a quantity that a step changes, summed over points: of its error, of its deviation from its value at the start of the run,
+/// and of a deviation below which its error does not matter.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Deviation {
+    /// Of the error.
+    pub error: f64,
+    /// Of the deviation at the end of the step.
+    pub size: f64,
+    /// Of the negligible deviation.
+    pub negligible: f64,
+}
+
+impl Deviation {
+    /// Adds a value with this weight, given its error, its deviation and a negligible one.
+    pub(super) fn add(&mut self, weight: f64, [error, size, negligible]: [f64; 3]) {
+        self.error += weight * error * error;
+        self.size += weight * size * size;
+        self.negligible += weight * negligible * negligible;
+    }
+}
+
+/// Number of the quantities of contacts whose errors are measured against their own deviations: what friction keeps, wear, and
+/// displacement, velocity, angle and angular velocity of obstacles that forces move.
+pub const CONTACT_QUANTITIES: usize = 6;
+/// Number of those of them that belong to points.
+pub const FIRST_OF_OBSTACLES: usize = 2;
+
 #[cfg(test)]
 mod tests {
     use super::*;

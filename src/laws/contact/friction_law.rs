@@ -6,7 +6,7 @@
 //! is a parameter of the graph ([`FrictionBound::resolve`]), and also of the vector graph: the law is radial, so that the vectors
 //! `s`, velocity and traction have the same direction.
 
-use crate::laws::law::LawFault;
+use crate::laws::{law::LawFault, step::Blend};
 
 /// The point of a friction graph with a given parameter `s = c v + q`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,8 +28,12 @@ pub struct Slip {
 pub struct FrictionHistory {
     /// Its name in field files and checkpoints.
     pub name: &'static str,
+    /// The name of its value before the last step in checkpoints.
+    pub earlier_name: &'static str,
     /// Its value at the start of the run.
     pub initial: f64,
+    /// Share of the tolerance of adaptive steps that its error may take.
+    pub share: f64,
 }
 
 /// Bisection halves the bracket, so that more iterations than bits are useless.
@@ -77,11 +81,17 @@ pub trait FrictionBound {
         None
     }
 
-    /// Sets the history with which a step begins, and the length of the step in s.
-    fn start_step(&mut self, _history: f64, _length: f64) {}
+    /// Starts a step from this blend of the histories after the last step and before it.
+    fn start_step(&mut self, _histories: [f64; 2], _blend: Blend) {}
 
-    /// The history after a step of this length in s that began with `history`, at this sliding velocity in m/s at its end.
-    fn history_after(&self, history: f64, _length: f64, _speed: f64) -> f64 {
+    /// The history after a step that starts from this blend of the histories after the last step and before it, at this sliding velocity
+    /// in m/s at its end.
+    fn history_after(&self, [history, _]: [f64; 2], _blend: Blend, _speed: f64) -> f64 {
+        history
+    }
+
+    /// A number for a history, of whose changes one is of the size that changes the coefficient much.
+    fn history_measure(&self, history: f64) -> f64 {
         history
     }
 
@@ -164,20 +174,21 @@ macro_rules! friction_laws {
                 steepest_decrease() -> f64;
                 corner_velocity() -> f64;
                 history() -> Option<FrictionHistory>;
-                history_after(history: f64, length: f64, speed: f64) -> f64;
+                history_after(histories: [f64; 2], blend: Blend, speed: f64) -> f64;
+                history_measure(history: f64) -> f64;
                 own_faults() -> Vec<crate::laws::law::LawFault>;
                 resolve(s: f64, c: f64, pressure: f64) -> Slip;
             }
 
             /// See [`FrictionBound::start_step`].
             #[inline]
-            pub fn start_step(&mut self, history: f64, length: f64) {
-                each_friction_law!(FrictionLaw, self, law => FrictionBound::start_step(law, history, length));
+            pub fn start_step(&mut self, histories: [f64; 2], blend: Blend) {
+                each_friction_law!(FrictionLaw, self, law => FrictionBound::start_step(law, histories, blend));
             }
 
             /// The law in a first step of this length in s.
             pub fn in_step(mut self, length: f64) -> Self {
-                self.start_step(self.history().map_or(0.0, |history| history.initial), length);
+                self.start_step([self.history().map_or(0.0, |history| history.initial); 2], Blend::euler(length));
                 self
             }
 

@@ -30,7 +30,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    laws::{expression::Scalar, law::LawFault},
+    laws::{expression::Scalar, law::LawFault, step::Blend},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -111,7 +111,7 @@ mod tests {
     use proptest::prelude::*;
 
     const NOWHERE: NodeContext =
-        NodeContext { penetration: f64::NEG_INFINITY, step_length: 0.5, mean_from: None };
+        NodeContext { penetration: f64::NEG_INFINITY, step_length: 0.5, mean_from: None, erosion: 0.0 };
 
     fn wall(bound: Bound) -> NormalResponse {
         NormalResponse::Unilateral(Unilateral { bound, gap: None })
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn a_grazing_point_touches_without_pressure() {
         // 0.25 m away, 0.5 m/s, 0.5 s: it arrives as the step ends.
-        let node = NodeContext { penetration: -0.25, step_length: 0.5, mean_from: None };
+        let node = NodeContext { penetration: -0.25, step_length: 0.5, ..NodeContext::default() };
         for law in laws() {
             let found = law.resolve(1.0, 2.0, node);
             assert_eq!((found.velocity, found.pressure), (0.5, 0.0), "{law:?}");
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_gap_that_is_closed_exactly_bears_pressure_at_rest() {
-        let node = NodeContext { penetration: 0.0, step_length: 0.5, mean_from: None };
+        let node = NodeContext { penetration: 0.0, step_length: 0.5, ..NodeContext::default() };
         let wall = wall(Bound::Displacement);
         let held = wall.resolve(7.0, 2.0, node);
         assert_eq!((held.velocity, held.pressure, held.derivative), (0.0, 7.0, 0.0));
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn only_walls_are_pure_bounds() {
-        let node = NodeContext { penetration: -0.25, step_length: 0.5, mean_from: None };
+        let node = NodeContext { penetration: -0.25, step_length: 0.5, ..NodeContext::default() };
         let graph = |points, slope_before, slope_after| {
             NormalLaw::Graph(Graph { points, slope_before, slope_after }).response().unwrap()
         };
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn far_obstacles_take_no_digits_from_the_velocity() {
-        let node = NodeContext { penetration: -1e6, step_length: 1e-3, mean_from: None };
+        let node = NodeContext { penetration: -1e6, step_length: 1e-3, ..NodeContext::default() };
         for law in laws() {
             assert_eq!(law.resolve(0.1 * 3.0, 3.0, node).velocity, 0.1 * 3.0 / 3.0, "{law:?}");
         }

@@ -18,11 +18,15 @@ pub struct NodeContext {
     /// In steps that conserve energy `u_nu - gap` in m at the start: the pressure of a law with a potential is then its mean over the
     /// step. `None`: the pressure is that at the end.
     pub mean_from: Option<f64>,
+    /// Depth of wear in the step per contact pressure, in m/Pa. It is not part of the graph of a law: see
+    /// [`NormalResponse::resolve_worn`](super::NormalResponse::resolve_worn).
+    pub erosion: f64,
 }
 
 impl NodeContext {
     /// A point with closed gap at the start of a step of 1 s, in which velocity in m/s and penetration in m are equal.
-    pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0, mean_from: None };
+    pub const AT_THE_GAP: Self =
+        Self { penetration: 0.0, step_length: 1.0, mean_from: None, erosion: 0.0 };
 
     /// The penetration in m at the end of the step, at a normal velocity in m/s.
     pub(super) fn penetration_at(&self, velocity: f64) -> f64 {

@@ -25,7 +25,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
     }
     if contacts.iter().any(|c| c.wear.is_some()) {
         words.push(
-            "wear widens the gap between steps: theta of a step remains valid, but uniqueness of the continuous problem is not certified"
+            "wear widens the gap: theta of a step takes the sliding velocity that wears the surface off as given, but uniqueness of the continuous problem is not certified"
                 .into(),
         );
     }

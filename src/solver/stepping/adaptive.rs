@@ -5,19 +5,26 @@
 //! (x_n - x_{n-1} - w (x_{n-1} - x_{n-2}))` with `w = k_n / k_{n-1}`. For implicit Euler this is the local error; for schemes of
 //! second order it is a bound that is also valid where contact or flow starts. The velocity error is measured in the mass norm (in
 //! the norm of the viscosity for problems without inertia), relative to the largest velocity so far. The stress error is measured
-//! in the compliance norm, relative to the largest stress without viscosity so far. It includes the stress caused by the velocity
+//! in the compliance norm, relative to the present stress without viscosity, or to a twentieth of the largest so far: a stress that
+//! relaxes keeps its accuracy, and one that vanishes does not stop the run. It includes the stress caused by the velocity
 //! error in the step, and the errors of viscoplastic histories, damage, the bonding of adhesion and the memory pressure of contact.
+//! What friction and wear keep, and the motions of obstacles moved by forces, are measured against their own largest deviations from
+//! their values at the start: a state of friction may change little beside a large normal stress and still determine the motion.
 //! The accumulated strain of hardening cells needs no term of its own: it grows no faster than the flow, whose error is included in
 //! that of the histories.
 
 use super::{
-    Norms, StepError, StepOutcome, Stepper,
+    StepError, StepOutcome, Stepper,
     step_length::{Landing, TIME_TOLERANCE, next_step},
     time_dependent_data::TimeDependentData,
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, effect::Step, state::State},
+    fem::{
+        body::Body,
+        effect::{CONTACT_QUANTITIES, Step},
+        state::State,
+    },
     job,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -25,6 +32,8 @@ use serde::{Deserialize, Serialize};
 
 /// Steps at one level before the length may be doubled.
 const STEPS_BEFORE_GROWTH: u32 = 2;
+/// Share of the largest stress below which the present one does not count as smaller.
+const LEAST_SHARE: f64 = 0.05;
 /// Safety factor: share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
 
@@ -40,6 +49,9 @@ pub struct StepLevel {
     pub velocity: f64,
     /// Largest norm of the stress so far.
     pub stress: f64,
+    /// Largest deviations of the quantities of contacts from their values at the start so far.
+    #[serde(default)]
+    pub contact: [f64; CONTACT_QUANTITIES],
     /// Number of rejected steps.
     pub rejected: u64,
 }
@@ -58,6 +70,17 @@ pub struct Adaptive<const D: usize> {
     highest: i32,
     /// The current level.
     pub step_level: StepLevel,
+}
+
+impl StepLevel {
+    /// Keeps the norms of a step that exceed those so far.
+    fn keep_largest(&mut self, StepError { size, contact, .. }: &StepError) {
+        self.velocity = self.velocity.max(size.velocity);
+        self.stress = self.stress.max(size.stress);
+        for (largest, found) in self.contact.iter_mut().zip(contact) {
+            *largest = largest.max(found.size);
+        }
+    }
 }
 
 impl<const D: usize> Adaptive<D> {
@@ -107,11 +130,10 @@ impl<const D: usize> Adaptive<D> {
             let (step, landing) = self.choose_step(session, state, target);
             let is_shortest = self.level_of(step) <= self.lowest;
             match self.attempt(session, stepper, body, state, step) {
-                Ok((mut outcome, error, size)) if is_shortest || error <= self.settings.tolerance => {
+                Ok((mut outcome, error, found)) if is_shortest || error <= self.settings.tolerance => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
                     outcome.landed_on = landing.name.filter(|_| step.time == landing.time);
-                    self.step_level.velocity = self.step_level.velocity.max(size.velocity);
-                    self.step_level.stress = self.step_level.stress.max(size.stress);
+                    self.step_level.keep_largest(&found);
                     self.adjust_level(step, error);
                     return Ok(outcome);
                 }
@@ -163,7 +185,7 @@ impl<const D: usize> Adaptive<D> {
         body: &mut Body<D, S>,
         state: &State,
         step: Step,
-    ) -> Result<(StepOutcome, f64, Norms), Agreed> {
+    ) -> Result<(StepOutcome, f64, StepError), Agreed> {
         let outcome = session.agree(stepper.attempt(session, body, state, step))?;
         let step_error = session.agree(stepper.error(session, body, state, step))?;
         let error = self.relative(step_error);
@@ -174,7 +196,7 @@ impl<const D: usize> Adaptive<D> {
                 step.time
             ))
         };
-        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, step_error.size)) })
+        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, step_error)) })
     }
 
     /// Finds reference norms of velocity and stress for a body at rest from a trial step of the largest length, or to the end of
@@ -190,8 +212,8 @@ impl<const D: usize> Adaptive<D> {
         let landing = self.landing(session, state, target, self.longest());
         let step = next_step(state, self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
-            Ok((_, _, size)) => {
-                (self.step_level.velocity, self.step_level.stress) = (size.velocity, size.stress);
+            Ok((_, _, found)) => {
+                self.step_level.keep_largest(&found);
                 Ok(())
             }
             Err(error) if error.is_failure() => Ok(()),
@@ -217,14 +239,20 @@ impl<const D: usize> Adaptive<D> {
         ((step.length / self.first).log2() + 1e-9).floor() as i32
     }
 
-    /// The error relative to the largest norms so far; NaN if the error or a norm is NaN.
-    fn relative(&self, StepError { error, size, negligible }: StepError) -> f64 {
+    /// The error relative to the norms so far; NaN if the error or a norm is NaN.
+    fn relative(&self, StepError { error, size, negligible, contact }: StepError) -> f64 {
         let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.step_level.velocity.max(size.velocity);
         let largest_stress = self.step_level.stress.max(size.stress);
         let velocity = ratio(error.velocity, largest_velocity.max(negligible.velocity * largest_stress));
-        let stress = ratio(error.stress, largest_stress.max(negligible.stress * largest_velocity));
-        (velocity * velocity + stress * stress).sqrt()
+        let present_stress = size.stress.max(LEAST_SHARE * largest_stress);
+        let stress = ratio(error.stress, present_stress.max(negligible.stress * largest_velocity));
+        let mut square = velocity * velocity + stress * stress;
+        for (largest, found) in self.step_level.contact.iter().zip(contact) {
+            let ratio = ratio(found.error, largest.max(found.size).max(found.negligible));
+            square += ratio * ratio;
+        }
+        square.sqrt()
     }
 
     /// The level whose error is expected to be within the tolerance: the error is proportional to the square of the length.
@@ -264,6 +292,7 @@ impl<const D: usize> Adaptive<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{fem::effect::Deviation, solver::stepping::Norms};
 
     fn adaptive() -> Adaptive<2> {
         let settings = job::Adaptive { tolerance: 1e-2, smallest_step: 0.001, largest_step: 0.1 };
@@ -316,6 +345,7 @@ mod tests {
             error: norms(error),
             size: norms(size),
             negligible: norms([1e-3, 1e-2]),
+            contact: [Deviation::default(); CONTACT_QUANTITIES],
         };
         let mut adaptive = adaptive();
         (adaptive.step_level.velocity, adaptive.step_level.stress) = (2.0, 0.5);
@@ -341,6 +371,35 @@ mod tests {
             (adaptive.relative(step_error([0.0, 1e-4], [5.0, 1e-9])) - 2e-3).abs() < 1e-15,
             "a free body: 1e-4 of 5e-2"
         );
+    }
+
+    #[test]
+    fn quantities_of_contacts_are_measured_against_their_own_deviations() {
+        let mut adaptive = adaptive();
+        (adaptive.step_level.velocity, adaptive.step_level.stress) = (1.0, 1e9);
+        adaptive.step_level.contact[1] = 4.0;
+        let mut contact = [Deviation::default(); CONTACT_QUANTITIES];
+        contact[0] = Deviation { error: 0.06, size: 0.2, negligible: 0.1 };
+        contact[1] = Deviation { error: 1.6, size: 3.0, negligible: 0.1 };
+        contact[2] = Deviation { error: 1e-12, size: 1e-12, negligible: 1e-9 };
+        let found = |contact| StepError { contact, ..StepError::default() };
+        assert!((adaptive.relative(found(contact)) - 0.5).abs() < 1e-5, "0.3 and 0.4, the largest was 4");
+        adaptive.step_level.keep_largest(&found(contact));
+        assert_eq!(adaptive.step_level.contact[..3], [0.2, 4.0, 1e-12]);
+        contact[0].error = f64::NAN;
+        assert!(adaptive.relative(found(contact)).is_nan());
+    }
+
+    #[test]
+    fn a_stress_that_relaxes_is_measured_against_the_present_one() {
+        let mut adaptive = adaptive();
+        adaptive.step_level.stress = 100.0;
+        let relative = |present: f64| {
+            let norms = |stress| Norms { velocity: 0.0, stress };
+            adaptive.relative(StepError { error: norms(1.0), size: norms(present), ..StepError::default() })
+        };
+        assert!((relative(25.0) - 1.0 / 25.0).abs() < 1e-15);
+        assert!((relative(0.0) - 1.0 / 5.0).abs() < 1e-15, "one that vanishes");
     }
 
     #[test]

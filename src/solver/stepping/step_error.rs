@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Curvature, Form, Step},
+        effect::{CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, Form, Step},
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
@@ -33,6 +33,8 @@ pub struct StepError {
     pub size: Norms,
     /// A velocity below this multiple of the stress is a rounding error, and a stress below this multiple of the velocity.
     pub negligible: Norms,
+    /// Norms of the quantities of contacts, squares in the calculation of the step.
+    pub contact: [Deviation; CONTACT_QUANTITIES],
 }
 
 /// Work space for nodal values with ghosts.
@@ -86,6 +88,7 @@ impl ErrorWorkspace {
             write(end, start.local()?.iter().zip(trial.iter()).map(|(u, v)| u + length * v));
             body.stress_error(curvature, end)
         };
+        let contact = contact_deviations(session, body, curvature, (&*end, &*trial), step);
         let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
         let mut square = |form: Option<Form>, x: &[f64]| {
             let Some(form) = form else { return 0.0 };
@@ -114,8 +117,37 @@ impl ErrorWorkspace {
             error: Norms { velocity, stress },
             size: Norms { velocity: all_velocity, stress: all_stress },
             negligible: Norms { velocity: NEGLIGIBLE / unit, stress: NEGLIGIBLE * unit },
+            contact,
         })
     }
+}
+
+/// The norms of the quantities of all contacts over all ranks. Collective where there is contact.
+fn contact_deviations<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    curvature: Curvature,
+    motion: (&[f64], &[f64]),
+    step: Step,
+) -> [Deviation; CONTACT_QUANTITIES] {
+    let mut all = [Deviation::default(); CONTACT_QUANTITIES];
+    if body.contacts.is_empty() {
+        return all;
+    }
+    let mut squares = [[0.0; 3]; CONTACT_QUANTITIES];
+    for contact in &body.contacts {
+        for (sum, found) in squares.iter_mut().zip(contact.deviations(curvature, motion, step.length)) {
+            let found = [found.error, found.size, found.negligible];
+            sum.iter_mut().zip(found).for_each(|(sum, square)| *sum += square);
+        }
+    }
+    for (at, (out, squares)) in all.iter_mut().zip(squares).enumerate() {
+        // All ranks have the same obstacles.
+        let copies = if at < FIRST_OF_OBSTACLES { 1.0 } else { session.ranks() as f64 };
+        let [error, size, negligible] = session.sum(squares).map(|square| (square / copies).sqrt());
+        *out = Deviation { error, size, negligible };
+    }
+    all
 }
 
 /// Replaces the previous values by these.

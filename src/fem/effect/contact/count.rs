@@ -53,7 +53,8 @@ impl<const D: usize> Contact<D> {
             count.open += usize::from(point.pressure_at(&self.law, Newton, velocity) == 0.0);
             let along = point.normal_component(Newton, velocity);
             let branch = if point.unknown == Unknown::Parameter {
-                let found = self.law.resolve(self.scale * along + point.pressure, self.scale, point.context);
+                let found =
+                    self.law.resolve_worn(self.scale * along + point.pressure, self.scale, point.context);
                 count.held += usize::from(found.derivative == 0.0);
                 found.branch
             } else {

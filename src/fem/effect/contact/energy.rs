@@ -50,7 +50,8 @@ impl<const D: usize> Contact<D> {
             }
             let mean = if with_means { 0.5 * (pressure + self.pressure_before(point)) } else { pressure };
             let change = point.context.step_length * v;
-            let after = point.context.penetration + change;
+            let eroded = point.worn[0] - point.worn[1] - point.continued_wear;
+            let after = point.context.penetration + change - eroded;
             // Without an obstacle at the start, or at the end, nothing is exchanged there.
             let times = |pressure: f64, way: f64| {
                 if pressure == 0.0 || !way.is_finite() { 0.0 } else { pressure * way }

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::space::Held,
+    fem::{effect::Blend, space::Held},
     laws::contact::FrictionLaw,
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     mesh::Mesh,
@@ -91,7 +91,7 @@ impl<const D: usize> Friction<D> {
                 tangents,
                 count,
                 law,
-                history: law.history().map_or(0.0, |history| history.initial),
+                history: [law.history().map_or(0.0, |history| history.initial); 2],
                 pressure: 0.0,
                 traction: [0.0; D],
                 tangent: Tangent::free(),
@@ -122,16 +122,16 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Starts a step of this length in s.
-    pub(super) fn start_step(&mut self, length: f64) {
+    /// Starts a step from this blend of earlier histories.
+    pub(super) fn start_step(&mut self, blend: Blend) {
         if let Some(history) = self.law.history() {
-            self.law.start_step(history.initial, length);
-            self.points.iter_mut().for_each(|point| point.law.start_step(point.history, length));
+            self.law.start_step([history.initial; 2], blend);
+            self.points.iter_mut().for_each(|point| point.law.start_step(point.history, blend));
         }
     }
 
-    /// Advances the histories by a step of this length in s at these velocities at its end, with ghosts.
-    pub(super) fn advance_histories(&mut self, velocity: &[f64], length: f64) {
+    /// Advances the histories by a step from this blend of earlier ones, at these velocities at its end, with ghosts.
+    pub(super) fn advance_histories(&mut self, velocity: &[f64], blend: Blend) {
         if self.law.history().is_none() {
             return;
         }
@@ -140,7 +140,7 @@ impl<const D: usize> Friction<D> {
             let along = point.along(Body, velocity);
             let obstacle = obstacle_velocities.get(at).map_or([0.0; D], |obstacle| *obstacle);
             let speed = norm(&add_scaled(&along, -1.0, &obstacle));
-            point.history = point.law.history_after(point.history, length, speed);
+            point.history = [point.law.history_after(point.history, blend, speed), point.history[0]];
         }
     }
 

@@ -39,7 +39,7 @@ impl<const D: usize> Contact<D> {
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
         let distance = |p: &Point<D>| {
             let pressure = p.pressure_at(&self.law, Newton, velocity) - p.open_pressure(residual);
-            self.law.distance(p.normal_component(Newton, velocity), pressure, p.context, range)
+            self.law.distance_worn(p.normal_component(Newton, velocity), pressure, p.context, range)
         };
         let normal = worst(free.map(distance));
         let Some(friction) = &self.friction else { return normal };

@@ -57,6 +57,8 @@ pub struct LoadedMotion {
     mass: f64,
     /// Displacement in m (angle) and velocity in m/s (rad/s) after the last step, and before it.
     converged: [f64; 2],
+    /// The same at the start of the run.
+    start: [f64; 2],
     earlier: [f64; 2],
     /// Displacement at the end of the current step, and the velocity in its equations.
     trial: [f64; 2],
@@ -162,7 +164,8 @@ impl LoadedMotion {
         let start = [0.0, velocity];
         let (converged, earlier, trial) = (start, start, start);
         let travel = Travel::to_end(Blend::euler(0.0));
-        Self { force, mass, converged, earlier, trial, resultant: [0.0; 2], stiffness: [0.0; 2], travel }
+        let (resultant, stiffness) = ([0.0; 2], [0.0; 2]);
+        Self { force, mass, converged, start, earlier, trial, resultant, stiffness, travel }
     }
 
     /// The force as a function of time.
@@ -173,6 +176,11 @@ impl LoadedMotion {
     /// Displacement in m and velocity in m/s after the last step.
     pub fn motion(&self) -> [f64; 2] {
         self.converged
+    }
+
+    /// Displacement and velocity, each at the end of the step, after the last one, before it, and at the start of the run.
+    pub fn last_values(&self) -> [[f64; 4]; 2] {
+        [0, 1].map(|kind| [self.trial[kind], self.converged[kind], self.earlier[kind], self.start[kind]])
     }
 
     /// Displacement and velocity after the last step and before it, for checkpoints.

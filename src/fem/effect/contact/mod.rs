@@ -40,7 +40,10 @@ mod unknowns;
 
 use crate::{
     error::Result,
-    fem::space::{Held, surface_points},
+    fem::{
+        effect::Blend,
+        space::{Held, surface_points},
+    },
     laws::contact::{Gap, NormalResponse, Wear},
     linear_algebra::tensor::{Vector, larger, norm},
     mesh::Mesh,
@@ -89,6 +92,8 @@ pub struct Contact<const D: usize> {
     pub scale: f64,
     /// Length in s of the current step, as laws of the displacement see it.
     step_length: f64,
+    /// The blend of earlier histories from which those of friction and wear start in the current step.
+    blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
     pub reference: ReferenceValues,
     facets: Vec<u32>,
@@ -150,6 +155,7 @@ impl<const D: usize> Contact<D> {
             wear: None,
             scale,
             step_length: 0.0,
+            blend: Blend::euler(0.0),
             reference,
             facets: facets.to_vec(),
             points,
@@ -189,11 +195,11 @@ impl<const D: usize> Contact<D> {
         self.obstacle.iter_mut().for_each(LoadedObstacle::commit);
     }
 
-    /// The gap in m of a point at `time`, where the obstacle is after the last step, and with the wear that this step has seen.
+    /// The gap in m of a point at `time`, where the obstacle is after the last step, with the wear until then.
     fn gap_at(&self, time: f64, point: &Point<D>) -> Result<f64> {
         let place = &point.place;
         let seen = self.obstacle.as_ref().map_or(*place, |obstacle| obstacle.seen_before(place));
-        Ok(self.gap.at(time, &seen, &point.normal)? + point.worn[1])
+        Ok(self.gap.at(time, &seen, &point.normal)? + point.worn[0])
     }
 
     /// Whether the surface of the obstacle may move.

@@ -21,12 +21,12 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Converts velocities into unknowns, with the pressures of the law at these velocities; where its graph has vertical parts,
-    /// with the pressures of the points.
+    /// Converts velocities into unknowns, with the pressures of the law at these velocities; where its graph has vertical parts or depends
+    /// on the sliding velocity, with the pressures of the points.
     pub fn unmap(&self, values: &mut [f64]) {
-        let has_vertical_parts = self.law.has_vertical_parts();
+        let has_own_pressures = self.law.has_vertical_parts() || self.wear.is_some();
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
-            let pressure = if has_vertical_parts {
+            let pressure = if has_own_pressures {
                 point.pressure
             } else {
                 self.law.pressure(point.normal_component(Newton, values), point.context)
@@ -40,6 +40,7 @@ impl<const D: usize> Contact<D> {
 
     /// Converts unknowns into velocities, and sets the corresponding pressures of the points.
     pub fn map(&mut self, values: &mut [f64]) {
+        self.erode(values);
         let (law, scale) = (&self.law, self.scale);
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let along = point.along(Newton, values);
@@ -71,7 +72,9 @@ impl<const D: usize> Contact<D> {
             let along = point.normal_component(Newton, velocity);
             let branch = match point.unknown {
                 Unknown::Parameter => {
-                    self.law.resolve(self.scale * along + point.pressure, self.scale, point.context).branch
+                    self.law
+                        .resolve_worn(self.scale * along + point.pressure, self.scale, point.context)
+                        .branch
                 }
                 Unknown::Velocity => self.law.branch(along, point.context),
                 Unknown::Held => 0,

@@ -64,8 +64,10 @@ pub(super) struct Point<const D: usize> {
     pub context: NodeContext,
     /// `u_nu - gap` in m, with both values at the start of the step.
     pub penetration_before: f64,
-    /// Depths of wear in m: the present one, and that before the last step.
+    /// Depths of wear in m: after the last step, and before it.
     pub worn: [f64; 2],
+    /// Depth in m by which the blend of a two-step scheme continues the wear of the last step.
+    pub continued_wear: f64,
     /// Growth of the gap in the step by the motion of the obstacle, in m.
     pub growth: f64,
     /// Contribution of the blend of a two-step scheme to the penetration, in m.
@@ -99,6 +101,7 @@ impl<const D: usize> Point<D> {
             context: NodeContext::default(),
             penetration_before: 0.0,
             worn: [0.0; 2],
+            continued_wear: 0.0,
             growth: 0.0,
             blend_offset: 0.0,
             pressure_before: 0.0,
@@ -242,7 +245,7 @@ impl<const D: usize> Point<D> {
     /// The point of the law's graph for the unknown `along` the direction.
     #[inline]
     pub(super) fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
-        law.resolve(scale * self.free_length * along, scale, self.context)
+        law.resolve_worn(scale * self.free_length * along, scale, self.context)
     }
 
     /// The magnitude of the normal velocity in m/s that would close the gap in the step; 0 for laws without a gap.

@@ -17,9 +17,7 @@ impl<const D: usize> Contact<D> {
     /// Evaluates the gap and the obstacle's motion for a step of this length to `time`, from the displacement at its start (with
     /// ghosts).
     pub fn prepare(&mut self, time: f64, length: f64, displacement: &[f64]) -> Result<()> {
-        if let Some(friction) = &mut self.friction {
-            friction.start_step(length);
-        }
+        self.start_histories(Blend::euler(length));
         if !self.law.depends_on_displacement() {
             return Ok(());
         }
@@ -32,11 +30,12 @@ impl<const D: usize> Contact<D> {
             let gap = self.gap.at(time, &after, &point.normal)?;
             let before = self.gap.at(time - length, &before, &point.normal)?;
             let along = point.normal_component(Body, displacement);
-            let [worn, worn_before] = point.worn;
+            let [worn, _] = point.worn;
             point.context =
-                NodeContext { penetration: along - gap - worn, step_length: length, mean_from: None };
-            point.penetration_before = along - before - worn_before;
+                NodeContext { penetration: along - gap - worn, step_length: length, mean_from: None, erosion: 0.0 };
+            point.penetration_before = along - before - worn;
             point.blend_offset = 0.0;
+            point.continued_wear = 0.0;
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
@@ -66,6 +65,12 @@ impl<const D: usize> Contact<D> {
         Ok(())
     }
 
+    /// Starts the histories of friction from this blend of earlier ones, as whose length the laws see the step.
+    pub fn start_histories(&mut self, blend: Blend) {
+        self.blend = blend;
+        self.friction.iter_mut().for_each(|friction| friction.start_step(blend));
+    }
+
     /// To be called after [`Contact::prepare`]: the displacement at the end is `u_{n-1} + shift + length v_n` with the length of
     /// the blend and a nodal shift with ghosts. The obstacle's velocity follows from its positions by the same formula.
     pub fn blend(&mut self, step: Step, blend: Blend, shift: &[f64]) -> Result<()> {
@@ -76,7 +81,9 @@ impl<const D: usize> Contact<D> {
         for point in &mut self.points {
             debug_assert!(point.blend_offset == 0.0, "the point was prepared");
             point.blend_offset = point.normal_component(Body, shift);
-            point.context.penetration += point.blend_offset;
+            let [worn, before] = point.worn;
+            point.continued_wear = -blend.earlier * (worn - before);
+            point.context.penetration += point.blend_offset - point.continued_wear;
             point.context.step_length = blend.length;
         }
         let before = step.time - step.length;

@@ -100,7 +100,7 @@ impl<const D: usize> Contact<D> {
                 let along = point.normal_component(Body, velocity);
                 let parameter = self.scale * along + state.pressure;
                 state.branch = match point.unknown {
-                    Unknown::Parameter => self.law.resolve(parameter, self.scale, point.context).branch,
+                    Unknown::Parameter => self.law.resolve_worn(parameter, self.scale, point.context).branch,
                     _ => self.law.branch(along, point.context),
                 };
             }

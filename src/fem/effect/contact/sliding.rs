@@ -3,12 +3,18 @@
 use super::{
     Contact,
     friction::Friction,
-    point::Vectors::{self, Body},
+    point::{
+        Point, Unknown,
+        Vectors::{self, Body, Newton},
+    },
 };
 use crate::{
     error::{Error, Result},
-    fem::space::Held,
-    laws::contact::FrictionLaw,
+    fem::{
+        effect::{Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES},
+        space::Held,
+    },
+    laws::contact::{FrictionLaw, NodeContext, Wear},
     linear_algebra::tensor::{Vector, larger, norm},
     mesh::Mesh,
 };
@@ -60,30 +66,109 @@ impl<const D: usize> Contact<D> {
 
     /// Advances the histories of friction and wear by a step of this length in s, at its velocities with ghosts.
     pub fn advance_histories(&mut self, velocity: &[f64], length: f64) {
+        let blend = self.blend_to_end(length);
         let Some(friction) = &mut self.friction else { return };
-        friction.advance_histories(velocity, length);
+        friction.advance_histories(velocity, blend);
         let Some(wear) = self.wear else { return };
         for (sliding, slip) in friction.sliding(Body, velocity) {
             let point = &mut self.points[sliding.at];
-            let pressure = point.pressure_at(&self.law, Body, velocity);
-            let [worn, _] = point.worn;
-            point.worn = [worn + wear.depth(pressure, length * norm(&slip)), worn];
+            let after = worn_after(point, wear, (velocity, norm(&slip)));
+            point.worn = [after, point.worn[0]];
         }
+    }
+
+    /// The blend of earlier histories from which those at the end of a step of this length in s follow. Schemes without such a blend may
+    /// balance forces before the end of the step.
+    fn blend_to_end(&self, length: f64) -> Blend {
+        if self.blend.earlier == 0.0 { Blend::euler(length) } else { self.blend }
+    }
+
+    /// Sets the erosion at the points in the current step for these unknowns of Newton's method: wear and friction follow the pressure,
+    /// which falls with the wear and therefore with the sliding velocity.
+    ///
+    /// The iteration for both increases toward the smallest sliding velocity that solves them. It contracts by about the friction
+    /// coefficient times the depth of wear per slip, `coefficient p`; derivatives in Newton's method omit this coupling for the same reason.
+    pub(super) fn erode(&mut self, values: &[f64]) {
+        let Some((wear, friction)) = self.wear.zip(self.friction.as_ref()) else { return };
+        for sliding in &friction.points {
+            let point = &mut self.points[sliding.at];
+            if point.unknown != Unknown::Parameter {
+                continue;
+            }
+            let parameter = friction.scale * norm(&sliding.along(Newton, values));
+            let along = point.along(Newton, values);
+            point.context.erosion = 0.0;
+            for _ in 0..EROSION_ITERATIONS {
+                let pressure = if friction.follows {
+                    point.resolve(&self.law, self.scale, along).pressure
+                } else {
+                    sliding.pressure
+                };
+                let speed = sliding.law.resolve(parameter, friction.scale, pressure).speed;
+                let erosion = wear.erosion(point.context.step_length * speed);
+                let change = erosion - point.context.erosion;
+                point.context.erosion = erosion;
+                if change.abs() <= f64::EPSILON * erosion {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// The errors of what friction, wear and the obstacle keep, on this rank, in a step of this length in s that was solved and not yet
+    /// committed, at its velocities with ghosts; see [`CONTACT_QUANTITIES`]. All ranks have the same obstacle.
+    pub fn deviations(
+        &self,
+        curvature: Curvature,
+        (displacement, velocity): (&[f64], &[f64]),
+        length: f64,
+    ) -> [Deviation; CONTACT_QUANTITIES] {
+        let mut out = [Deviation::default(); CONTACT_QUANTITIES];
+        if let Some(obstacle) = &self.obstacle {
+            for (number, motion) in obstacle.motions().into_iter().enumerate() {
+                let Some(motion) = motion else { continue };
+                for (kind, [now, before, earlier, start]) in motion.last_values().into_iter().enumerate() {
+                    let error = curvature.error([now, before, earlier]);
+                    out[FIRST_OF_OBSTACLES + 2 * number + kind]
+                        .add(1.0, [error, now - start, ROUNDING_SHARE * now]);
+                }
+            }
+        }
+        let Some(friction) = &self.friction else { return out };
+        let blend = self.blend_to_end(length);
+        for (sliding, slip) in friction.sliding(Body, velocity) {
+            let (speed, point) = (norm(&slip), &self.points[sliding.at]);
+            if let Some(history) = sliding.law.history() {
+                let after = sliding.law.history_after(sliding.history, blend, speed);
+                let values = [after, sliding.history[0], sliding.history[1], history.initial];
+                let [now, before, earlier, start] = values.map(|value| sliding.law.history_measure(value));
+                let error = curvature.error([now, before, earlier]) / history.share;
+                out[0].add(sliding.weight, [error, now - start, NEGLIGIBLE_HISTORY]);
+            }
+            if let Some(wear) = self.wear {
+                let after = worn_after(point, wear, (velocity, speed));
+                let error = curvature.error([after, point.worn[0], point.worn[1]]);
+                let moved = point.normal_component(Body, displacement);
+                out[1].add(sliding.weight, [error, after, ROUNDING_SHARE * moved]);
+            }
+        }
+        out
     }
 
     /// The names of the histories that friction and wear keep at nodes. Fields show the first ones; `all` has those, too, that only the
     /// next step needs.
     pub fn history_names(&self, all: bool) -> impl Iterator<Item = &'static str> {
-        let friction = self.friction.iter().filter_map(|friction| friction.law.history());
-        let worn = self.wear.iter().flat_map(move |_| WORN.into_iter().take(if all { 2 } else { 1 }));
-        friction.map(|history| history.name).chain(worn)
+        let count = if all { 2 } else { 1 };
+        let friction = self.friction.iter().filter_map(|friction| names(&friction.law));
+        let worn = self.wear.iter().map(|_| WORN);
+        friction.chain(worn).flat_map(move |names| names.into_iter().take(count))
     }
 
     /// The history of this name at each of its nodes on this rank.
     pub fn history(&self, name: &str) -> Vec<(usize, f64)> {
         let Some(friction) = &self.friction else { return Vec::new() };
-        if has_history(&friction.law, name) {
-            return friction.points.iter().map(|point| (point.node(), point.history)).collect();
+        if let Some(at) = position_of_history(&friction.law, name) {
+            return friction.points.iter().map(|point| (point.node(), point.history[at])).collect();
         }
         let Some(at) = self.position_of_wear(name) else { return Vec::new() };
         friction.points.iter().map(|sliding| (sliding.node(), self.points[sliding.at].worn[at])).collect()
@@ -91,9 +176,11 @@ impl<const D: usize> Contact<D> {
 
     /// Sets the history of this name from values at the owned nodes of the body.
     pub fn restore_history(&mut self, name: &str, nodal: &[f64]) {
-        let friction = self.friction.iter_mut().filter(|friction| has_history(&friction.law, name));
-        let points = friction.flat_map(|friction| &mut friction.points);
-        points.for_each(|point| point.history = nodal[point.node()]);
+        if let Some(friction) = &mut self.friction
+            && let Some(at) = position_of_history(&friction.law, name)
+        {
+            friction.points.iter_mut().for_each(|point| point.history[at] = nodal[point.node()]);
+        }
         if let Some(at) = self.position_of_wear(name) {
             self.points.iter_mut().for_each(|point| point.worn[at] = nodal[point.node()]);
         }
@@ -151,9 +238,30 @@ impl<const D: usize> Contact<D> {
     }
 }
 
+/// Largest number of iterations for the erosion at a point.
+const EROSION_ITERATIONS: usize = 50;
+
+/// The depth of wear in m of a point at the end of the step just solved, at its velocities with ghosts and this sliding velocity in m/s.
+fn worn_after<const D: usize>(point: &Point<D>, wear: Wear, (velocity, speed): (&[f64], f64)) -> f64 {
+    let continued = point.continued_wear;
+    let NodeContext { penetration, step_length, .. } = point.context;
+    let unworn = penetration + continued + step_length * point.normal_component(Body, velocity);
+    point.worn[0] + Wear::depth(point.pressure, wear.erosion(step_length * speed), [continued, unworn])
+}
+
+/// A change of a friction history, in its measure, that matters for no result.
+const NEGLIGIBLE_HISTORY: f64 = 1e-3;
+/// Share of a displacement or a velocity that is a rounding error.
+const ROUNDING_SHARE: f64 = 1e-9;
+
 /// Names of the depths of wear: the present one, and that before the last step.
 const WORN: [&str; 2] = ["wear", "previous_wear"];
 
-fn has_history(law: &FrictionLaw, name: &str) -> bool {
-    law.history().is_some_and(|history| history.name == name)
+/// The names of what a friction law keeps: the present value, and that before the last step.
+fn names(law: &FrictionLaw) -> Option<[&'static str; 2]> {
+    law.history().map(|history| [history.name, history.earlier_name])
+}
+
+fn position_of_history(law: &FrictionLaw, name: &str) -> Option<usize> {
+    names(law)?.iter().position(|known| *known == name)
 }

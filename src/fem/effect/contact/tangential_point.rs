@@ -22,8 +22,8 @@ pub(super) struct TangentialPoint<const D: usize> {
     pub count: usize,
     /// The law in the current step.
     pub law: FrictionLaw,
-    /// What the law keeps, if it has a history.
-    pub history: f64,
+    /// What the law keeps, if it has a history: after the last step, and before it.
+    pub history: [f64; 2],
     /// The contact pressure in Pa that determines the bound.
     pub pressure: f64,
     /// `q` in Pa at the last evaluation.

@@ -187,7 +187,7 @@ mod tests {
             [0.0, 50.0, 12.5]
         );
         // d + 0.5 * 100 d = 1.02 with d = 0.02.
-        let node = NodeContext { penetration: 0.02, step_length: 1.0, mean_from: None };
+        let node = NodeContext { penetration: 0.02, step_length: 1.0, ..NodeContext::default() };
         let found = law.resolve(2.0, 2.0, node);
         assert!((found.pressure - 2.0).abs() < 1e-14 && found.velocity.abs() < 1e-14);
         assert!((found.derivative - 1.0 / 102.0).abs() < 1e-16);
@@ -201,7 +201,7 @@ mod tests {
             exponent in 1.0f64..2.0, stiffness in 0.1f64..1e4, start in -1.0f64..1.0, s in -1e3f64..1e3, c in 0.1f64..100.0,
         ) {
             let law = Compliance { stiffness, exponent, gap: None };
-            let node = NodeContext { penetration: start, step_length: 0.1, mean_from: None };
+            let node = NodeContext { penetration: start, step_length: 0.1, ..NodeContext::default() };
             let found = law.resolve(s, c, node);
             let open = c * found.velocity + law.pressure(found.velocity, node) - s;
             let size = s.abs() + c * found.velocity.abs() + (1.0 + law.stiffness_at(start.max(0.0)) ) * 1e-2;

@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn glue_stretches_tears_and_lets_go_by_hand() {
         let law = glue(1e4);
-        let at = |penetration| NodeContext { penetration, step_length: 0.5, mean_from: None };
+        let at = |penetration| NodeContext { penetration, step_length: 0.5, ..NodeContext::default() };
         // 1 mm/s for 0.5 s from the obstacle: 0.5 mm away, 1 Pa, slope 2 Pa / 1 mm * 0.5 s.
         assert!((law.pressure(-1e-3, at(0.0)) + 1.0).abs() < 1e-15);
         assert!((law.slope(-1e-3, at(0.0)) - 1e3).abs() < 1e-9);
@@ -284,7 +284,7 @@ mod tests {
     #[test]
     fn a_rigid_obstacle_behind_the_glue_bears_any_pressure() {
         let law = glue(f64::INFINITY);
-        let node = NodeContext { penetration: -5e-4, step_length: 0.5, mean_from: None };
+        let node = NodeContext { penetration: -5e-4, step_length: 0.5, ..NodeContext::default() };
         let found = law.resolve(1e4 * 1e-3 + 30.0, 1e4, node);
         assert!((found.velocity - 1e-3).abs() < 1e-15 && (found.pressure - 30.0).abs() < 1e-11, "{found:?}");
         assert_eq!((found.derivative, found.branch), (0.0, 3));
@@ -305,7 +305,7 @@ mod tests {
             s in -50.0f64..50.0, penetration in -8e-3f64..2e-3, length in 0.01f64..2.0, more in 1.05f64..5.0,
         ) {
             let law = glue(1e4);
-            let node = NodeContext { penetration, step_length: length, mean_from: None };
+            let node = NodeContext { penetration, step_length: length, ..NodeContext::default() };
             let c = more * law.monotonicity_constant(length) + 0.1;
             let found = law.resolve(s, c, node);
             prop_assert!((c * found.velocity + found.pressure - s).abs() < 1e-12 * (1.0 + s.abs()));

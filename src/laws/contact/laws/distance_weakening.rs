@@ -9,11 +9,12 @@
 //! ```
 //!
 //! Within a step of length `k` that starts with the slip `s0`, the slip at the end is `s0 + k v`: a law of the sliding velocity whose
-//! steepest decrease is `k (static - dynamic) / distance p`.
+//! steepest decrease is `k (static - dynamic) / distance p`. In a two-step scheme `s0` is its blend of the last two slips and `k` its length.
 
 use crate::laws::{
     contact::friction_law::{FrictionBound, FrictionHistory},
     law::LawFault,
+    step::Blend,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,7 +31,7 @@ pub enum Decay {
 }
 
 /// Friction whose coefficient decreases from static to dynamic with the accumulated slip distance of a point. Field files and
-/// checkpoints contain the slip as `slip`, which with every time scheme has an error of first order in the step.
+/// checkpoints contain the slip as `slip`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DistanceWeakening {
@@ -47,7 +48,7 @@ pub struct DistanceWeakening {
     /// The decrease of the coefficient.
     #[serde(default)]
     pub decay: Decay,
-    /// Slip in m at the start of the step, and length of the step in s.
+    /// Slip in m from which the step starts, and length of the step in s.
     #[serde(skip)]
     pub step: [f64; 2],
 }
@@ -90,15 +91,20 @@ impl FrictionBound for DistanceWeakening {
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        Some(FrictionHistory { name: "slip", initial: 0.0 })
+        Some(FrictionHistory { name: "slip", earlier_name: "previous_slip", initial: 0.0, share: 1.0 })
     }
 
-    fn start_step(&mut self, slip: f64, length: f64) {
-        self.step = [slip, length];
+    fn start_step(&mut self, [recent, earlier]: [f64; 2], blend: Blend) {
+        self.step = [blend.of(recent, earlier), blend.length];
     }
 
-    fn history_after(&self, slip: f64, length: f64, speed: f64) -> f64 {
-        slip + length * speed
+    /// Where a point comes to rest its slip ends, whatever the blend of a two-step scheme continues.
+    fn history_after(&self, [recent, earlier]: [f64; 2], blend: Blend, speed: f64) -> f64 {
+        if speed == 0.0 { recent } else { blend.of(recent, earlier) + blend.length * speed }
+    }
+
+    fn history_measure(&self, slip: f64) -> f64 {
+        slip / self.distance
     }
 
     fn own_faults(&self) -> Vec<LawFault> {
@@ -117,7 +123,7 @@ mod tests {
 
     fn law(decay: Decay, slip: f64, length: f64) -> DistanceWeakening {
         let mut law = DistanceWeakening { at_rest: 0.6, dynamic: 0.2, distance: 0.5, decay, step: [0.0; 2] };
-        law.start_step(slip, length);
+        law.start_step([slip; 2], Blend::euler(length));
         law
     }
 
@@ -134,6 +140,17 @@ mod tests {
             assert!((law.steepest_decrease() - 0.08).abs() < 1e-16);
         }
         assert_eq!(linear.bound(1.0, -3.0), 0.0);
+    }
+
+    #[test]
+    fn a_two_step_scheme_continues_the_slip_until_a_point_comes_to_rest() {
+        let blend = Blend { length: 0.2, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 };
+        let mut law = law(Decay::Linear, 0.0, 0.0);
+        law.start_step([0.3, 0.15], blend);
+        // 0.35 m + 0.2 s 0.5 m/s = 0.45 m of 0.5 m.
+        assert!((law.coefficient(0.5) - 0.24).abs() < 1e-14);
+        assert!((law.history_after([0.3, 0.15], blend, 0.5) - 0.45).abs() < 1e-14);
+        assert_eq!(law.history_after([0.3, 0.15], blend, 0.0), 0.3);
     }
 
     proptest! {

@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn a_wall_is_touched_at_any_pressure_and_left_at_none() {
         let wall = Unilateral { bound: Bound::Velocity, gap: None };
-        let node = NodeContext { penetration: 3.0, step_length: 0.5, mean_from: None };
+        let node = NodeContext { penetration: 3.0, step_length: 0.5, ..NodeContext::default() };
         let touching = wall.resolve(7.0, 2.0, node);
         assert_eq!((touching.velocity, touching.pressure, touching.derivative), (0.0, 7.0, 0.0));
         let open = wall.resolve(-6.0, 2.0, node);
