@@ -5,6 +5,7 @@ use super::{
     estimate::Estimate,
     folder::refuse_unwritable,
     header,
+    obstacles::{self, ContactGaps},
     setup::{Setup, setup},
     steps,
     summary::PartitionQuality,
@@ -36,6 +37,7 @@ pub struct Report {
     unknowns: usize,
     effects: Vec<&'static str>,
     contact_points: u64,
+    gaps: Vec<ContactGaps>,
     probes: Vec<Probe>,
     scheme: &'static str,
     steps: u64,
@@ -105,6 +107,7 @@ fn report<const D: usize, const S: usize>(
         unknowns: body.unknowns(session),
         effects: body.effect_names(),
         contact_points: inventory.contact_points,
+        gaps: obstacles::gaps(session, job, body, &ready.state)?,
         probes: job.output.probe.clone(),
         scheme: scheme.scheme().name(),
         steps,
@@ -212,6 +215,7 @@ impl Report {
         if self.newton {
             lines.push(format!("contact    {} points", self.contact_points));
         }
+        lines.extend(self.gaps.iter().map(ContactGaps::line));
         if !self.probes.is_empty() {
             let names: Vec<&str> = self.probes.iter().map(|p| p.name.as_str()).collect();
             lines.push(format!("probes     {}: inside the body", names.join(", ")));

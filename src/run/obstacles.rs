@@ -1,16 +1,25 @@
-//! Warnings about the initial position of a body relative to its obstacles.
+//! The position of a body relative to its obstacles: warnings about that at the start and about contacts that are not as they seem, and
+//! the gaps of all contacts.
 
 use crate::{
     error::Result,
-    fem::{body::Body, state::State},
+    fem::{
+        body::Body,
+        effect::{Closeness, Contact, Gaps},
+        state::State,
+    },
     job::Job,
     laws::contact::Gap,
     linear_algebra::tensor::{Vector, larger},
     parallel::session::Session,
 };
+use serde::Serialize;
 
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
+
+/// Penetration at nodes that supports hold, as a share of the body's size, above which a warning is given.
+const OVERRUN: f64 = 1e-6;
 
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -30,7 +39,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         if !contact.law.depends_on_displacement() {
             continue;
         }
-        let [deepest] = session.largest([contact.deepest(0.0, &displacement)]);
+        let deepest = -gaps_of_all(session, contact, 0.0, &displacement).smallest;
         let on = table.on.join(", ");
         if deepest > TOO_DEEP * size {
             out.push(format!(
@@ -38,17 +47,136 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 100.0 * deepest / size
             ));
         }
-        if deepest <= ROUNDING * size && is_behind(session, &contact.gap, &body.mesh.nodes, size) {
-            let remedy = match contact.gap {
-                Gap::Sphere(_) => "check `hollow`, which states whether the body is inside the sphere",
-                Gap::Shape(_) => {
-                    "the distance must be positive outside of the obstacle: reverse the sign of `distance`, or the orientation of \
-                     the triangles of `surface`"
+        let [least, most] = depths(session, &contact.gap, &body.mesh.nodes);
+        if deepest > ROUNDING * size || most <= TOO_DEEP * size {
+            continue;
+        }
+        if least < -ROUNDING * size {
+            out.push(format!(
+                "contact.{number}: the obstacle lies inside the body, up to {most:.3e} m deep, where the boundary {on} does not touch it: \
+                 correct position, size or motion of the obstacle"
+            ));
+            continue;
+        }
+        let remedy = match contact.gap {
+            Gap::Sphere(_) => "check `hollow`, which states whether the body is inside the sphere",
+            Gap::Shape(_) => {
+                "the distance must be positive outside of the obstacle: reverse the sign of `distance`, or the orientation of \
+                 the triangles of `surface`"
+            }
+            _ => "reverse the plane's `normal`: it must point out of the obstacle toward the body",
+        };
+        out.push(format!(
+            "contact.{number}: the body lies behind its obstacle, so that the boundary {on} can never touch it; {remedy}"
+        ));
+    }
+    Ok(out)
+}
+
+/// The gaps of a contact that depends on them. Names are those of `solver check --json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct ContactGaps {
+    /// The boundaries.
+    on: Vec<String>,
+    /// Smallest and largest gap in m; absent if the normal of no point meets the obstacle.
+    range: Option<[f64; 2]>,
+    /// All points, and those whose normal does not meet the obstacle.
+    points: usize,
+    points_without_obstacle: usize,
+}
+
+impl ContactGaps {
+    /// As a line for the terminal.
+    pub(super) fn line(&self) -> String {
+        let on = self.on.join(", ");
+        let Some([smallest, largest]) = self.range else {
+            return format!("gap        {on}: no obstacle along the normal of any point");
+        };
+        let without = match self.points_without_obstacle {
+            0 => String::new(),
+            count => format!("; no obstacle along the normals of {count} of {} points", self.points),
+        };
+        format!("gap        {on}: {smallest:.4e} m to {largest:.4e} m{without}")
+    }
+}
+
+/// The gaps of all contacts that depend on them, at the start. Collective.
+pub(super) fn gaps<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<Vec<ContactGaps>> {
+    let displacement = session.agree(state.displacement.local())?;
+    let contacts = body.contacts.iter().zip(&job.contact);
+    let gaps =
+        contacts.filter(|(contact, _)| contact.law.depends_on_displacement()).map(|(contact, table)| {
+            let Gaps { smallest, largest, without } =
+                gaps_of_all(session, contact, state.time, &displacement);
+            ContactGaps {
+                on: table.on.clone(),
+                range: (smallest <= largest).then_some([smallest, largest]),
+                points: session.total(contact.point_count()),
+                points_without_obstacle: without,
+            }
+        });
+    Ok(gaps.collect())
+}
+
+/// The gaps of a contact on all ranks. Collective.
+fn gaps_of_all<const D: usize>(
+    session: &Session,
+    contact: &Contact<D>,
+    time: f64,
+    displacement: &[f64],
+) -> Gaps {
+    let Gaps { smallest, largest, without } = contact.gaps(time, displacement);
+    let [nearest, farthest] = session.largest([-smallest, largest]);
+    Gaps { smallest: -nearest, largest: farthest, without: session.total(without) }
+}
+
+/// Warnings about nodes that supports hold inside of an obstacle, which carry no contact force, and, after the last step, about contacts
+/// that have never touched. Collective, with the same warnings on all ranks.
+pub(super) fn warnings_of_run<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+    state: &State,
+    has_ended: bool,
+) -> Result<Vec<String>> {
+    let displacement = session.agree(state.displacement.local())?;
+    let size = size(session, &body.mesh.nodes);
+    let mut out = Vec::new();
+    for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
+        if !contact.law.depends_on_displacement() {
+            continue;
+        }
+        let Closeness { penetration, held } = contact.closeness_of_all(session);
+        let on = table.on.join(", ");
+        if held > OVERRUN * size {
+            out.push(format!(
+                "contact.{number}: the obstacle moved up to {held:.3e} m beyond nodes of the boundary {on} that a support holds along \
+                 the normal: there is no contact force at these nodes, and contact forces do not include what the support would have to \
+                 carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
+            ));
+        }
+        let touched = larger(penetration, held) >= -ROUNDING * size;
+        if has_ended && state.step > 0 && !touched {
+            let Gaps { smallest, .. } = gaps_of_all(session, contact, state.time, &displacement);
+            let nearest = match larger(penetration, held) {
+                f64::NEG_INFINITY => {
+                    "no obstacle was along the normal of any of its points after any step".into()
                 }
-                _ => "reverse the plane's `normal`: it must point out of the obstacle toward the body",
+                most => format!("the smallest gap after any step was {:.3e} m", -most),
+            };
+            let last = if smallest.is_finite() {
+                format!(", at the end it is {smallest:.3e} m")
+            } else {
+                String::new()
             };
             out.push(format!(
-                "contact.{number}: the body lies behind its obstacle, so that the boundary {on} can never touch it; {remedy}"
+                "contact.{number}: the boundary {on} never touched its obstacle: {nearest}{last}; if it should have, check position, size \
+                 and motion of the obstacle, and their units"
             ));
         }
     }
@@ -68,11 +196,12 @@ fn size<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> f64 {
     (0..D).map(|axis| ends[0][axis] + ends[1][axis]).fold(0.0, larger)
 }
 
-/// Whether the whole body lies inside of the obstacle. Collective.
-fn is_behind<const D: usize>(session: &Session, gap: &Gap, nodes: &[Vector<D>], size: f64) -> bool {
+/// The smallest and the largest depth of nodes inside of the obstacle in m, negative outside; minus infinity without an obstacle.
+/// Collective.
+fn depths<const D: usize>(session: &Session, gap: &Gap, nodes: &[Vector<D>]) -> [f64; 2] {
     let depths = nodes.iter().filter_map(|node| gap.depth(0.0, node));
     let [least, most] =
         depths.fold([f64::NEG_INFINITY; 2], |[a, b], depth| [larger(a, -depth), larger(b, depth)]);
     let [least, most] = session.largest([least, most]);
-    -least >= -ROUNDING * size && most > TOO_DEEP * size
+    [-least, most]
 }

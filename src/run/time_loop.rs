@@ -4,7 +4,7 @@ use super::{
     Clock, Inventory, Simulation, Start,
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
-    header,
+    header, obstacles,
     outputs::{Contents, Outputs, reaches},
     phases,
     restored::{candidates, restore},
@@ -297,6 +297,13 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             let written = self.session.agree(written);
             self.keep_first(&mut result, written);
         }
+        let Simulation { body, state, .. } = &self.simulation;
+        let warnings =
+            obstacles::warnings_of_run(self.session, self.job, body, state, result == Ok(Exit::Done));
+        let warnings = self.session.agree(warnings).map(|warnings| {
+            warnings.into_iter().for_each(|warning| self.log.warning(warning));
+        });
+        self.keep_first(&mut result, warnings);
         let (status, error) = match &result {
             Ok(Exit::Done) => ("completed", None),
             Ok(_) => ("stopped", None),

@@ -19,6 +19,7 @@ mod iterations;
 mod landings;
 mod launch;
 mod materials;
+mod obstacles;
 mod outputs;
 mod partitions;
 mod points;

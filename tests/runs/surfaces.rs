@@ -60,6 +60,34 @@ fn a_box_of_triangles_presses_as_its_distance_says_on_any_number_of_ranks() {
     }
 }
 
+/// A box of the size of the block, in an STL file, presses every node of its top, also those at its edges.
+#[test]
+fn a_box_as_wide_as_the_block_presses_as_a_plane_does() {
+    let make = |obstacle: &str| {
+        under_a_box()
+            .set("mesh.box", "{size = [8e-3, 5e-3, 2e-3], cells = [6, 5, 2]}")
+            .set("support", "[{on = ['bottom'], fix = 'all'}]")
+            .without("material.density")
+            .without("output.probe")
+            .set("contact.0.obstacle", obstacle)
+            .set("time", "{end = 1.0, step = 0.5, scheme = 'implicit_euler'}")
+    };
+    let contact = |case: &Case| case.results().table("resultants.csv").only("source", "contact top");
+    let plane = make("{plane = {point = [0, 0, '2e-3 - 0.02e-3*t'], normal = [0, 0, -1]}}").run_and_keep(1);
+    let wanted = contact(&plane).numbers("force_z");
+    for factor in [1.0, 1.0 - f32::EPSILON, 1.0 + f32::EPSILON] {
+        let shape = "{surface = 'box.stl', scale = 1e-3, centre = [4e-3, 2.5e-3, '3.5e-3 - 0.02e-3*t']}";
+        let case = make(&format!("{{shape = {shape}}}"));
+        write(&case, stl(factor, [0, 1, 2]));
+        let found = contact(&case.run_and_keep(2));
+        let forces = found.numbers("force_z");
+        for (one, other) in wanted.iter().zip(&forces) {
+            assert!((one - other).abs() <= 1e-4 * one.abs(), "{factor}: {one} and {other}");
+        }
+        assert!((found.last("touching_area") - 4e-5).abs() < 1e-12, "{}", found.last("touching_area"));
+    }
+}
+
 #[test]
 fn a_run_continues_with_the_surface_it_had_wherever_its_file_is() {
     let straight = under_a_box().set("checkpoint.every", "4").run_and_keep(1);
@@ -103,6 +131,8 @@ fn files_that_hold_no_closed_surface_are_refused() {
         (b"solid nothing\nendsolid nothing\n".to_vec(), "0 triangles"),
         (b"neither text nor numbers of a surface".to_vec(), "it is not an STL file"),
         (open, "belongs to one triangle only: the surface is not closed (3 such edges)"),
+        (stl(1.0, [0, 1, 2])[..500].to_vec(), "it is truncated"),
+        (b"SOLID a\r\nFACET NORMAL 0 0 1\r\n OUTER LOOP\r\n  VERTEX 0 0".to_vec(), "it is truncated"),
     ] {
         let case = under_a_box();
         write(&case, bytes);

@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Exit, Result},
     fem::{
         body::Body,
-        effect::{History, LoadedMotion},
+        effect::{Closeness, History, LoadedMotion},
         state::State,
     },
     job::differing_keys,
@@ -62,6 +62,9 @@ pub struct Header {
     /// The digest of the checkpoint from which the run started, if it started from one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_state: Option<String>,
+    /// For each contact: the largest penetration in m so far of points that are free to move, and of points that supports hold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub closeness: Vec<[Option<f64>; 2]>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -80,7 +83,7 @@ pub struct Identity {
 }
 
 impl Header {
-    /// The header for a state and the sums over the steps up to it.
+    /// The header for a state and the sums over the steps up to it. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         identity: &Identity,
@@ -108,6 +111,11 @@ impl Header {
             obstacle_rotation_stiffness: motions(1).map(LoadedMotion::stiffness).collect(),
             obstacle_rotation_resultants: motions(1).map(LoadedMotion::resultant).collect(),
             start_state: identity.start_state.clone(),
+            closeness: body
+                .contacts
+                .iter()
+                .map(|contact| contact.closeness_of_all(session).saved())
+                .collect(),
             mesh: digest(body),
             physics: identity.physics.clone(),
         }
@@ -222,6 +230,9 @@ pub fn restore<const D: usize, const S: usize>(
             motion.restore_resultant(resultants.get(at).copied().unwrap_or(0.0));
             motion.restore_stiffness(stiffness.get(at).copied().unwrap_or(0.0));
         }
+    }
+    for (contact, saved) in body.contacts.iter_mut().zip(&header.closeness) {
+        contact.closeness = Closeness::restored(*saved);
     }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)

@@ -16,7 +16,9 @@ mod obstacle_load;
 mod obstacle_motion;
 mod obstacle_shape;
 mod obstacle_surface;
+mod obstacle_sweep;
 mod polyline;
+mod stl;
 mod table;
 mod wear;
 
@@ -35,6 +37,7 @@ pub use obstacle::{Gap, Plane, Sphere};
 pub use obstacle_load::ObstacleLoad;
 pub use obstacle_motion::{ObstacleMotion, Rate};
 pub use obstacle_shape::Shape;
+pub use obstacle_sweep::Sweep;
 pub use polyline::Polyline;
 pub use table::{ContactTable, Quadrature};
 pub use wear::Wear;

@@ -13,7 +13,8 @@
 //! That of a shape is the length of the ray to its surface, see [`Shape`].
 //!
 //! The gap is negative where the point is inside the obstacle, and infinite where the ray along the normal does not meet the
-//! obstacle, so that there is no contact.
+//! obstacle, so that there is no contact. Where an obstacle has pushed the surface back so far that it lies wholly behind the
+//! undeformed position, the ray begins at the displaced one.
 
 use super::obstacle_shape::{Shape, vector};
 use crate::{
@@ -98,7 +99,27 @@ impl Gap {
     /// Gap in m at `time` of the point with the undeformed position `place`, along its unit `normal`; infinite if its ray does
     /// not meet the obstacle.
     pub fn at<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> Result<f64> {
-        let gap = self.measure(time, place, normal);
+        self.number(self.measure(time, place, normal), time, place)
+    }
+
+    /// The gap of a point whose surface has `moved` along the normal, in m. An obstacle that has pushed the surface back may lie wholly
+    /// behind the undeformed position; the ray then begins at the moved one.
+    pub fn of_moved<const D: usize>(
+        &self,
+        time: f64,
+        place: &Vector<D>,
+        normal: &Vector<D>,
+        moved: f64,
+    ) -> Result<f64> {
+        let gap = self.at(time, place, normal)?;
+        if gap < f64::INFINITY || moved >= 0.0 || matches!(self, Self::Distance(_)) {
+            return Ok(gap);
+        }
+        Ok(moved + self.at(time, &add_scaled(place, moved, normal), normal)?)
+    }
+
+    /// The length of a ray, unless it is no number.
+    pub(super) fn number<const D: usize>(&self, gap: f64, time: f64, place: &Vector<D>) -> Result<f64> {
         if gap > f64::NEG_INFINITY {
             return Ok(gap);
         }
@@ -166,7 +187,13 @@ impl Gap {
     }
 }
 
-fn to_sphere<const D: usize>(offset: &Vector<D>, normal: &Vector<D>, radius: f64, hollow: bool) -> f64 {
+/// The length of a ray from a place relative to the centre to a sphere; negative from inside of the obstacle.
+pub(super) fn to_sphere<const D: usize>(
+    offset: &Vector<D>,
+    normal: &Vector<D>,
+    radius: f64,
+    hollow: bool,
+) -> f64 {
     let along = dot(offset, normal);
     // Distance of the centre from the ray, rather than a difference of squares, keeps all digits near the surface.
     let across: Vector<D> = std::array::from_fn(|i| offset[i] - along * normal[i]);

@@ -71,6 +71,15 @@ impl<const D: usize> ObstacleMotion<D> {
         self.angular_velocity == [0.0; 3]
     }
 
+    /// Velocity in m/s of the material of the obstacle where the ray from `place` along the unit `normal` meets it, after `reach` m; if
+    /// the ray does not meet it, at `place`.
+    pub fn velocity_along(&self, place: &Vector<D>, normal: &Vector<D>, reach: f64) -> Vector<D> {
+        if self.is_translation() {
+            return self.velocity;
+        }
+        self.velocity_at(&add_scaled(place, if reach.is_finite() { reach } else { 0.0 }, normal))
+    }
+
     /// Velocity in m/s of the material of the obstacle at a position.
     fn velocity_at(&self, place: &Vector<D>) -> Vector<D> {
         let arm = add_scaled(place, -1.0, &self.centre);
@@ -111,23 +120,6 @@ impl Gap {
             }
             Self::Distance(_) | Self::Plane(_) => axis_of(&[]),
         }
-    }
-
-    /// Velocity in m/s of the material of the obstacle at `time`, in this `motion`, at the point where the ray from `place` along
-    /// the unit `normal` meets the obstacle; if the ray does not meet it, at `place`.
-    pub fn velocity_along<const D: usize>(
-        &self,
-        motion: &ObstacleMotion<D>,
-        time: f64,
-        place: &Vector<D>,
-        normal: &Vector<D>,
-    ) -> Result<Vector<D>> {
-        if motion.is_translation() {
-            return Ok(motion.velocity);
-        }
-        let reach = self.at(time, place, normal)?;
-        let reach = if reach.is_finite() { reach } else { 0.0 };
-        Ok(motion.velocity_at(&add_scaled(place, reach, normal)))
     }
 
     /// The motion of the obstacle at the end of a step; zero without an obstacle.
@@ -288,8 +280,8 @@ mod tests {
         let motion = cylinder.motion::<3>(STEP).unwrap();
         // A body above it, at its highest line: the surface moves at twice the velocity of the axis.
         let (above, down) = ([1.0, 7.0, 1.25], [0.0, 0.0, -1.0]);
-        let found = cylinder.velocity_along(&motion, STEP.time, &above, &down).unwrap();
-        assert_eq!(found, [4.0, 0.0, 0.0]);
+        let reach = cylinder.at(STEP.time, &above, &down).unwrap();
+        assert_eq!(motion.velocity_along(&above, &down, reach), [4.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use super::obstacle_surface::TriangulatedSurface;
 use crate::{
     laws::expression::Scalar,
-    linear_algebra::tensor::{Vector, add_scaled, larger},
+    linear_algebra::tensor::{Vector, add_scaled, larger, norm},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,8 +23,8 @@ pub struct Shape {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("variables" = "x, y, z", "unit" = "m"), example = "sqrt(x^2 + z^2) - 0.1")]
     pub distance: Option<Scalar>,
-    /// In 3D, an STL file (binary or ASCII) of the surface, relative to the job file, in place of `distance`. The surface must be
-    /// closed, its triangles counterclockwise as seen from outside of the obstacle, and its parts must not overlap. Coordinates are
+    /// In 3D, an STL file (binary or ASCII) of the surface, relative to the job file, in place of `distance`. Corners nearer than
+    /// a millionth of the largest coordinate are joined. The surface must be closed, its triangles counterclockwise as seen from outside of the obstacle, and its parts must not overlap. Coordinates are
     /// relative to `centre`. Each triangle is flat, so that the gap of a round tool is as exact as its triangulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<PathBuf>", extend("format" = "path"), example = "../meshes/stamp.stl")]
@@ -72,6 +72,15 @@ const ZERO: f64 = 1e-15;
 const FARTHEST: f64 = 1e6;
 /// The most steps of a search; a ray at less than half a degree to the surface takes more.
 const MOST_STEPS: usize = 1000;
+/// By which share of the coordinates a ray may miss an edge: by rounding, with an expression; by that of numbers of seven digits in the
+/// file of a surface.
+const SLACK: [f64; 2] = [1e-12, 2.5e-7];
+/// The half-width for derivatives of the distance near the surface, as a multiple of this distance.
+const WIDTH: f64 = 10.0;
+/// Cosine between a ray and the normal of the surface below which the ray runs along the surface.
+const PARALLEL: f64 = 0.1;
+/// The depth, as a share of the coordinates, below which an edge has been pressed into the body, and the obstacle is not beside it.
+const DEEPEST: f64 = 0.1;
 
 impl Shape {
     /// The place relative to the centre at `time`.
@@ -110,17 +119,58 @@ impl Shape {
         Some(self.surface.as_ref()?.triangles.as_ref()?.digest())
     }
 
+    /// The distance from the surface in m by which a ray may miss it, for a body of this size in m.
+    fn slack(&self, size: f64) -> f64 {
+        SLACK[usize::from(self.surface.is_some())] * size
+    }
+
     /// The length in m of the ray from a place relative to the centre, along the unit normal, to the surface; negative from inside.
-    /// Infinite if the ray does not meet the obstacle, NaN if the expression is no number or no distance there.
+    /// Infinite if the ray does not meet the obstacle, NaN if the expression is no number or no distance there. A ray along an edge
+    /// of the obstacle meets it.
     pub(super) fn along<const D: usize>(&self, offset: &Vector<D>, normal: &Vector<D>) -> f64 {
-        let first = self.distance_at(offset);
         let size = offset.iter().fold(self.extent(), |most, x| larger(most, x.abs()));
+        let slack = self.slack(size);
+        let Search { length, nearest } = self.search(offset, normal, [size, 0.0]);
+        if length.is_nan() || nearest > slack {
+            return length;
+        }
+        let touches = self.distance_at(offset).abs() <= slack;
+        let slope = if touches { self.slope(offset, normal, slack) } else { 0.0 };
+        // The ray meets a surface across it, or leads away from one.
+        if slope > PARALLEL || length.is_finite() && (!touches || slope < -PARALLEL) {
+            return length;
+        }
+        let Search { length: found, .. } = self.search(offset, normal, [size, slack]);
+        // A wall beside the body is not in front of it.
+        if touches && found < -DEEPEST * size { f64::INFINITY } else { found + slack }
+    }
+
+    /// The cosine between a ray from a place at the surface and the normal of the surface.
+    fn slope<const D: usize>(&self, offset: &Vector<D>, normal: &Vector<D>, slack: f64) -> f64 {
+        let change = |direction: &Vector<D>| {
+            let at = |length: f64| self.distance_at(&add_scaled(offset, length, direction));
+            at(WIDTH * slack) - at(-WIDTH * slack)
+        };
+        let steepest: Vector<D> =
+            std::array::from_fn(|i| change(&std::array::from_fn(|j| f64::from(u8::from(i == j)))));
+        change(normal) / norm(&steepest)
+    }
+
+    /// Follows the ray to the surface that is a `slack` farther out than that of the obstacle, where coordinates have this `size`.
+    fn search<const D: usize>(
+        &self,
+        offset: &Vector<D>,
+        normal: &Vector<D>,
+        [size, slack]: [f64; 2],
+    ) -> Search {
+        let first = self.distance_at(offset) - slack;
+        let mut nearest = first.abs();
         if first.abs() <= ZERO * size {
-            return first;
+            return Search { length: first, nearest };
         }
         // From inside, the search goes the other way, through distances of the other sign.
         let side = first.signum();
-        let at = |length: f64| side * self.distance_at(&add_scaled(offset, side * length, normal));
+        let at = |length: f64| side * (self.distance_at(&add_scaled(offset, side * length, normal)) - slack);
         let (mut here, mut value, mut step) = (0.0, first.abs(), first.abs());
         for _ in 0..MOST_STEPS {
             let next = here + step;
@@ -128,16 +178,18 @@ impl Shape {
             let most = step * (1.0 + ROUNDING[0]) + ROUNDING[1] * (size + next);
             let is_distance = (there - value).abs() <= most;
             if !is_distance {
-                return f64::NAN;
+                return Search { length: f64::NAN, nearest };
             }
             if there <= 0.0 {
-                return side * zero_between(at, [here, value], [next, there], ZERO * size);
+                let length = side * zero_between(at, [here, value], [next, there], ZERO * size);
+                return Search { length, nearest };
             }
+            nearest = nearest.min(there);
             if next > FARTHEST * first.abs() {
                 break;
             }
             if there <= ZERO * size {
-                return side * next;
+                return Search { length: side * next, nearest };
             }
             let slope = (there - value) / step;
             (here, value) = (next, there);
@@ -145,8 +197,39 @@ impl Shape {
             let is_near = value < NEAR * first.abs() && slope < 0.0;
             step = value * if is_near { (2.0 / -slope).min(FASTEST) } else { 1.0 };
         }
+        let length =
+            if side < 0.0 { self.from_beyond(offset, normal, ([size, slack], here)) } else { f64::INFINITY };
+        Search { length, nearest }
+    }
+
+    /// The length of the ray from a place inside near a surface that is parallel to it, along which a search takes too many steps: from
+    /// outside, back to the place. The surface is farther than `least`.
+    fn from_beyond<const D: usize>(
+        &self,
+        offset: &Vector<D>,
+        normal: &Vector<D>,
+        ([size, slack], least): ([f64; 2], f64),
+    ) -> f64 {
+        let mut length = least;
+        while length < FARTHEST * size {
+            length *= 2.0;
+            let start = add_scaled(offset, -length, normal);
+            if self.distance_at(&start) > slack {
+                let found = self.search(&start, normal, [larger(size, length), slack]).length;
+                return if found <= length { found - length } else { f64::NAN };
+            }
+        }
         f64::INFINITY
     }
+}
+
+/// What a search has found.
+#[derive(Debug, Clone, Copy)]
+struct Search {
+    /// Length of the ray in m, as that of [`Shape::along`].
+    length: f64,
+    /// The smallest distance in m from the surface at the places of the search before its end.
+    nearest: f64,
 }
 
 /// The numbers of components at `time`.
@@ -251,6 +334,47 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn rays_along_the_edges_of_a_punch_meet_it_and_a_wall_beside_is_not_in_front() {
+        // 0.3 m wide, which numbers of seven digits do not hold.
+        let halves = [0.15, 0.15, 0.5];
+        let expression = shape("max(max(abs(x) - 0.15, abs(y) - 0.15), abs(z) - 0.5)");
+        let corners: Vec<Vector<3>> = (0..8usize)
+            .map(|corner| std::array::from_fn(|i| halves[i] * if corner >> i & 1 == 0 { -1.0 } else { 1.0 }))
+            .collect();
+        let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let triangles: Vec<[usize; 3]> =
+            sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let single: Vec<Vector<3>> =
+            corners.iter().map(|corner| corner.map(|x| f64::from(x as f32))).collect();
+        let punch = |corners: &[Vector<3>], triangles: Vec<[usize; 3]>| {
+            let surface = TriangulatedSurface::new(corners, triangles).expect("a surface");
+            let surface = Some(Surface { file: PathBuf::new(), triangles: Some(Arc::new(surface)) });
+            Shape { surface, ..Shape::default() }
+        };
+        let inward = single.iter().map(|corner| corner.map(|x| 0.999_999_95 * x)).collect::<Vec<_>>();
+        let punches = [expression, punch(&single, triangles.clone()), punch(&inward, triangles)];
+        let up = [0.0, 0.0, 1.0];
+        for punch in &punches {
+            for [x, y] in
+                [[0.15, 0.15], [-0.15, 0.15], [0.15, 0.02], [0.0, -0.15], [0.07, 0.0], [0.15 - 1e-10, 0.0]]
+            {
+                for height in [0.2, 1e-3, 0.0, -1e-8, -1e-4, -0.01] {
+                    let found = punch.along(&[x, y, -0.5 - height], &up);
+                    assert!((found - height).abs() <= 3e-7, "{found} for {height} at {x}, {y}: {punch:?}");
+                }
+            }
+            for x in [0.1501, 0.151, 0.2] {
+                assert_eq!(punch.along(&[x, 0.0, -0.6], &up), f64::INFINITY, "beside it: {punch:?}");
+                assert_eq!(punch.along(&[x, 0.0, -0.4], &up), f64::INFINITY, "beside it: {punch:?}");
+            }
+            let beside = punch.along(&[0.15, 0.0, 0.2], &up);
+            assert_eq!(beside, f64::INFINITY, "a wall: {punch:?}");
+            assert!((punch.along(&[0.15 - 1e-6, 0.0, -0.3], &up) + 0.2).abs() < 3e-8, "deep inside");
+        }
+        assert_eq!(shape("x").along(&[0.0, 1.0], &DOWN), f64::INFINITY, "an endless wall");
     }
 
     #[test]

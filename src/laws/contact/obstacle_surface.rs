@@ -1,5 +1,6 @@
 //! A triangulated surface that bounds an obstacle.
 
+use super::stl;
 use crate::linear_algebra::tensor::Vector;
 use parry3d_f64::{
     math::Vector as Point,
@@ -33,11 +34,8 @@ impl TriangulatedSurface {
     /// The surface in an STL file with these bytes, ASCII or binary, whose unit of length is `scale` m. An error says what is wrong
     /// with the surface.
     pub(super) fn from_stl(bytes: &[u8], scale: f64) -> Result<Self, String> {
-        let read = stl_io::read_stl(&mut std::io::Cursor::new(bytes));
-        let stl = read.map_err(|error| format!("it is not an STL file: {error}"))?;
-        let corner = |vertex: &stl_io::Vertex| vertex.0.map(|x| scale * f64::from(x));
-        let corners: Vec<Vector<3>> = stl.vertices.iter().map(corner).collect();
-        let triangles = stl.faces.iter().map(|face| face.vertices).collect();
+        let (mut corners, triangles) = stl::read(bytes)?;
+        corners.as_flattened_mut().iter_mut().for_each(|x| *x *= scale);
         Self::new(&corners, triangles)
     }
 
@@ -221,27 +219,9 @@ mod tests {
     #[test]
     fn files_are_read_in_the_unit_they_are_written_in() {
         let (corners, triangles) = block([[0.0; 3], [2.0, 3.0, 4.0]], false);
-        let facets: Vec<stl_io::Triangle> = triangles
-            .iter()
-            .map(|triangle| stl_io::Triangle {
-                normal: stl_io::Normal::new([0.0; 3]),
-                vertices: triangle.map(|corner| stl_io::Vertex::new(corners[corner].map(|x| x as f32))),
-            })
-            .collect();
-        let mut binary = Vec::new();
-        stl_io::write_stl(&mut binary, facets.iter()).unwrap();
-        let mut text = String::from("solid box\n");
-        for triangle in &triangles {
-            text += "facet normal 0 0 0\nouter loop\n";
-            triangle.iter().for_each(|&corner| {
-                let [x, y, z] = corners[corner];
-                text += &format!("vertex {x} {y} {z}\n");
-            });
-            text += "endloop\nendfacet\n";
-        }
-        text += "endsolid box\n";
-        let files = [binary.as_slice(), text.as_bytes()]
-            .map(|bytes| TriangulatedSurface::from_stl(bytes, 1e-3).unwrap());
+        let [text, binary] = stl::tests::written(&corners, &triangles);
+        let files =
+            [binary.as_slice(), &text].map(|bytes| TriangulatedSurface::from_stl(bytes, 1e-3).unwrap());
         assert_eq!(files[0], files[1]);
         assert!((files[0].distance(&[1e-3, 1e-3, 5e-3]) - 1e-3).abs() < 1e-18);
         assert_ne!(files[0], TriangulatedSurface::from_stl(&binary, 1.0).unwrap());

@@ -1,13 +1,14 @@
 //! Operations on contacts before and after a step.
 
 use crate::{
-    error::Result,
+    error::{Error, Result},
     fem::{
         body::Body,
         effect::{CONTACT, Energy, NUMERICAL, Step, WORK},
         space::{acts_at_midsides, add_corner_means},
         state::State,
     },
+    linear_algebra::petsc::DistributedVector,
 };
 
 /// Adds the energy that contact dissipated in a committed step, the numerical part, and the work on obstacles; adds the powers of friction
@@ -52,6 +53,31 @@ pub(super) fn prepare_gaps<const D: usize, const S: usize>(
 ) -> Result<()> {
     let displacement = state.displacement.local()?;
     body.contacts.iter_mut().try_for_each(|contact| contact.prepare(step.time, step.length, &displacement))
+}
+
+/// Fails where an obstacle passes a boundary in the step with this solution, which has ghosts.
+pub(super) fn refuse_passage<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &State,
+    step: Step,
+    solved: &DistributedVector,
+) -> Result<()> {
+    let (displacement, velocity) = (state.displacement.local()?, solved.local()?);
+    for (number, contact) in body.contacts.iter().enumerate() {
+        let passage = contact.refuse_passage(step, &displacement, &velocity);
+        passage.map_err(|error| Error::Failed(format!("contact.{number}: {error}")))?;
+    }
+    Ok(())
+}
+
+/// Keeps how near obstacles have come in the step just committed.
+pub(super) fn keep_closeness<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+) -> Result<()> {
+    let velocity = state.velocity.local()?;
+    body.contacts.iter_mut().for_each(|contact| contact.keep_closeness(&velocity));
+    Ok(())
 }
 
 /// Sets the pressures of all contacts to those of the converged state.

@@ -3,7 +3,7 @@
 use super::{
     StepOutcome,
     balance::Balance,
-    contacts::{commit_tractions, prepare_contacts, prepare_gaps},
+    contacts::{commit_tractions, keep_closeness, prepare_contacts, prepare_gaps, refuse_passage},
     factor_cache::nearest_cached_length,
     force_scale::ForceScale,
     integrator::Integrator,
@@ -20,7 +20,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
-        effect::{CONTACT, Energy, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
+        effect::{CONTACT, Contact, Energy, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
         resultants::BalancedMotion,
         state::State,
     },
@@ -275,7 +275,14 @@ impl Stepper {
         drop(stage);
         self.clock.solve += solving.elapsed();
         self.traffic.add_solve(self.solver.traffic(session.ranks())?);
-        outcome
+        let outcome = outcome?;
+        if body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
+            if body.contacts.iter().any(Contact::needs_ghosts) {
+                self.trial.update_ghosts()?;
+            }
+            session.agree(refuse_passage(body, state, step, &self.trial))?;
+        }
+        Ok(outcome)
     }
 
     /// Solves the started step. Collective.
@@ -457,6 +464,7 @@ impl Stepper {
         let of_obstacles = self.energy_of_obstacles(body, state, step);
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
+        keep_closeness(body, state)?;
         body.commit();
         drop(stage);
         let balancing = Instant::now();

@@ -8,7 +8,6 @@ use crate::{
     error::Result,
     fem::effect::{EnergyKind, Role},
     laws::contact::NodeContext,
-    linear_algebra::tensor::larger,
 };
 
 /// Dissipated by contact, or absorbed by contact memory.
@@ -93,24 +92,14 @@ impl<const D: usize> Contact<D> {
         self.law.pressure(0.0, context)
     }
 
-    /// Largest penetration in m of points on this rank at `time`; minus infinity where none can touch the obstacle. A gap that
-    /// is NaN is ignored: the first step refuses it.
-    pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
-        let depth = |point: &Point<D>| {
-            let gap = self.gap_at(time, point);
-            gap.map_or(f64::NEG_INFINITY, |gap| point.normal_component(Body, displacement) - gap)
-        };
-        self.points.iter().map(depth).fold(f64::NEG_INFINITY, larger)
-    }
-
     /// Energy in J stored at `time`, from displacements with ghosts.
     pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> Result<f64> {
         if self.law.energy(0.0).is_none() {
             return Ok(0.0);
         }
         let energy = |point: &Point<D>| {
-            let gap = self.gap_at(time, point)?;
-            let stored = self.law.energy(point.normal_component(Body, displacement) - gap);
+            let [along, gap] = self.position_at(time, displacement, point)?;
+            let stored = self.law.energy(along - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };
         self.points.iter().map(energy).sum()

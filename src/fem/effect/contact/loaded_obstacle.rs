@@ -134,6 +134,11 @@ impl<const D: usize> LoadedObstacle<D> {
         self.rotation.as_ref().map_or([0.0; 3], |(axis, motion)| axis.map(|x| motion.trial[1] * x))
     }
 
+    /// Whether a force moves the obstacle.
+    pub(super) fn moves(&self) -> bool {
+        self.translation.is_some()
+    }
+
     /// Whether a moment turns the obstacle.
     pub(super) fn turns(&self) -> bool {
         self.rotation.is_some()

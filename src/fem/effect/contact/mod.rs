@@ -21,6 +21,7 @@
 //! unknown; their law must not have vertical parts.
 
 mod bounds;
+mod closeness;
 mod count;
 mod directions;
 mod energy;
@@ -35,6 +36,7 @@ mod resultant;
 mod sliding;
 mod squares;
 mod starts;
+mod sweep;
 mod tangential_point;
 mod unknowns;
 
@@ -54,6 +56,7 @@ use point::{Point, Vectors::Body, gauss_points};
 use std::collections::BTreeSet;
 
 pub use crate::laws::contact::Quadrature;
+pub use closeness::{Closeness, Gaps};
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, ContactEnergy, STORED_IN_CONTACT};
@@ -88,6 +91,8 @@ pub struct Contact<const D: usize> {
     arms: Vec<Vector<D>>,
     /// Wear of the surface.
     pub wear: Option<Wear>,
+    /// How near body and obstacle have come in the steps so far, on this rank.
+    pub closeness: Closeness,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
     /// Length in s of the current step, as laws of the displacement see it.
@@ -153,6 +158,7 @@ impl<const D: usize> Contact<D> {
             obstacle: None,
             arms: Vec::new(),
             wear: None,
+            closeness: Closeness::default(),
             scale,
             step_length: 0.0,
             blend: Blend::euler(0.0),
@@ -195,11 +201,13 @@ impl<const D: usize> Contact<D> {
         self.obstacle.iter_mut().for_each(LoadedObstacle::commit);
     }
 
-    /// The gap in m of a point at `time`, where the obstacle is after the last step, with the wear until then.
-    fn gap_at(&self, time: f64, point: &Point<D>) -> Result<f64> {
-        let place = &point.place;
+    /// The displacement in m of a point along the normal at `time`, and its gap there, where the obstacle is after the last step, and
+    /// with the wear until then; from nodal displacements of the body.
+    fn position_at(&self, time: f64, displacement: &[f64], point: &Point<D>) -> Result<[f64; 2]> {
+        let (place, worn) = (&point.place, point.worn[0]);
+        let along = point.normal_component(Body, displacement);
         let seen = self.obstacle.as_ref().map_or(*place, |obstacle| obstacle.seen_before(place));
-        Ok(self.gap.at(time, &seen, &point.normal)? + point.worn[0])
+        Ok([along, self.gap.of_moved(time, &seen, &point.normal, along - worn)? + worn])
     }
 
     /// Whether the surface of the obstacle may move.

@@ -60,6 +60,8 @@ pub(super) struct Point<const D: usize> {
     pub unknown: Unknown,
     /// Initial position, in m.
     pub place: Vector<D>,
+    /// The gap in m at the end of the step of the undeformed surface without wear.
+    pub reach: f64,
     /// Penetration from the displacement at the start and the gap at the end of the step, and step length.
     pub context: NodeContext,
     /// `u_nu - gap` in m, with both values at the start of the step.
@@ -98,6 +100,7 @@ impl<const D: usize> Point<D> {
             free_length: 0.0,
             unknown: Unknown::Velocity,
             place: [0.0; D],
+            reach: 0.0,
             context: NodeContext::default(),
             penetration_before: 0.0,
             worn: [0.0; 2],

@@ -10,7 +10,7 @@ use crate::{
     error::{Error, Result},
     fem::effect::{Blend, Step},
     laws::contact::{NodeContext, Rate},
-    linear_algebra::tensor::{Vector, add_scaled, dot, norm},
+    linear_algebra::tensor::{add_scaled, dot, norm},
 };
 
 impl<const D: usize> Contact<D> {
@@ -27,10 +27,11 @@ impl<const D: usize> Contact<D> {
                 None => [point.place; 2],
                 Some(obstacle) => [obstacle.seen_after(&point.place), obstacle.seen_before(&point.place)],
             };
-            let gap = self.gap.at(time, &after, &point.normal)?;
-            let before = self.gap.at(time - length, &before, &point.normal)?;
             let along = point.normal_component(Body, displacement);
             let [worn, _] = point.worn;
+            let gap = self.gap.of_moved(time, &after, &point.normal, along - worn)?;
+            let before = self.gap.of_moved(time - length, &before, &point.normal, along - worn)?;
+            point.reach = gap;
             point.context =
                 NodeContext { penetration: along - gap - worn, step_length: length, mean_from: None, erosion: 0.0 };
             point.penetration_before = along - before - worn;
@@ -39,30 +40,24 @@ impl<const D: usize> Contact<D> {
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
-        self.set_arms(time)?;
+        self.set_arms(time);
         self.set_obstacle_velocities(Rate::euler(time, length))
     }
 
     /// Sets the places at which the rays along the normals meet an obstacle that a moment turns, relative to its centre; zero where
     /// they do not meet it.
-    fn set_arms(&mut self, time: f64) -> Result<()> {
-        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.turns()) else {
-            return Ok(());
-        };
-        let (gap, centre) = (&self.gap, self.gap.centre(time));
-        let arm = |point: &Point<D>| -> Result<Vector<D>> {
-            let seen = obstacle.seen_after(&point.place);
-            let reach = gap.at(time, &seen, &point.normal)?;
-            if reach == f64::INFINITY {
-                return Ok([0.0; D]);
+    fn set_arms(&mut self, time: f64) {
+        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.turns()) else { return };
+        let centre = self.gap.centre(time);
+        let arm = |point: &Point<D>| {
+            if point.reach == f64::INFINITY {
+                return [0.0; D];
             }
-            Ok(add_scaled(&add_scaled(&seen, reach, &point.normal), -1.0, &centre))
+            let seen = obstacle.seen_after(&point.place);
+            add_scaled(&add_scaled(&seen, point.reach, &point.normal), -1.0, &centre)
         };
         self.arms.clear();
-        for point in &self.points {
-            self.arms.push(arm(point)?);
-        }
-        Ok(())
+        self.arms.extend(self.points.iter().map(arm));
     }
 
     /// Starts the histories of friction from this blend of earlier ones, as whose length the laws see the step.
@@ -132,20 +127,19 @@ impl<const D: usize> Contact<D> {
             return Ok(());
         };
         let obstacle = self.obstacle.as_ref();
-        let (gap, points, mut motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
+        let (points, mut motion) = (&self.points, self.gap.motion::<D>(rate)?);
         motion.turn(&obstacle.map_or([0.0; 3], LoadedObstacle::angular_velocity));
         let velocity = |point: &Point<D>| {
             let seen = obstacle.map_or(point.place, |obstacle| obstacle.seen_after(&point.place));
-            let prescribed = gap.velocity_along(&motion, rate.time, &seen, &point.normal)?;
-            let own = obstacle.map_or([0.0; D], LoadedObstacle::velocity);
-            Ok::<Vector<D>, Error>(add_scaled(&prescribed, 1.0, &own))
+            let prescribed = motion.velocity_along(&seen, &point.normal, point.reach);
+            add_scaled(&prescribed, 1.0, &obstacle.map_or([0.0; D], LoadedObstacle::velocity))
         };
         friction.obstacle_velocities.clear();
         for point in &friction.points {
-            friction.obstacle_velocities.push(point.part(&velocity(&points[point.at])?));
+            friction.obstacle_velocities.push(point.part(&velocity(&points[point.at])));
         }
         for (at, tangent) in &friction.held {
-            let (point, velocity) = (&points[*at], velocity(&points[*at])?);
+            let (point, velocity) = (&points[*at], velocity(&points[*at]));
             let along = dot(tangent, &velocity);
             if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
                 return Err(Error::Refused(format!(

@@ -105,8 +105,8 @@ impl<const D: usize> Contact<D> {
                 };
             }
             if self.law.depends_on_displacement() {
-                let gap = self.gap_at(time, point)?;
-                state.gap = gap - point.normal_component(Body, displacement);
+                let [along, gap] = self.position_at(time, displacement, point)?;
+                state.gap = gap - along;
             }
             visit(point.node(), state);
         }

@@ -1,0 +1,104 @@
+//! Obstacles that contact misses: they pass the boundary within a step, press against nodes that supports hold, or never touch it.
+
+use super::{
+    Contact,
+    closeness::{Closeness, Gaps},
+    loaded_obstacle::LoadedObstacle,
+    point::{
+        Point, Unknown,
+        Vectors::{self, Body},
+    },
+};
+use crate::{
+    error::{Error, Result},
+    fem::effect::Step,
+    laws::contact::{Gap, Sweep},
+    linear_algebra::tensor::{add_scaled, larger},
+    parallel::session::Session,
+};
+
+impl<const D: usize> Contact<D> {
+    /// Fails where the obstacle has passed a point in the step just solved, from displacements at its start and velocities at its end
+    /// (with ghosts).
+    pub fn refuse_passage(&self, step: Step, displacement: &[f64], velocity: &[f64]) -> Result<()> {
+        if !self.law.depends_on_displacement() || matches!(self.gap, Gap::Distance(_)) {
+            return Ok(());
+        }
+        let times = [step.time - step.length, step.time];
+        for point in &self.points {
+            let [worn, worn_before] = point.worn;
+            let along = point.normal_component(Body, displacement);
+            let moved = along + point.blend_offset + self.advance(point, Body, velocity);
+            let [before, after] = match &self.obstacle {
+                None => [point.place; 2],
+                Some(obstacle) => [obstacle.seen_before(&point.place), obstacle.seen_after(&point.place)],
+            };
+            let sweep = Sweep {
+                times,
+                places: [
+                    add_scaled(&before, along - worn_before, &point.normal),
+                    add_scaled(&after, moved - worn, &point.normal),
+                ],
+                normal: point.normal,
+                loses_obstacle: point.penetration_before > f64::NEG_INFINITY && !point.can_touch(),
+            };
+            if self.gap.passes(&sweep)? {
+                let driven = self.obstacle.as_ref().is_some_and(LoadedObstacle::moves);
+                let speed = if driven { "its force or its mass" } else { "its motion" };
+                return Err(Error::Failed(format!(
+                    "the step to t = {:.6e} s (length {:.3e} s) failed: its obstacle passes through the boundary at {:?} m, in front of \
+                     which it is at the start of the step and behind which at the end; take a smaller [time] step, in which obstacle \
+                     and body approach each other by less than the size of the obstacle, or correct {speed}",
+                    step.time, step.length, point.place
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// How far a point moves along its normal in the step, in m, at these velocities.
+    fn advance(&self, point: &Point<D>, vectors: Vectors, velocity: &[f64]) -> f64 {
+        point.context.step_length * point.normal_component(vectors, velocity)
+    }
+
+    /// Keeps how near the obstacle has come in the step just solved, at its velocities with ghosts.
+    pub fn keep_closeness(&mut self, velocity: &[f64]) {
+        if !self.law.depends_on_displacement() {
+            return;
+        }
+        let mut closeness = self.closeness;
+        for point in &self.points {
+            let after = point.context.penetration + self.advance(point, Body, velocity);
+            if point.unknown == Unknown::Held {
+                closeness.held = larger(closeness.held, after);
+            } else {
+                let presses = point.pressure_at(&self.law, Body, velocity) != 0.0;
+                closeness.penetration =
+                    larger(closeness.penetration, if presses { larger(after, 0.0) } else { after });
+            }
+        }
+        self.closeness = closeness;
+    }
+
+    /// How near body and obstacle have come in the steps so far, on any rank. Collective.
+    pub fn closeness_of_all(&self, session: &Session) -> Closeness {
+        let [penetration, held] = session.largest([self.closeness.penetration, self.closeness.held]);
+        Closeness { penetration, held }
+    }
+
+    /// The gaps of points on this rank at `time`, from displacements with ghosts. A gap that is NaN is ignored: the first step refuses
+    /// it.
+    pub fn gaps(&self, time: f64, displacement: &[f64]) -> Gaps {
+        let mut gaps = Gaps { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, without: 0 };
+        for point in &self.points {
+            let Ok([along, gap]) = self.position_at(time, displacement, point) else { continue };
+            if gap == f64::INFINITY {
+                gaps.without += 1;
+            } else {
+                gaps.smallest = gaps.smallest.min(gap - along);
+                gaps.largest = gaps.largest.max(gap - along);
+            }
+        }
+        gaps
+    }
+}

@@ -1,0 +1,177 @@
+//! Whether an obstacle passes a point of the boundary within a step.
+//!
+//! Gaps are known at the ends of a step only. An obstacle that moves by more than its size in a step may be in front of a point at the
+//! start and behind it at the end, where no ray along the normal meets it. As seen from the obstacle, the point moves from one place to
+//! the other; the way between them is taken as straight. The obstacle has passed if the point leaves it on this way through a surface
+//! that faces the same way as the boundary: then the obstacle is on the body's side. Where the point leaves through any other surface,
+//! the obstacle was lifted, or has moved sideways.
+
+use super::{
+    obstacle::{Gap, Sphere, to_sphere},
+    obstacle_shape::vector,
+};
+use crate::{
+    error::Result,
+    linear_algebra::tensor::{Vector, add_scaled, larger, norm},
+};
+
+/// Cosine between the normals of boundary and obstacle above which the obstacle lies behind the point that leaves it.
+const BEHIND: f64 = 0.05;
+/// Lengths of this share of the way or of the coordinates are rounding.
+const ROUNDING: f64 = 1e-9;
+/// The half-width for derivatives of the distance, as a share of the coordinates.
+const WIDTH: f64 = 1e-6;
+
+/// The way of a point of the boundary in a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep<const D: usize> {
+    /// Start and end of the step in s.
+    pub times: [f64; 2],
+    /// Places at these times in m, without what a force has moved the obstacle.
+    pub places: [Vector<D>; 2],
+    /// Outward unit normal of the boundary.
+    pub normal: Vector<D>,
+    /// Whether the gap is finite at the start and infinite at the end.
+    pub loses_obstacle: bool,
+}
+
+impl Gap {
+    /// Whether the obstacle passes a point in a step without a gap at its end that shows this. A gap that is given, without an
+    /// obstacle, passes nothing.
+    pub fn passes<const D: usize>(&self, sweep: &Sweep<D>) -> Result<bool> {
+        let Sweep { times, places, normal, loses_obstacle } = sweep;
+        let Some(depth) = self.depth(times[1], &places[1]) else { return Ok(false) };
+        let centres: [Vector<D>; 2] = match self {
+            Self::Sphere(Sphere { centre, .. }) => times.map(|time| vector(centre, time)),
+            Self::Shape(shape) => times.map(|time| vector(&shape.centre, time)),
+            Self::Distance(_) | Self::Plane(_) => [[0.0; D]; 2],
+        };
+        let offsets: [Vector<D>; 2] = std::array::from_fn(|i| add_scaled(&places[i], -1.0, &centres[i]));
+        let size = offsets.as_flattened().iter().fold(0.0, |most, x| larger(most, x.abs()));
+        if depth > ROUNDING * size {
+            return Ok(*loses_obstacle);
+        }
+        let way = add_scaled(&offsets[1], -1.0, &offsets[0]);
+        let length = norm(&way);
+        // Within its distance from the end, the point does not meet the obstacle. Half-spaces have no other side.
+        if matches!(self, Self::Plane(_)) || -depth >= length {
+            return Ok(false);
+        }
+        let back = way.map(|x| -x / length);
+        let ray = match self {
+            Self::Sphere(Sphere { radius, hollow, .. }) => to_sphere(&offsets[1], &back, *radius, *hollow),
+            Self::Shape(shape) => shape.along(&offsets[1], &back),
+            Self::Distance(_) | Self::Plane(_) => f64::INFINITY,
+        };
+        // At the surface, rounding may put the end of the way inside.
+        let ray = larger(self.number(ray, times[1], &places[1])?, 0.0);
+        if ray >= (1.0 - ROUNDING) * length {
+            return Ok(false);
+        }
+        // Where the point leaves the obstacle, how fast the distance grows along the normal.
+        let leaves = add_scaled(&places[1], ray, &back);
+        let width = WIDTH * size;
+        let at = |along: f64| self.depth(times[1], &add_scaled(&leaves, along, normal)).unwrap_or_default();
+        Ok(at(-width) - at(width) > 2.0 * BEHIND * width)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::contact::{
+        obstacle::{
+            Plane,
+            tests::{expression, numbers},
+        },
+        obstacle_shape::Shape,
+    };
+
+    const DOWN: Vector<2> = [0.0, -1.0];
+
+    /// A disc below y = 0 that moves by the given way in a second, and the same as a shape.
+    fn discs(radius: f64, from: [f64; 2], way: [f64; 2]) -> [Gap; 2] {
+        let centre = |i: usize| expression(&format!("{} + {}*t", from[i], way[i]));
+        let centre = || vec![centre(0), centre(1)];
+        let shape = Shape {
+            distance: Some(expression(&format!("sqrt(x^2 + y^2) - {radius}"))),
+            centre: centre(),
+            ..Shape::default()
+        };
+        let disc = Sphere { centre: centre(), radius, hollow: false, rotation: None, axis: None };
+        [Gap::Sphere(disc), Gap::Shape(shape)]
+    }
+
+    /// Whether the obstacle passes a point of a lower boundary that moves from one place to the other in a second.
+    fn passes(gap: &Gap, places: [[f64; 2]; 2]) -> bool {
+        let [before, after] =
+            [0, 1].map(|i| gap.of_moved(i as f64, &places[0], &DOWN, places[0][1] - places[i][1]));
+        let loses_obstacle = before.unwrap().is_finite() && after.unwrap() == f64::INFINITY;
+        gap.passes(&Sweep { times: [0.0, 1.0], places, normal: DOWN, loses_obstacle }).unwrap()
+    }
+
+    #[test]
+    fn a_disc_that_jumps_over_a_point_passes_it() {
+        let rest = |x: f64| [[x, 0.0]; 2];
+        for disc in discs(0.2, [0.0, -0.3], [0.1, 1.0]) {
+            assert!(passes(&disc, rest(0.03)) && passes(&disc, rest(0.15)), "{disc:?}");
+            assert!(!passes(&disc, rest(0.4)), "beside it: {disc:?}");
+        }
+        for disc in discs(0.2, [0.0, -0.3], [0.0, 0.05]) {
+            assert!(!passes(&disc, rest(0.0)), "not yet there: {disc:?}");
+        }
+        for disc in discs(0.2, [0.0, -0.3], [0.0, 0.25]) {
+            assert!(!passes(&disc, rest(0.0)), "its gap is negative: {disc:?}");
+        }
+        for disc in discs(0.2, [0.0, -0.2], [0.0, -5.0]) {
+            assert!(!passes(&disc, rest(0.0)), "lifted: {disc:?}");
+        }
+        for disc in discs(0.2, [-1.0, -0.15], [3.0, 0.0]) {
+            assert!(!passes(&disc, rest(0.0)), "it rolls past: {disc:?}");
+        }
+        for disc in discs(0.2, [0.0, 0.5], [0.0, -2.0]) {
+            assert!(!passes(&disc, rest(0.0)), "back to the right side: {disc:?}");
+        }
+    }
+
+    #[test]
+    fn only_the_relative_motion_counts() {
+        for disc in discs(0.2, [0.0, -0.3], [0.0, 7.0]) {
+            assert!(!passes(&disc, [[0.0, 0.0], [0.0, 7.0]]), "both move: {disc:?}");
+            assert!(passes(&disc, [[0.0, 0.0], [0.0, 6.0]]), "too slow: {disc:?}");
+        }
+        for disc in discs(0.2, [0.0, -0.3], [0.0, 0.0]) {
+            assert!(passes(&disc, [[0.0, 0.0], [0.0, -3.0]]), "the body falls through: {disc:?}");
+            assert!(!passes(&disc, [[0.0, 0.0], [0.0, -0.1]]), "the body touches: {disc:?}");
+        }
+    }
+
+    #[test]
+    fn a_plane_that_turns_over_a_point_passes_it_and_a_shell_too() {
+        let turning = |rate: &str| {
+            let normal = vec![expression(&format!("sin({rate}*t)")), expression(&format!("cos({rate}*t)"))];
+            Gap::Plane(Plane { point: numbers(&[-1.0, -0.1]), normal, rotation: None })
+        };
+        assert!(passes(&turning("-2"), [[0.5, 0.0]; 2]), "the point is inside and faces away");
+        assert!(!passes(&turning("2"), [[0.5, 0.0]; 2]), "turned away");
+        let shell = |speed: &str| {
+            let centre = vec![expression("0"), expression(speed)];
+            Gap::Sphere(Sphere { centre, radius: 1.0, hollow: true, rotation: None, axis: None })
+        };
+        assert!(passes(&shell("-5*t"), [[0.0, -0.5]; 2]));
+        assert!(!passes(&shell("0.1*t"), [[0.0, -0.5]; 2]));
+    }
+
+    #[test]
+    fn the_gap_of_a_surface_that_was_pushed_back_shows_the_obstacle_behind_its_undeformed_place() {
+        for disc in discs(0.2, [0.0, 0.1], [0.0, 0.3]) {
+            let gap = |time: f64, moved: f64| disc.of_moved(time, &[0.0, 0.0], &DOWN, moved).unwrap();
+            assert!((gap(0.0, 0.0) + 0.3).abs() < 1e-12, "the place is inside");
+            assert_eq!(gap(1.0, 0.0), f64::INFINITY, "no surface is in front of the place");
+            assert!((gap(1.0, -0.3) + 0.6).abs() < 1e-12, "the surface is 0.3 m behind: {disc:?}");
+            assert!((gap(1.0, -0.7) + 0.6).abs() < 1e-12, "the surface is beyond the disc: {disc:?}");
+        }
+        let given = Gap::Distance(expression("1/t"));
+        assert_eq!(given.of_moved(0.0, &[0.0, 0.0], &DOWN, -1.0).unwrap(), f64::INFINITY);
+    }
+}

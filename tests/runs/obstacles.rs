@@ -1,0 +1,213 @@
+//! Obstacles that contact must not miss: fast ones, those behind the boundary, those that held nodes stop, and those that never touch.
+
+use crate::{
+    case::Case,
+    launch::{self, Outcome},
+};
+
+/// A clamped elastic block without mass, 2 m x 0.5 m, under this obstacle.
+fn under(obstacle: &str) -> Case {
+    Case::of("pressing_disc")
+        .without("material.density")
+        .without("material.viscosity")
+        .set("contact.0.obstacle", obstacle)
+        .set("output", "{folder = 'out', profile = [{on = 'top'}]}")
+        .set("time", "{end = 1.0, step = 0.05, scheme = 'implicit_euler'}")
+}
+
+fn disc(height: &str, radius: f64) -> String {
+    format!("{{sphere = {{centre = [1.0, '{height}'], radius = {radius}}}}}")
+}
+
+/// The same disc as a shape.
+fn shape(height: &str, radius: f64) -> String {
+    format!("{{shape = {{distance = 'sqrt(x^2 + y^2) - {radius}', centre = [1.0, '{height}']}}}}")
+}
+
+/// The vertical forces of the contact on the block.
+fn forces(case: &Case) -> Vec<f64> {
+    case.results().table("resultants.csv").only("source", "contact top").numbers("force_y")
+}
+
+fn warns_of(outcome: &Outcome, case: &Case, words: &str) -> bool {
+    let said = launch::unwrapped(&outcome.stdout).contains(words);
+    let kept = case.results().summary()["warnings"].to_string().contains(words);
+    assert_eq!(said, kept, "in the log and in the summary alike");
+    said
+}
+
+#[test]
+fn a_disc_that_jumps_over_the_boundary_fails_the_step_on_any_number_of_ranks() {
+    for obstacle in [disc("0.65 - 8*t", 0.1), shape("0.65 - 8*t", 0.1)] {
+        for (ranks, scheme) in [(1, "implicit_euler"), (2, "bdf2"), (3, "implicit_euler")] {
+            let case = under(&obstacle).set("time.scheme", &format!("'{scheme}'"));
+            case.run_with(ranks, &[])
+                .expect(1)
+                .says("contact.0: the step to t = 5.000000e-2 s")
+                .says("its obstacle passes through the boundary at [")
+                .says(", 0.5] m, in front of which it is at the start of the step")
+                .says("take a smaller [time] step");
+            assert_eq!(case.results().checkpoints(), [0]);
+            assert_eq!(case.results().summary()["status"], "failed");
+        }
+    }
+}
+
+#[test]
+fn a_ball_that_jumps_over_the_boundary_fails_the_step() {
+    let case = Case::cube(2)
+        .set("material", "{elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}}")
+        .set("support", "[{on = ['bottom'], fix = 'all'}]")
+        .set("contact", "[{on = ['top'], normal = {unilateral = {}}}]")
+        .set("contact.0.obstacle.sphere", "{centre = [0.4, 0.6, '1.4 - 9*t'], radius = 0.2}")
+        .without("traction")
+        .without("body_force")
+        .without("initial")
+        .set("time", "{end = 0.2, step = 0.1, scheme = 'implicit_euler'}");
+    for ranks in [1, 2] {
+        case.run_with(ranks, &["--force"]).expect(1).says("passes through the boundary at [0.5, 0.5, 1.0] m");
+    }
+}
+
+#[test]
+fn adaptive_steps_are_shortened_until_a_fast_disc_is_felt() {
+    let case = under(&disc("0.65 - 8*t", 0.1))
+        .set("time", "{end = 0.035, step = 0.035, scheme = 'implicit_euler'}")
+        .set("time.adaptive", "{smallest_step = 1e-4, largest_step = 0.035, tolerance = 0.9}");
+    for ranks in [1, 2] {
+        case.run(ranks);
+        let forces = forces(&case);
+        assert!(forces[forces.len() - 1] < 0.0, "{forces:?}");
+    }
+}
+
+#[test]
+fn a_disc_that_is_pressed_in_by_more_than_its_diameter_is_felt_to_the_end() {
+    // It touches at t = 0.1 s, and lies behind the undeformed boundary from t = 0.7 s on.
+    for obstacle in [disc("0.58 - 0.2*t", 0.06), shape("0.58 - 0.2*t", 0.06)] {
+        let case = under(&obstacle);
+        case.run(2);
+        let straight = forces(&case);
+        let touching = straight.iter().position(|force| *force < 0.0).expect("contact");
+        assert!(touching <= 4, "{straight:?}");
+        for pair in straight[touching..].windows(2) {
+            assert!(pair[1] < pair[0], "the force grows with the depth: {straight:?}");
+        }
+        let top = case.results().table("profiles.csv");
+        let middle: Vec<f64> = top
+            .words("gap")
+            .into_iter()
+            .zip(top.numbers("x"))
+            .filter(|(_, x)| *x == 1.0)
+            .map(|(gap, _)| gap.parse().expect("a gap"))
+            .collect();
+        assert!(middle[middle.len() - 1].abs() < 1e-9, "{middle:?}");
+        let case = under(&obstacle).set("checkpoint", "{every = 15}").set("time.end", "0.75");
+        case.run(1);
+        let case = case.set("time.end", "1.0");
+        case.run_with(2, &["--restart"]).expect(0);
+        let restarted = forces(&case);
+        assert_eq!(restarted.len(), straight.len());
+        for (one, other) in straight.iter().zip(&restarted) {
+            assert!((one - other).abs() <= 1e-6 * straight[straight.len() - 1].abs(), "{one} and {other}");
+        }
+    }
+}
+
+#[test]
+fn nodes_that_a_support_holds_inside_of_an_obstacle_are_warned_of() {
+    let words = "beyond nodes of the boundary top that a support holds along the normal";
+    let case = under("{plane = {point = [0, 0.5], normal = [0, -1]}}")
+        .set("support", "[{on = ['left'], fix = 'all'}, {on = ['bottom'], fix = ['y']}]")
+        .set("contact.0.obstacle_load", "{direction = [0, -1], force = '1e3*t'}")
+        .set("checkpoint", "{every = 10}")
+        .set("time.end", "0.5");
+    for ranks in [1, 2, 3] {
+        assert!(warns_of(&case.run_with(ranks, &["--force"]).expect(0), &case, words));
+    }
+    let prescribed = under("{plane = {point = [0, '0.5 - 1e-3*sin(pi*t)'], normal = [0, -1]}}")
+        .set("support", "[{on = ['left'], fix = 'all'}, {on = ['bottom'], fix = ['y']}]");
+    assert!(warns_of(&prescribed.run_with(2, &[]).expect(0), &prescribed, words), "it has gone again");
+    let free = case.set("support.0.fix", "['x']");
+    assert!(!warns_of(&free.run_with(1, &["--force"]).expect(0), &free, words));
+}
+
+#[test]
+fn a_contact_that_never_touched_is_warned_of_after_the_last_step() {
+    let words = "contact.0: the boundary top never touched its obstacle";
+    let plane = |height: &str| format!("{{plane = {{point = [0, '{height}'], normal = [0, -1]}}}}");
+    for (obstacle, said) in [
+        (plane("500 - t"), Some("the smallest gap after any step was 4.985e2 m")),
+        (disc("600", 50.0), Some("the smallest gap after any step was 5.495e2 m")),
+        ("{sphere = {centre = [70, 2], radius = 1}}".into(), Some("no obstacle was along the normal")),
+        (plane("0.52 - 0.06*sin(pi*t)"), None),
+    ] {
+        let case = under(&obstacle);
+        for ranks in [1, 3] {
+            let outcome = case.run_with(ranks, &["--force"]).expect(0);
+            assert_eq!(warns_of(&outcome, &case, words), said.is_some(), "{obstacle}");
+            said.into_iter().for_each(|said| assert!(warns_of(&outcome, &case, said), "{obstacle}"));
+        }
+    }
+}
+
+#[test]
+fn a_contact_that_touched_before_a_restart_has_touched() {
+    let obstacle = "{plane = {point = [0, '0.52 - 0.06*sin(2*pi*t)'], normal = [0, -1]}}";
+    let case = under(obstacle).set("checkpoint", "{every = 10}").set("time.end", "0.5");
+    case.run(2);
+    let case = case.set("time.end", "1.0");
+    let outcome = case.run_with(1, &["--restart"]).expect(0);
+    assert!(!warns_of(&outcome, &case, "never touched"), "{}", outcome.stdout);
+}
+
+#[test]
+fn an_obstacle_inside_the_body_is_warned_of() {
+    let case = under(&disc("0.25", 0.1));
+    for ranks in [1, 2] {
+        launch::run(ranks, &["check", case.written().to_str().expect("a path")])
+            .expect(0)
+            .says("contact.0: the obstacle lies inside the body, up to 1.000e-1 m deep")
+            .says("gap        top: no obstacle along the normal of any point");
+    }
+}
+
+#[test]
+fn a_check_prints_the_gaps_of_contacts() {
+    let case = under("{plane = {point = [0, 0.75], normal = [1, -10]}}");
+    let job = case.written();
+    for ranks in [1, 2] {
+        // From 0.25 m at the left to 2 m times the slope of 0.1 more at the right.
+        launch::run(ranks, &["check", job.to_str().expect("a path")])
+            .expect(0)
+            .says("gap        top: 2.5000e-1 m to 4.5000e-1 m");
+    }
+    let case = under(&disc("0.8", 0.12));
+    let outcome = launch::run(2, &["check", "--json", case.written().to_str().expect("a path")]).expect(0);
+    let report: serde_json::Value = serde_json::from_str(&outcome.stdout).expect("an object");
+    let gaps = &report["gaps"][0];
+    assert_eq!((&gaps["on"][0], &gaps["points"]), (&"top".into(), &41.into()));
+    // Five nodes, 0.05 m apart, are under the disc.
+    assert_eq!(gaps["points_without_obstacle"], 36);
+    let range = [0, 1].map(|at| gaps["range"][at].as_f64().expect("a number"));
+    let farthest = 0.3 - (0.12f64 * 0.12 - 0.01).sqrt();
+    assert!((range[0] - 0.18).abs() < 1e-12 && (range[1] - farthest).abs() < 1e-12, "{range:?}");
+}
+
+#[test]
+fn a_punch_as_wide_as_the_block_presses_as_a_plane_does() {
+    let make =
+        |obstacle: &str| under(obstacle).set("mesh.rectangle.cells", "[15, 5]").set("time.step", "0.25");
+    let plane = make("{plane = {point = [0, '0.5 - 0.02*t'], normal = [0, -1]}}");
+    plane.run(1);
+    let distance = "max(abs(x) - 1, abs(y) - 0.3)";
+    let punch = make(&format!("{{shape = {{distance = '{distance}', centre = [1, '0.8 - 0.02*t']}}}}"));
+    for ranks in [1, 2] {
+        punch.run(ranks);
+        for (one, other) in forces(&plane).iter().zip(forces(&punch)) {
+            assert!((one - other).abs() < 1e-6 * one.abs().max(1.0), "{one} and {other}");
+        }
+        let contact = punch.results().table("resultants.csv").only("source", "contact top");
+        assert!((contact.last("touching_area") - 2.0).abs() < 1e-12, "{}", contact.last("touching_area"));
+    }
+}
