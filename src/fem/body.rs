@@ -288,14 +288,20 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// space.
     pub fn add_matrix_product(&self, length: f64, x: &[f64], scaled: &mut Vec<f64>, forces: &mut [f64]) {
         let forms = [(Form::Mass, 1.0 / length), (Form::Viscosity, 1.0), (Form::Elasticity, length)];
-        let is_in_matrix = |form: Form| {
-            !(self.is_explicit() && form == Form::Elasticity)
-                && (self.elastic_support.has(form) || self.terms().any(|term| term.form() == Some(form)))
-        };
-        for (form, factor) in forms.into_iter().filter(|(form, _)| is_in_matrix(*form)) {
+        for (form, factor) in forms {
             scaled.clear();
             scaled.extend(x.iter().map(|x| factor * x));
-            self.add_linear_form(form, scaled, forces);
+            self.add_form_of_matrix(form, scaled, forces);
+        }
+    }
+
+    /// Adds `F x` to `forces` with the part of a form that [`Body::matrix`] contains; nothing if it does not.
+    pub fn add_form_of_matrix(&self, form: Form, x: &[f64], forces: &mut [f64]) {
+        let is_explicit = self.is_explicit() && form == Form::Elasticity;
+        if !is_explicit
+            && (self.elastic_support.has(form) || self.terms().any(|term| term.form() == Some(form)))
+        {
+            self.add_linear_form(form, x, forces);
         }
     }
 

@@ -22,5 +22,5 @@ pub mod tree;
 pub use distributed::{Mesh, distribute};
 pub use global::{Boundary, GlobalMesh, Names, PointSet};
 pub use midsides::midpoint;
-pub use skeleton::free_motions;
+pub use skeleton::{count_free_motions, free_motions};
 pub use tags::Tags;

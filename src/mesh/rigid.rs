@@ -36,6 +36,22 @@ pub(super) struct Body<const D: usize> {
 impl<const D: usize> Skeleton<D> {
     /// The free motions of each body that can move, in words.
     pub(super) fn free_motions(mut self) -> Vec<String> {
+        let loose = self.loose();
+        let words = |(number, free): (usize, Vec<Motion>)| {
+            let body = &self.bodies[number];
+            let motions = body.in_words(&free);
+            format!("body {} (around {}): {}", number + 1, place(&body.centre), motions.join(", "))
+        };
+        loose.into_iter().map(words).collect()
+    }
+
+    /// The number of independent free motions of all bodies.
+    pub(super) fn count_free_motions(mut self) -> usize {
+        self.loose().iter().map(|(_, free)| free.len()).sum()
+    }
+
+    /// The numbers of the bodies that can move, each with a basis of its free motions.
+    fn loose(&mut self) -> Vec<(usize, Vec<Motion>)> {
         let mut loose: Vec<usize> = (0..self.bodies.len()).collect();
         loop {
             let before = loose.len();
@@ -51,12 +67,8 @@ impl<const D: usize> Skeleton<D> {
                 break;
             }
         }
-        let words = |&number: &usize| {
-            let body = &self.bodies[number];
-            let motions = body.in_words(&body.free(&self.points, &self.held));
-            format!("body {} (around {}): {}", number + 1, place(&body.centre), motions.join(", "))
-        };
-        loose.iter().map(words).collect()
+        let free = |number: usize| (number, self.bodies[number].free(&self.points, &self.held));
+        loose.into_iter().map(free).collect()
     }
 }
 

@@ -31,6 +31,16 @@ pub fn free_motions<const D: usize>(
     Ok(skeleton(session, mesh, held, along)?.free_motions())
 }
 
+/// The number of these motions. Collective.
+pub fn count_free_motions<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    held: &[[bool; D]],
+    along: &[(usize, Vector<D>)],
+) -> Result<usize, Agreed> {
+    Ok(skeleton(session, mesh, held, along)?.count_free_motions())
+}
+
 /// The bodies, each with constraints that span those of its held nodes, at most six from each rank, and the points that it shares
 /// with other bodies. Collective, the same on all ranks.
 fn skeleton<const D: usize>(

@@ -148,7 +148,9 @@ fn may_conserve<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) ->
     let supports = ["damage", "adhesion", "contact_memory"].iter().all(|name| !names.contains(name));
     let mut materials = job.region.iter().map(|region| &region.material).chain([&job.material]);
     let is_inertial = materials.all(|material| material.density.is_some());
-    supports && is_inertial && job.time.adaptive.is_none() && body.support_motion.is_none()
+    let turns =
+        job.contact.iter().filter_map(|contact| contact.obstacle_load.as_ref()?.moment.as_ref()).count() > 0;
+    supports && is_inertial && !turns && job.time.adaptive.is_none() && body.support_motion.is_none()
 }
 
 /// Up to which step the scheme of a job is stable, and which scheme suits the job.

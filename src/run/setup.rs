@@ -79,7 +79,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
         ),
         _ => error.into(),
     })?;
-    let certificates = session.agree(Certificates::of(session, &body, &state, &mut matrix, longest))?;
+    let certificates =
+        session.agree(Certificates::of(session, &body, &state, &mut matrix, steps::range(job)))?;
     let unique_step = if certificates.steps_are_unique() {
         None
     } else {

@@ -2,7 +2,7 @@
 
 use crate::{
     job::{Every, Job, Scalar},
-    solver::stepping::{Adaptive, Breakpoint, Landings, TIME_TOLERANCE},
+    solver::stepping::{Adaptive, Breakpoint, Landings, StepRange, TIME_TOLERANCE},
 };
 
 /// Steps end at the kinks of a table if at most this number lies within steps, or one in every ten steps.
@@ -23,6 +23,18 @@ pub(super) fn adaptive<const D: usize>(job: &Job) -> Option<Adaptive<D>> {
 /// The longest step of a job.
 pub(super) fn longest_step(job: &Job) -> f64 {
     adaptive::<2>(job).map_or(job.time.step, |adaptive| adaptive.longest())
+}
+
+/// The lengths that the steps of a job may have.
+pub(super) fn range(job: &Job) -> StepRange {
+    let landings = landings(job);
+    match adaptive::<2>(job) {
+        None => StepRange::fixed(job.time.scheme, &landings),
+        Some(adaptive) => {
+            let shortest = adaptive.shortest().min(landings.shortest_gap());
+            StepRange::adaptive(job.time.scheme, [shortest, adaptive.longest()])
+        }
+    }
 }
 
 /// A value that may depend on time.

@@ -148,8 +148,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         while let Some(outcome) =
             self.simulation.advance(self.session).or_else(|error| self.explain(error))?
         {
-            let Simulation { state, landings, adaptive, .. } = &self.simulation;
             self.refuse_overflow()?;
+            self.cover_steps()?;
+            self.refuse_uncertified(&outcome)?;
+            let Simulation { state, landings, adaptive, .. } = &self.simulation;
             self.outputs.after_step(self.session, &self.simulation, &outcome)?;
             let has_steps_left = state.time < self.job.time.end;
             let steps_left = landings.steps_after(state.time, state.step_length);
@@ -180,6 +182,53 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             }
             _ => Err(error.into()),
         }
+    }
+
+    /// Renews the certificates if the run has made steps for which they do not hold, and fails if the new ones require the consent of the
+    /// job. Collective.
+    fn cover_steps(&mut self) -> Result<()> {
+        let Simulation { body, state, scheme, .. } = &mut self.simulation;
+        let Some(taken) = scheme.attempted().filter(|taken| !self.certificates.hold_for(*taken)) else {
+            return Ok(());
+        };
+        let range = self.certificates.range.map_or(taken, |range| range.or(taken));
+        let [shortest, longest] = taken.steps;
+        self.log.warning(format!(
+            "at t = {:.6e} s the steps of the run, of {shortest:.4e} to {longest:.4e} s, are outside of the range of its certificates, \
+             which are computed anew",
+            state.time
+        ));
+        let mut matrix = scheme.matrix(self.session, body, range.steps[1])?;
+        let renewed = Certificates::of(self.session, body, state, &mut matrix, range)?;
+        let words = renewed.verdict(range.steps[1], None, &self.job.solver.accept);
+        words.words.iter().for_each(|words| self.log.line(format!("certified  {words}")));
+        let was_unique = self.certificates.steps_are_unique();
+        self.certificates = renewed;
+        if was_unique && !self.certificates.steps_are_unique() && !words.refusals.is_empty() {
+            return Err(Error::Failed(format!(
+                "at t = {:.6e} s a step may have several solutions: theta is {:.4} for the steps of this run; choose other steps, or \
+                 accept it with [solver] accept = [\"uniqueness\"]",
+                state.time,
+                self.certificates.theta_step.unwrap_or(f64::NAN)
+            )));
+        }
+        Ok(())
+    }
+
+    /// Fails if the search has found several solutions of a step that has one according to the certificates: one of them is wrong.
+    fn refuse_uncertified(&self, outcome: &StepOutcome) -> Result<()> {
+        let known = &self.certificates;
+        let Some(theta) = known.theta_step.filter(|_| known.covers_steps && known.steps_are_unique()) else {
+            return Ok(());
+        };
+        if !outcome.solutions_differ {
+            return Ok(());
+        }
+        Err(Error::Internal(format!(
+            "the search found {} solutions of the step to t = {:.6e} s, which has one because theta of a step is {theta:.4}: this is a \
+             fault of the program, and neither the certificate nor the solutions can be relied on; please report it with the job",
+            outcome.solutions, self.simulation.state.time
+        )))
     }
 
     /// Fails if energies, stresses or residuals are not finite.

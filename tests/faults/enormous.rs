@@ -88,8 +88,8 @@ fn a_mesh_that_does_not_fit_in_the_memory_ends_with_the_sum_that_is_needed() {
         command.arg(format!("ulimit -v {MEMORY}; exec \"$0\" check \"$1\""));
         command.arg(env!("CARGO_BIN_EXE_solver")).arg(case.written());
         let outcome = Running::spawn(command).wait().expect(1);
-        outcome.says("not enough memory").says("32000000 cells").says("11.2 GB").says("are available");
         assert_eq!(outcome.stderr.matches("not enough memory").count(), 1, "{}", outcome.stderr);
+        outcome.says("not enough memory").says("32000000 cells").says("11.2 GB").says("are available");
     }
 }
 

@@ -150,6 +150,7 @@ fn a_check_says_what_a_run_would_be_and_writes_nothing() {
         let expected = [
             "theta",
             "theta_step",
+            "step_range",
             "viscosity_modulus",
             "monotonicity_constant",
             "growth_constants",

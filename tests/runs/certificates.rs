@@ -249,3 +249,136 @@ fn a_step_beyond_a_bound_is_refused_with_the_largest_one_and_runs_if_accepted() 
     let results: Results = accepted.run(1);
     assert!(launch::unwrapped(&results.text("run.log")).contains("accepted by the job"));
 }
+
+/// An elastic layer without inertia above a foundation whose pressure falls with the velocity by 60 Pa s/m. Per area, the layer resists
+/// the velocity of its lower side with 900 Pa/m times the length of the matrix of a step.
+fn layer(scheme: &str, step: f64, end: f64) -> Case {
+    Case::of("hard/three_solutions")
+        .set("mesh.rectangle.size", "[0.5, 2.0]")
+        .set("mesh.rectangle.cells", "[2, 3]")
+        .without("material.viscosity")
+        .set("material.elasticity", "{ youngs_modulus = 1800.0, poisson_ratio = 0.0 }")
+        .set("traction", "[{ on = ['bottom'], value = [0, '-(1.4*t + 0.5*t^2)'] }]")
+        .set("contact.0.normal.graph.points", "[[0.0, 0.0], [1e-3, 0.08], [2e-3, 0.02]]")
+        .set("contact.0.normal.graph.slope_before", "80.0")
+        .set("contact.0.normal.graph.slope_after", "80.0")
+        .set("time.scheme", &format!("'{scheme}'"))
+        .set("time.step", &format!("{step:?}"))
+        .set("time.end", &format!("{end:?}"))
+        .set("solver", "{ guesses = 20 }")
+        .set("output.probe", "[]")
+}
+
+/// `theta` of a step of the layer whose matrix is for this length.
+fn theta_of_layer(length: f64) -> f64 {
+    60.0 / (900.0 * length)
+}
+
+#[test]
+fn a_certificate_is_that_of_the_worst_step_of_the_scheme() {
+    // Under bdf2 all steps but the first have two thirds of the elastic part.
+    for (scheme, worst) in [("implicit_euler", 0.08), ("bdf2", 0.08 / 1.5)] {
+        let theta = theta_of_layer(worst);
+        let unsafe_step = theta > 0.999;
+        for ranks in [1, 2] {
+            let case = layer(scheme, 0.08, 0.4);
+            let found =
+                certificate(&check(&case.set("solver.accept", "['uniqueness']"), ranks), "theta_step");
+            close(found / theta, 1.0, 1e-5, scheme);
+        }
+        let outcome = layer(scheme, 0.08, 0.4).run_with(2, &["--force"]);
+        if unsafe_step {
+            outcome.expect(2).says("may have several solutions");
+        } else {
+            outcome.expect(0);
+        }
+    }
+    assert!(theta_of_layer(0.08) < 0.999 && theta_of_layer(0.08 / 1.5) > 1.0);
+}
+
+#[test]
+fn a_certificate_is_that_of_the_shortest_step_where_short_steps_are_worse() {
+    let accepted = |case: Case| check(&case.set("solver.accept", "['uniqueness']"), 2);
+    let theta = |case: Case| certificate(&accepted(case), "theta_step");
+    let safe = || layer("implicit_euler", 0.08, 0.4);
+    close(theta(safe()), theta_of_layer(0.08), 1e-5, "equal steps");
+    // Steps of 0.08 s, and one of 0.03 s, 0.02 s, 0.01 s or 0.04 s.
+    close(theta(safe().set("time.land_on", "[0.11]")) / theta_of_layer(0.03), 1.0, 1e-5, "a landing");
+    close(theta(layer("implicit_euler", 0.08, 0.42)) / theta_of_layer(0.02), 1.0, 1e-5, "the end");
+    let output = safe().set("output.fields", "{ at = [0.09] }");
+    close(theta(output) / theta_of_layer(0.01), 1.0, 1e-5, "an output");
+    let kink = safe()
+        .set("traction", "[{ on = ['bottom'], value = [0, 'interpolate(t, 0, 0, 0.12, -0.1, 1, -0.2)'] }]");
+    close(theta(kink) / theta_of_layer(0.04), 1.0, 1e-5, "a kink of a load");
+    let adaptive =
+        safe().set("time.adaptive", "{ tolerance = 0.1, smallest_step = 0.02, largest_step = 0.32 }");
+    close(theta(adaptive) / theta_of_layer(0.01), 1.0, 1e-5, "half of the shortest adaptive step");
+    let checked = accepted(safe().set("time.land_on", "[0.11]"));
+    let [shortest, longest]: [f64; 2] =
+        serde_json::from_value(checked["certificates"]["step_range"].clone()).expect("a range");
+    close(shortest, 0.03, 1e-12, "the shortest step");
+    close(longest, 0.08, 1e-12, "the longest step");
+    let refused = safe().set("time.land_on", "[0.11]").run_with(2, &["--force"]).expect(2);
+    refused.says("a step between 3.0000e-2 and 8.0000e-2 s may have several solutions");
+}
+
+#[test]
+fn a_bound_of_the_slip_pressure_is_that_of_the_worst_step() {
+    let block = |scheme: &str| {
+        Case::of("hard/three_solutions")
+            .set("mesh.rectangle.size", "[0.6, 0.5]")
+            .set("mesh.rectangle.cells", "[4, 3]")
+            .without("material.viscosity")
+            .set("material.elasticity", "{ youngs_modulus = 3e6, poisson_ratio = 0.2 }")
+            .set("support", "[{ on = ['top'], fix = 'all', displacement = ['0.002*t', -1e-4] }]")
+            .without("traction")
+            .set("contact.0.normal", "{ unilateral = {} }")
+            .set(
+                "contact.0.friction",
+                "{ distance_weakening = { static = 0.5, dynamic = 0.3, distance = 2e-4 } }",
+            )
+            .set("time.scheme", &format!("'{scheme}'"))
+            .set("time.end", "0.5")
+            .set("solver", "{}")
+            .set("output.probe", "[]")
+    };
+    let bound = |case: Case, ranks| certificate(&check(&case, ranks), "slip_pressure_bound");
+    for ranks in [1, 2] {
+        let euler = bound(block("implicit_euler"), ranks);
+        // The friction coefficient falls with the slip of the whole step, and the matrix has k' = 2/3 k.
+        close(bound(block("bdf2"), ranks) / euler * 1.5, 1.0, 1e-5, "bdf2");
+        // Both are in proportion to the step.
+        close(
+            bound(block("implicit_euler").set("time.land_on", "[0.07]"), ranks) / euler,
+            1.0,
+            1e-5,
+            "short",
+        );
+    }
+}
+
+#[test]
+fn a_restart_with_steps_outside_of_the_certified_range_renews_the_certificate() {
+    // The first run ends with a step of 0.1 s, so that the second one continues with k = 0.2 s and k' = 0.6 k, and ends with a step
+    // of 0.1 s and k' = 0.75 k. Without the restart all its steps were of 0.2 s.
+    for ranks in [1, 2] {
+        let case = layer("bdf2", 0.2, 0.5).set("checkpoint", "{ every = 100 }");
+        case.run_with(ranks, &["--force"]).expect(0);
+        case.run_with(ranks, &["--restart", "--set", "time.end=1.0"]).expect(0);
+        let log = launch::unwrapped(&case.results().text("run.log"));
+        assert!(
+            log.contains("are outside of the range of its certificates, which are computed anew"),
+            "{log}"
+        );
+        let theta = case.results().summary()["certificates"]["theta_step"].as_f64().expect("theta");
+        close(theta / theta_of_layer(0.075), 1.0, 1e-5, "theta after the restart");
+    }
+}
+
+#[test]
+fn a_search_finds_one_solution_of_a_body_at_rest() {
+    for ranks in [1, 2] {
+        let results = layer("implicit_euler", 0.08, 0.16).without("traction").run(ranks);
+        assert_eq!(results.summary()["guesses"]["most_solutions"], 1, "on {ranks} ranks");
+    }
+}

@@ -54,11 +54,11 @@ fn a_pad_never_wears_off_more_than_it_overlaps_its_belt_in_steps_of_any_length()
     for scheme in ["implicit_euler", "bdf2"] {
         for step in [0.7, 1.9, 4.0, 300.0] {
             for law in ["{ unilateral = {} }", "{ compliance = { stiffness = 1e12 } }"] {
-                let case = pad(scheme, step, 6.0 * step).set("contact.0.normal", law);
+                let case = pad(scheme, step, 3.0 * step).set("contact.0.normal", law);
                 let results = case.run(1);
                 let depth = deepest(&results);
                 assert!(
-                    depth <= INTERFERENCE * (1.0 + 1e-9) && depth > 0.9 * INTERFERENCE,
+                    depth <= INTERFERENCE * (1.0 + 1e-9) && depth > 0.75 * INTERFERENCE,
                     "{scheme}, {law}, steps of {step} s: {depth} m"
                 );
                 assert!(results.number("max_energy_imbalance") < 1e-9, "{scheme}, {law}, steps of {step} s");

@@ -197,7 +197,9 @@ fn bound(session: &Session) {
         };
         let mut run = simulation::<2, 4>(session, &text(1e-3), &crossed([3, 2]));
         let mut matrix = run.scheme.matrix(session, &mut run.body, 1e-3).expect("matrix");
-        let known = Certificates::of(session, &run.body, &run.state, &mut matrix, 0.0).expect("certificates");
+        let range = matrix.range;
+        let known =
+            Certificates::of(session, &run.body, &run.state, &mut matrix, range).expect("certificates");
         let step = factor * known.explicit_step_bound.expect("a bound");
         let mut run = simulation::<2, 4>(session, &text(step), &crossed([3, 2]));
         while run.advance(session).expect("a step").is_some() {}

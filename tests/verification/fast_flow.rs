@@ -95,7 +95,8 @@ pub fn together(session: &Session) {
     let mesh = rectangle([1.0, 1.0], [2, 2], Diagonal::Crossed, [1.0; 2]).expect("mesh");
     let mut run = simulation::<2, 4>(session, &job(0.01), &mesh);
     let mut matrix = run.scheme.matrix(session, &mut run.body, 0.01).expect("matrix");
-    let found = Certificates::of(session, &run.body, &run.state, &mut matrix, 0.01).expect("certificates");
+    let range = matrix.range;
+    let found = Certificates::of(session, &run.body, &run.state, &mut matrix, range).expect("certificates");
     let (explicit, flowing) =
         (found.explicit_step_bound.expect("a bound"), found.flowing_step_bound.expect("a bound"));
     assert!((explicit / (2.0 * tau) - 1.0).abs() < 1e-6, "{explicit}");

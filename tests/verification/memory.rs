@@ -105,7 +105,8 @@ fn follows<const D: usize, const S: usize>(
 fn bound(session: &Session) {
     let mut run = simulation::<2, 4>(session, &job::<2>(&["bottom"], MEMORY), &crossed([3, 2]));
     let mut matrix = run.scheme.matrix(session, &mut run.body, END / STEPS as f64).expect("matrix");
-    let known = Certificates::of(session, &run.body, &run.state, &mut matrix, 0.0).expect("certificates");
+    let range = matrix.range;
+    let known = Certificates::of(session, &run.body, &run.state, &mut matrix, range).expect("certificates");
     let (found, expected) =
         (known.explicit_step_bound.expect("a bound"), 2.0 * (DENSITY * 0.9 / (MEMORY[0] * MEMORY[1])).sqrt());
     assert!((found / expected - 1.0).abs() < 1e-2, "{found} s instead of {expected} s");

@@ -193,7 +193,8 @@ fn compare<const D: usize, const S: usize>(
     let what = format!("{what}, {D}D, {density} kg, {} ranks", session.ranks());
     let mut run = simulation::<D, S>(session, &job::<D>(contacts, density), mesh);
     let mut of_step = run.scheme.matrix(session, &mut run.body, STEP).expect("matrix");
-    let found = Certificates::of(session, &run.body, &run.state, &mut of_step, STEP).expect("certificates");
+    let range = of_step.range;
+    let found = Certificates::of(session, &run.body, &run.state, &mut of_step, range).expect("certificates");
     let largest_step =
         Certificates::unique_step(session, &run.body, &run.state, &mut of_step).expect("certificate");
     let matrix = dense(session, (&run.body, &run.state), |x, y| of_step.multiply(x, y).expect("product"));
@@ -287,7 +288,8 @@ fn cube(quadrature: &str, solver: &str) -> String {
 fn theta_of_cube(session: &Session, mesh: &GlobalMesh<3>, quadrature: &str) -> f64 {
     let mut run = simulation::<3, 6>(session, &cube(quadrature, "accept = ['uniqueness']"), mesh);
     let mut matrix = run.scheme.matrix(session, &mut run.body, 0.04).expect("matrix");
-    let found = Certificates::of(session, &run.body, &run.state, &mut matrix, 0.04).expect("certificates");
+    let range = matrix.range;
+    let found = Certificates::of(session, &run.body, &run.state, &mut matrix, range).expect("certificates");
     found.theta_step.expect("theta")
 }
 

@@ -46,9 +46,9 @@ use crate::{
 pub use crate::laws::step::{Blend, Evaluation, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode, Gaps,
-    LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, PointCount, PointState,
-    Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns, contact_nodes,
+    CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode, Decrease,
+    Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, PointCount,
+    PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns, contact_nodes,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

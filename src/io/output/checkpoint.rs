@@ -415,13 +415,6 @@ fn check_mesh<const D: usize, const S: usize>(
     body: &Body<D, S>,
 ) -> Result<Header> {
     let header = read_header(path, bytes)?;
-    if header.start_state.is_some() && header.start_state != identity.start_state {
-        return refuse(
-            "the state from which the run started has changed since the checkpoint was written; restore that state, or start the run \
-             again without --restart"
-                .into(),
-        );
-    }
     if header.mesh != digest(body) || header.dimension != D {
         let words =
             "the checkpoint belongs to another mesh; a run can start only from a state on its own mesh";
@@ -438,6 +431,13 @@ fn check<const D: usize, const S: usize>(
 ) -> Result<Header> {
     let refuse = |words: String| Err(refused(path, &words));
     let header = read_header(path, bytes)?;
+    if header.start_state.is_some() && header.start_state != identity.start_state {
+        return refuse(
+            "the state from which the run started has changed since the checkpoint was written; restore that state, or start the run \
+             again without --restart"
+                .into(),
+        );
+    }
     let differing = differing_keys(&header.physics, &identity.physics);
     if !differing.is_empty() {
         let lines: Vec<String> = differing

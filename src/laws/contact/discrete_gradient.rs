@@ -127,7 +127,7 @@ mod tests {
     }
 
     fn node(before: f64, growth: f64) -> NodeContext {
-        NodeContext { penetration: before - growth, step_length: 0.02, mean_from: Some(before) }
+        NodeContext { penetration: before - growth, step_length: 0.02, mean_from: Some(before), erosion: 0.0 }
     }
 
     #[test]

@@ -25,8 +25,7 @@ pub struct NodeContext {
 
 impl NodeContext {
     /// A point with closed gap at the start of a step of 1 s, in which velocity in m/s and penetration in m are equal.
-    pub const AT_THE_GAP: Self =
-        Self { penetration: 0.0, step_length: 1.0, mean_from: None, erosion: 0.0 };
+    pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0, mean_from: None, erosion: 0.0 };
 
     /// The penetration in m at the end of the step, at a normal velocity in m/s.
     pub(super) fn penetration_at(&self, velocity: f64) -> f64 {

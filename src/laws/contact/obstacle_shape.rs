@@ -216,7 +216,8 @@ impl Shape {
             let start = add_scaled(offset, -length, normal);
             if self.distance_at(&start) > slack {
                 let found = self.search(&start, normal, [larger(size, length), slack]).length;
-                return if found <= length { found - length } else { f64::NAN };
+                // The place is inside, if only by rounding.
+                return if found.is_finite() { (found - length).min(0.0) } else { f64::INFINITY };
             }
         }
         f64::INFINITY

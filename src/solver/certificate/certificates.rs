@@ -1,5 +1,6 @@
 //! The values of the certificates.
 
+use crate::solver::stepping::StepRange;
 use serde::{Deserialize, Serialize};
 
 /// Constants of the problem; null if undefined.
@@ -10,6 +11,14 @@ pub struct Certificates {
     pub theta: Option<f64>,
     /// The same with the matrix of a step, and with the sums over its quadrature points.
     pub theta_step: Option<f64>,
+    /// The shortest and the longest step in s for which `theta_step` and `slip_pressure_bound` hold; null if they hold for any.
+    pub step_range: Option<[f64; 2]>,
+    /// The same with the lengths of the matrices of these steps.
+    #[serde(skip)]
+    pub range: Option<StepRange>,
+    /// Whether `theta_step` below 1 excludes a second solution of a step.
+    #[serde(skip)]
+    pub covers_steps: bool,
     /// `m_A` in Pa s.
     pub viscosity_modulus: Option<f64>,
     /// `m_j` in Pa s/m.
@@ -52,5 +61,19 @@ impl Certificates {
     /// Whether each step has one solution according to `theta_step`, if it is defined.
     pub fn steps_are_unique(&self) -> bool {
         self.theta_step.is_none_or(|theta| theta < 1.0 - Self::MARGIN)
+    }
+
+    /// Whether they cover these steps.
+    pub fn hold_for(&self, steps: StepRange) -> bool {
+        self.range.is_none_or(|range| range.contains(steps))
+    }
+
+    /// The steps for which `theta_step` holds, in words; empty if it holds for any.
+    pub(super) fn steps_in_words(&self) -> String {
+        match self.step_range {
+            None => String::new(),
+            Some([shortest, longest]) if shortest == longest => format!(" of {shortest} s"),
+            Some([shortest, longest]) => format!(" of {shortest:.4e} to {longest:.4e} s"),
+        }
     }
 }

@@ -1,7 +1,18 @@
 //! Cases that the certificates do not cover.
 
 use super::Certificates;
-use crate::fem::body::Body;
+use crate::fem::{body::Body, effect::Contact};
+
+/// Whether `theta_step` below 1 excludes a second solution of a step: nothing in the step depends on the unknown contact pressures or
+/// softens, and cells do not flow in it.
+pub(super) fn covers_steps<const D: usize, const S: usize>(body: &Body<D, S>, step_length: f64) -> bool {
+    let is_uncovered = |contact: &Contact<D>| {
+        contact.friction().is_some_and(|friction| friction.follows_pressure())
+            || contact.obstacle.is_some()
+            || contact.decrease_per_pressure(step_length).is_some()
+    };
+    !body.contacts.iter().any(is_uncovered) && body.softening().next().is_none() && !body.flows()
+}
 
 /// Descriptions of effects that depend on the unknown contact pressures, and of effects that may soften the body at the end of a
 /// step.

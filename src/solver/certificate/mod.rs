@@ -19,8 +19,16 @@
 //! smallest `c1`, then the smallest `c0`, that hold for all contact laws. A rigid obstacle has no growth constants, because its
 //! graph ends in a vertical ray; there, existence follows from the monotonicity of the graph. Laws that depend on the displacement
 //! have none either. Where a law decreases with the displacement, by `m` in Pa/m at most, its `m_j` in a step of length `k` is `k m`:
-//! `theta_step` covers each step, and no certificate of the continuous problem is known. Where the steps have several lengths, these
-//! are certificates of the first one.
+//! `theta_step` covers each step, and no certificate of the continuous problem is known.
+//!
+//! `theta_step` and `slip_pressure_bound` are those of the worst step that the run can make, of all lengths between the shortest and the
+//! longest of its range (`StepRange`) and of all coefficients of its scheme. With the length `k'` for which a scheme takes its matrix
+//! `M/k' + A + k' E` (`bdf2`: from `k/2`, if a step of length `k` is much longer than the last one, to `k` in the first step; `midpoint`:
+//! `k/2`) the quotient of each motion has one peak as a function of `k'` (`worst_length.rs`), so that the ascent over motions takes the
+//! worst length of each. It starts from lengths over the whole range, because there may be several local peaks. Slopes of laws of the
+//! displacement grow with `k'` (`midpoint`: with `k`), those of friction that weakens with the slip or a state with `k`, those of damped
+//! responses do not: without inertia and viscosity their worst step is the shortest. A run that makes a step outside of the range, as
+//! after a restart with other steps, renews its certificates.
 //!
 //! `m_j` is the steepest decrease of a contact graph, `m_t` that of a friction graph (slip weakening: the decrease of the
 //! coefficient times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. If the normal law has
@@ -40,6 +48,7 @@ mod forms;
 mod small_eigen;
 mod suprema;
 mod verdict;
+mod worst_length;
 
 pub use certificates::Certificates;
 pub use verdict::Verdict;
@@ -51,29 +60,28 @@ use crate::{
         effect::{Contact, Form},
         state::State,
     },
+    linear_algebra::tensor::Vector,
+    mesh::count_free_motions,
     parallel::session::Session,
-    solver::stepping::MatrixOfStep,
+    solver::stepping::{MatrixOfStep, StepRange},
 };
-use coverage::not_covered;
+use coverage::{covers_steps, not_covered};
 use suprema::{Suprema, Supremum};
 
 /// Number of velocity components up to which the cost of the sharp bound of explicit steps is negligible.
 const SMALL: usize = 10_000;
-/// A trace norm |gamma|^2 of more than this multiple of the length of the body is caused by a rigid motion of one of several bodies
-/// and rounding errors.
-const RIGID: f64 = 1e10;
 
 impl Certificates {
-    /// Computes the certificates of a body and the matrix of its step; no step is longer than `longest` in s.
+    /// Computes the certificates of a body, given the range of its steps and the matrix of one of them, preferably the longest.
     /// Collective.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
         state: &State,
         matrix: &mut MatrixOfStep<'_>,
-        longest: f64,
+        range: StepRange,
     ) -> Result<Self> {
-        let length = matrix.length;
+        let (length, longest) = (matrix.length, range.steps[1]);
         let steepest = |constants: [f64; 2]| constants.into_iter().fold(0.0, f64::max);
         let falls = body.contacts.iter().map(|c| steepest(c.monotonicity_constants(length)));
         let decrease = body.contacts.iter().filter_map(Contact::decrease_with_displacement);
@@ -89,21 +97,23 @@ impl Certificates {
             ..Self::default()
         };
         let scheme_is_implicit = matrix.scheme.is_implicit();
-        let mut suprema = Suprema::new(session, body, state, matrix);
+        let mut suprema = Suprema::new(session, body, state, matrix, range);
         if !body.contacts.is_empty() {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
             known.theta_step = Some(if falling { suprema.find(Supremum::ThetaStep)? } else { 0.0 });
             if viscous && decrease.is_none() {
                 known.theta = Some(if falling { suprema.find(Supremum::Theta)? } else { 0.0 });
             }
-            if !suprema.is_unbounded_by_rigid_motions(Supremum::TraceNorm)? {
-                known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?)
-                    .filter(|norm| *norm < RIGID * extent(session, &body.mesh.nodes));
+            let normals = body.contacts.iter().flat_map(Contact::normal_directions);
+            if !moves_rigidly(session, body, normals, false)? {
+                known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?);
             }
         }
         if body.contacts.iter().any(|contact| contact.decrease_per_pressure(length).is_some()) {
             let bound = if known.steps_are_unique() {
-                if suprema.is_unbounded_by_rigid_motions(Supremum::SlipPressure)? {
+                let slips = |contact: &&Contact<D>| contact.decrease_per_pressure(length).is_some();
+                let tangents = body.contacts.iter().filter(slips).flat_map(Contact::tangential_directions);
+                if moves_rigidly(session, body, tangents, true)? {
                     0.0
                 } else {
                     (1.0 - Self::MARGIN) / suprema.find(Supremum::SlipPressure)?
@@ -114,6 +124,11 @@ impl Certificates {
             known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite() && *bound >= 0.0);
         }
         known.decrease_with_displacement = decrease;
+        let depends = known.theta_step.is_some_and(|theta| theta != 0.0)
+            || known.slip_pressure_bound.is_some_and(|bound| bound != 0.0);
+        known.range = depends.then_some(range);
+        known.step_range = depends.then_some(range.steps);
+        known.covers_steps = covers_steps(body, length);
         known.not_covered = not_covered(body, &known, length);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let flow = body.flow_properties().map(|flow| flow.step_bound).reduce(f64::min);
@@ -146,18 +161,34 @@ impl Certificates {
         if !body.has_form_everywhere(Form::Mass) {
             return Ok(None);
         }
-        Ok(Some(1.0 / Suprema::new(session, body, state, matrix).find(Supremum::UniqueStep)?))
+        let range = matrix.range;
+        Ok(Some(1.0 / Suprema::new(session, body, state, matrix, range).find(Supremum::UniqueStep)?))
     }
 }
 
-/// The longest side of the box around these nodes on all ranks. Collective.
-fn extent<const D: usize>(session: &Session, nodes: &[[f64; D]]) -> f64 {
-    let bound = |sign: f64| -> [f64; D] {
-        let most = |i| nodes.iter().map(|node| sign * node[i]).fold(f64::NEG_INFINITY, f64::max);
-        session.largest(std::array::from_fn(most))
-    };
-    let (high, low) = (bound(1.0), bound(-1.0));
-    (0..D).map(|i| high[i] + low[i]).fold(0.0, f64::max)
+/// Whether a rigid motion of a body moves these nodes along these directions without resistance of the supports, and of the inertia
+/// and the springs if those count: a supremum of the motion over its resistance is then infinite, and its numerical value a rounding
+/// error. Collective.
+fn moves_rigidly<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    directions: impl Iterator<Item = (usize, Vector<D>)>,
+    inertia_and_springs_count: bool,
+) -> Result<bool> {
+    let mesh = &body.mesh;
+    let mut held: Vec<[bool; D]> = body.held.flags().as_chunks().0.to_vec();
+    let mut along: Vec<_> = body.held.slanted_directions().collect();
+    if inertia_and_springs_count {
+        along = body.support_directions().collect();
+        let mut masses = vec![0.0; held.len() * D];
+        body.add_form(Form::Mass, &vec![1.0; held.len() * D], &mut masses);
+        for (held, masses) in held.iter_mut().zip(masses.as_chunks::<D>().0) {
+            (0..D).for_each(|i| held[i] |= masses[i] > 0.0);
+        }
+    }
+    let free = count_free_motions(session, mesh, &held, &along)?;
+    along.extend(directions);
+    Ok(free > 0 && count_free_motions(session, mesh, &held, &along)? < free)
 }
 
 /// Growth constants that hold for all contacts, if there are any contacts.

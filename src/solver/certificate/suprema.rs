@@ -2,16 +2,21 @@
 
 use super::{
     Certificates,
-    ascent::{Limits, Quotient, maximise},
+    ascent::{Limits, Maximum, Quotient, maximise},
     cells::stable_step,
     forms,
+    worst_length::worst_length,
 };
 use crate::{
     error::Result,
-    fem::{body::Body, effect::Form, state::State},
-    linear_algebra::petsc::DistributedVector,
+    fem::{
+        body::Body,
+        effect::{Contact, Decrease, Form},
+        state::State,
+    },
+    linear_algebra::{petsc::DistributedVector, tensor::larger},
     parallel::session::Session,
-    solver::stepping::MatrixOfStep,
+    solver::stepping::{MatrixOfStep, StepRange, TIME_TOLERANCE},
 };
 
 /// Convergence limits for the supremum of the explicit step.
@@ -20,11 +25,6 @@ const EXPLICIT_STEP_LIMITS: Limits = Limits { tolerance: 1e-5, iterations: 60 };
 const CONTACT_LIMITS: Limits = Limits { tolerance: 1e-8, iterations: 200 };
 /// `theta_step` of the suggested largest step; the distance from 1 allows for the rounding of its digits.
 const SUGGESTED_THETA_STEP: f64 = 1.0 - 2.0 * Certificates::MARGIN;
-
-/// Share of the quotients of an irregular motion below which those of a rigid motion are rounding errors.
-const UNRESOLVED: f64 = 1e-13;
-/// Share of the square of a motion below which what is left of it without others is a rounding error.
-const DEPENDENT: f64 = 1e-10;
 
 /// The supremum to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +39,72 @@ pub(super) enum Supremum {
     SlipPressure,
 }
 
+/// Largest ratio of neighbouring lengths from which the search for the worst step starts.
+const RATIO_OF_STARTS: f64 = 10.0;
+
+/// Steps whose worst one is sought.
+#[derive(Debug, Clone, Copy)]
+struct Steps {
+    /// The least and the greatest length in s of their matrices.
+    lengths: [f64; 2],
+    slip: Slip,
+}
+
+/// The length of steps by which the slip of friction grows.
+#[derive(Debug, Clone, Copy)]
+enum Slip {
+    /// This multiple of the length of the matrix.
+    OfMatrix(f64),
+    /// This length in s.
+    Whole(f64),
+}
+
+impl Steps {
+    /// The steps of a range. As slip grows by at most the longest step, and by at most a multiple of the length of the matrix, they are two
+    /// sorts where the length of the matrix may be that of the step or less.
+    fn of(range: StepRange, has_slip: bool) -> Vec<Self> {
+        let ([least, greatest], longest) = (range.matrices, range.steps[1]);
+        let bend = (longest / range.slip).clamp(least, greatest);
+        if !has_slip || bend * (1.0 + TIME_TOLERANCE) >= greatest {
+            return vec![Self { lengths: [least, greatest], slip: Slip::OfMatrix(range.slip) }];
+        }
+        vec![
+            Self { lengths: [least, bend], slip: Slip::OfMatrix(range.slip) },
+            Self { lengths: [bend, greatest], slip: Slip::Whole(longest) },
+        ]
+    }
+
+    /// Whether all have a matrix of this length in s.
+    fn have_length(&self, length: f64) -> bool {
+        self.lengths.iter().all(|own| (own - length).abs() <= TIME_TOLERANCE * length)
+    }
+
+    /// The decreases of a contact in a step, as a multiple of the length of the matrix and a constant.
+    fn decreases(&self, [normal, tangential]: [Decrease; 2], is_midpoint: bool) -> [Decrease; 2] {
+        // Contact at the end of a step, and the matrix of half of it.
+        let whole = if is_midpoint { 2.0 } else { 1.0 };
+        let normal = Decrease { proportional: whole * normal.proportional, ..normal };
+        let Decrease { constant, proportional } = tangential;
+        let tangential = match self.slip {
+            Slip::OfMatrix(ratio) => Decrease { constant, proportional: ratio * proportional },
+            Slip::Whole(length) => Decrease { constant: constant + length * proportional, proportional: 0.0 },
+        };
+        [normal, tangential]
+    }
+
+    /// The steps of one length of the matrix in s.
+    fn at(self, length: f64) -> Self {
+        Self { lengths: [length; 2], ..self }
+    }
+
+    /// Lengths over the whole range, in geometric progression.
+    fn samples(&self) -> impl Iterator<Item = f64> {
+        let [least, greatest] = self.lengths;
+        let pieces = ((greatest / least).ln() / RATIO_OF_STARTS.ln()).ceil().clamp(1.0, 12.0) as u32;
+        (0..=pieces).rev().map(move |at| least * (greatest / least).powf(f64::from(at) / f64::from(pieces)))
+    }
+}
+
 /// Computes suprema for a body and the matrix of its step. Suprema over the motion of the contact boundary have
 /// similar maximisers: each iteration starts from the last one.
 pub(super) struct Suprema<'a, 'm, const D: usize, const S: usize> {
@@ -46,6 +112,7 @@ pub(super) struct Suprema<'a, 'm, const D: usize, const S: usize> {
     body: &'a Body<D, S>,
     state: &'a State,
     matrix: &'a mut MatrixOfStep<'m>,
+    range: StepRange,
     /// The response to a unit load on the whole contact boundary.
     contact_response: Option<DistributedVector>,
     /// The maximiser of the last supremum.
@@ -58,18 +125,56 @@ impl<'a, 'm, const D: usize, const S: usize> Suprema<'a, 'm, D, S> {
         body: &'a Body<D, S>,
         state: &'a State,
         matrix: &'a mut MatrixOfStep<'m>,
+        range: StepRange,
     ) -> Self {
-        Self { session, body, state, matrix, contact_response: None, peak: None }
+        Self { session, body, state, matrix, range, contact_response: None, peak: None }
     }
 
-    /// Approaches the supremum from below. Collective.
+    /// Approaches the supremum from below, over all steps of the range if it is one of a step. Collective.
     pub(super) fn find(&mut self, supremum: Supremum) -> Result<f64> {
         let (session, body, state) = (self.session, self.body, self.state);
-        let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum };
+        let whole = self.range.steps;
         if supremum == Supremum::ExplicitStep {
             let start = pseudorandom_vector(body, state)?;
+            let steps = Steps { lengths: self.range.matrices, slip: Slip::OfMatrix(self.range.slip) };
+            let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum, whole, steps };
             return Ok(maximise(session, &mut pencil, start, None, EXPLICIT_STEP_LIMITS)?.value);
         }
+        let has_slip = |contact: &Contact<D>| {
+            contact.decreases(whole)[1].proportional > 0.0
+                || contact.decreases_per_pressure(whole).proportional > 0.0
+        };
+        let has_slip = body.contacts.iter().any(has_slip);
+        let mut most = 0.0;
+        for steps in Steps::of(self.range, has_slip) {
+            let is_of_steps = matches!(supremum, Supremum::ThetaStep | Supremum::SlipPressure);
+            if !is_of_steps || steps.have_length(self.matrix.range.matrices[0]) {
+                most = larger(most, self.climb(supremum, steps)?);
+                continue;
+            }
+            // The ascent over motions and lengths starts from the best of several lengths.
+            let mut best: Option<(f64, DistributedVector)> = None;
+            for length in steps.samples() {
+                let value = self.climb(supremum, steps.at(length))?;
+                most = larger(most, value);
+                if best.as_ref().is_none_or(|(most, _)| value > *most)
+                    && let Some(peak) = &self.peak
+                {
+                    best = Some((value, copy(peak)?));
+                }
+            }
+            if let Some((_, peak)) = best {
+                self.peak = Some(peak);
+            }
+            most = larger(most, self.climb(supremum, steps)?);
+        }
+        Ok(most)
+    }
+
+    /// Ascends over motions, and over the lengths of these steps. Collective.
+    fn climb(&mut self, supremum: Supremum, steps: Steps) -> Result<f64> {
+        let (session, body, state) = (self.session, self.body, self.state);
+        let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum, whole: self.range.steps, steps };
         let contact_response = match &self.contact_response {
             Some(contact_response) => copy(contact_response)?,
             None => {
@@ -84,83 +189,10 @@ impl<'a, 'm, const D: usize, const S: usize> Suprema<'a, 'm, D, S> {
             Some(peak) => (peak, Some(contact_response)),
             None => (contact_response, None),
         };
-        let peak = maximise(session, &mut pencil, start, beside, CONTACT_LIMITS)?;
-        self.peak = Some(peak.vector);
-        Ok(peak.value)
+        let Maximum { value, vector } = maximise(session, &mut pencil, start, beside, CONTACT_LIMITS)?;
+        self.peak = Some(vector);
+        Ok(value)
     }
-}
-
-impl<const D: usize, const S: usize> Suprema<'_, '_, D, S> {
-    /// Whether a rigid motion that the supports allow meets the first form of a supremum, but not the second: the supremum is then
-    /// infinite, and its numerical value a rounding error. Collective.
-    pub(super) fn is_unbounded_by_rigid_motions(&mut self, supremum: Supremum) -> Result<bool> {
-        let (session, body, state) = (self.session, self.body, self.state);
-        let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum };
-        // The first form of a motion, and the second with its forces.
-        let mut measured = |motion: &mut DistributedVector| -> Result<(f64, f64, DistributedVector)> {
-            let (mut first, mut forces) = (motion.like()?, motion.like()?);
-            pencil.apply(0, motion, &mut first)?;
-            pencil.apply(1, motion, &mut forces)?;
-            Ok((motion.dot(&first)?, motion.dot(&forces)?, forces))
-        };
-        let mut irregular = pseudorandom_vector(body, state)?;
-        let size = irregular.dot(&irregular)?;
-        let (first, resistance, _) = measured(&mut irregular)?;
-        let least = [first, resistance].map(|square| UNRESOLVED * square / size);
-        let mut resisted: Vec<(DistributedVector, DistributedVector, f64)> = Vec::new();
-        for mut motion in rigid_motions(session, body, state)? {
-            let whole = motion.dot(&motion)?;
-            for (other, forces, square) in &resisted {
-                motion.add_scaled(-motion.dot(forces)? / square, other)?;
-            }
-            let size = motion.dot(&motion)?;
-            if size <= DEPENDENT * whole {
-                continue;
-            }
-            let (first, resistance, forces) = measured(&mut motion)?;
-            if resistance > least[1] * size {
-                resisted.push((motion, forces, resistance));
-            } else if first > least[0] * size {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-}
-
-/// The translations and rotations of a body, zero at fixed components.
-fn rigid_motions<const D: usize, const S: usize>(
-    session: &Session,
-    body: &Body<D, S>,
-    state: &State,
-) -> Result<Vec<DistributedVector>> {
-    let owned = state.velocity.owned()?.len() / D;
-    let nodes = &body.mesh.nodes[..owned];
-    let mut sums = [0.0; 4];
-    for node in nodes {
-        sums[3] += 1.0;
-        (0..D).for_each(|i| sums[i] += node[i]);
-    }
-    let [middle @ .., count] = session.sum(sums);
-    let middle = middle.map(|sum| sum / count);
-    let mut motions = Vec::new();
-    // Along an axis, or from one axis to another.
-    let pairs = (0..D).flat_map(|i| (i..D).map(move |j| (i, j)));
-    for (i, j) in pairs {
-        let mut motion = state.velocity.like()?;
-        motion.fill(0.0)?;
-        for (values, node) in motion.owned_mut()?.chunks_exact_mut(D).zip(nodes) {
-            if i == j {
-                values[i] = 1.0;
-            } else {
-                values[i] = middle[j] - node[j];
-                values[j] = node[i] - middle[i];
-            }
-        }
-        forms::clear_fixed_components(body, &mut motion)?;
-        motions.push(motion);
-    }
-    Ok(motions)
 }
 
 fn copy(vector: &DistributedVector) -> Result<DistributedVector> {
@@ -173,48 +205,122 @@ struct Pencil<'a, 'm, const D: usize, const S: usize> {
     body: &'a Body<D, S>,
     matrix: &'a mut MatrixOfStep<'m>,
     supremum: Supremum,
+    /// The shortest and the longest step of the run in s.
+    whole: [f64; 2],
+    /// The steps of the suprema of steps.
+    steps: Steps,
+}
+
+/// A quadratic form of a pencil.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Interior(Form),
+    /// Of the matrix of a step: the whole matrix, or what it contains of a form.
+    Matrix,
+    OfMatrix(Form),
+    /// Squares over the contact boundary with the decreases of its laws, exact.
+    Trace,
+    /// The sums over contact points of what a step of these lengths adds: constant or in proportion to the length.
+    Constant,
+    Proportional,
+    /// Both of them in a step of a single length.
+    Whole,
+    /// The same for friction that weakens with the pressure.
+    ConstantPerPressure,
+    ProportionalPerPressure,
+    WholePerPressure,
+    NormalTrace,
+}
+
+/// The forms of the matrices of steps of any length.
+const OF_MATRIX: [Part; 3] =
+    [Part::OfMatrix(Form::Mass), Part::OfMatrix(Form::Viscosity), Part::OfMatrix(Form::Elasticity)];
+
+impl<const D: usize, const S: usize> Pencil<'_, '_, D, S> {
+    /// Whether the steps have the matrix at hand.
+    fn has_matrix(&self) -> bool {
+        self.steps.have_length(self.matrix.range.matrices[0])
+    }
+
+    fn parts(&self) -> Vec<Part> {
+        match self.supremum {
+            Supremum::Theta => vec![Part::Trace, Part::Interior(Form::Viscosity)],
+            Supremum::TraceNorm => vec![Part::NormalTrace, Part::Interior(Form::Strain)],
+            Supremum::ExplicitStep => {
+                [Form::Elasticity, Form::Mass, Form::Viscosity].map(Part::Interior).to_vec()
+            }
+            Supremum::UniqueStep => {
+                vec![Part::Whole, Part::Interior(Form::Viscosity), Part::Interior(Form::Mass)]
+            }
+            Supremum::ThetaStep if self.has_matrix() => vec![Part::Whole, Part::Matrix],
+            Supremum::SlipPressure if self.has_matrix() => {
+                vec![Part::WholePerPressure, Part::Matrix, Part::Whole]
+            }
+            Supremum::ThetaStep => [&[Part::Constant, Part::Proportional][..], &OF_MATRIX].concat(),
+            Supremum::SlipPressure => {
+                let per_pressure = [Part::ConstantPerPressure, Part::ProportionalPerPressure];
+                [&per_pressure[..], &[Part::Constant, Part::Proportional], &OF_MATRIX].concat()
+            }
+        }
+    }
+
+    /// The coefficients of the squares at the points of a contact.
+    fn coefficients(&self, part: Part, contact: &Contact<D>) -> [f64; 2] {
+        let whole = |step: [Decrease; 2]| step.map(|d| d.constant + self.steps.lengths[1] * d.proportional);
+        let is_midpoint = self.matrix.scheme.is_midpoint();
+        let own = || self.steps.decreases(contact.decreases(self.whole), is_midpoint);
+        let per_pressure = || {
+            let friction = [Decrease::default(), contact.decreases_per_pressure(self.whole)];
+            self.steps.decreases(friction, is_midpoint)
+        };
+        match part {
+            Part::Constant => own().map(|decrease| decrease.constant),
+            Part::Proportional => own().map(|decrease| decrease.proportional),
+            Part::Whole => whole(own()),
+            Part::ConstantPerPressure => per_pressure().map(|decrease| decrease.constant),
+            Part::ProportionalPerPressure => per_pressure().map(|decrease| decrease.proportional),
+            Part::WholePerPressure => whole(per_pressure()),
+            Part::NormalTrace => [1.0, 0.0],
+            Part::Trace => contact.monotonicity_constants(self.matrix.length),
+            Part::Interior(_) | Part::Matrix | Part::OfMatrix(_) => [0.0; 2],
+        }
+    }
+
+    /// The forms and their values in numerator and denominator, `a + k b` and `m/k + c + k e`, where the length `k` is free.
+    fn free_length(&self, values: &[f64]) -> Option<f64> {
+        let (power, forms) = match *values {
+            [a, b, m, c, e] => ([a, b], [m, c, e]),
+            [a, b, constant, proportional, m, c, e] => ([a, b], [m, c - constant, e - proportional]),
+            _ => return None,
+        };
+        Some(worst_length(self.steps.lengths, power, forms))
+    }
 }
 
 impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
     fn forms(&self) -> usize {
-        if matches!(self.supremum, Supremum::ExplicitStep | Supremum::UniqueStep | Supremum::SlipPressure) {
-            3
-        } else {
-            2
-        }
+        self.parts().len()
     }
 
     fn apply(&mut self, form: usize, x: &mut DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let body = self.body;
-        let interior = match (self.supremum, form) {
-            (Supremum::ExplicitStep, 0) => Form::Elasticity,
-            (Supremum::ExplicitStep, 1) | (Supremum::UniqueStep, 2) => Form::Mass,
-            (Supremum::ExplicitStep, _) | (Supremum::Theta | Supremum::UniqueStep, 1) => Form::Viscosity,
-            (Supremum::TraceNorm, 1) => Form::Strain,
-            (Supremum::ThetaStep | Supremum::SlipPressure, 1) => return self.matrix.multiply(x, y),
-            (supremum, _) => {
-                return forms::apply(body, x, y, |x, y| {
-                    for contact in &body.contacts {
-                        let falls = contact.monotonicity_constants(self.matrix.length);
-                        match (supremum, form) {
-                            (Supremum::TraceNorm, _) => {
-                                forms::add_trace(&body.mesh, contact, [1.0, 0.0], x, y)
-                            }
-                            (Supremum::Theta, _) => forms::add_trace(&body.mesh, contact, falls, x, y),
-                            (Supremum::SlipPressure, 0) => {
-                                contact.add_squares(
-                                    [0.0, contact.decrease_per_pressure(self.matrix.length).unwrap_or(0.0)],
-                                    x,
-                                    y,
-                                );
-                            }
-                            _ => contact.add_squares(falls, x, y),
+        let part = self.parts()[form];
+        match part {
+            Part::Matrix => self.matrix.multiply(x, y),
+            Part::Interior(form) => forms::apply(body, x, y, |x, y| body.add_form(form, x, y)),
+            Part::OfMatrix(form) => forms::apply(body, x, y, |x, y| body.add_form_of_matrix(form, x, y)),
+            _ => forms::apply(body, x, y, |x, y| {
+                for contact in &body.contacts {
+                    let coefficients = self.coefficients(part, contact);
+                    match part {
+                        Part::Trace | Part::NormalTrace => {
+                            forms::add_trace(&body.mesh, contact, coefficients, x, y)
                         }
+                        _ => contact.add_squares(coefficients, x, y),
                     }
-                });
-            }
-        };
-        forms::apply(body, x, y, |x, y| body.add_form(interior, x, y))
+                }
+            }),
+        }
     }
 
     fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
@@ -223,6 +329,15 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
     }
 
     fn weights(&self, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        if let Some(k) = self.free_length(values) {
+            let matrix = [1.0 / k, 1.0, k];
+            let rest = values.len() - 5;
+            let own = [-1.0, -k];
+            return (
+                [&[1.0, k][..], &[0.0; 5][..rest], &[0.0; 3]].concat(),
+                [&[0.0; 2][..], &own[..rest], &matrix].concat(),
+            );
+        }
         match self.supremum {
             Supremum::ExplicitStep => {
                 let k = stable_step(values[0], values[1], values[2]);
@@ -235,12 +350,12 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
     }
 
     fn value(&self, values: &[f64]) -> f64 {
-        match self.supremum {
-            Supremum::ExplicitStep => 1.0 / stable_step(values[0], values[1], values[2]),
-            Supremum::UniqueStep => (values[0] / SUGGESTED_THETA_STEP - values[1]) / values[2],
-            Supremum::SlipPressure => values[0] / (values[1] - values[2]),
-            Supremum::Theta | Supremum::ThetaStep | Supremum::TraceNorm => values[0] / values[1],
+        if self.supremum == Supremum::ExplicitStep {
+            return 1.0 / stable_step(values[0], values[1], values[2]);
         }
+        let (numerator, denominator) = self.weights(values);
+        let sum = |weights: &[f64]| weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>();
+        sum(&numerator) / sum(&denominator)
     }
 }
 

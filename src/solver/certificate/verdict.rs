@@ -56,10 +56,13 @@ impl Certificates {
         }
         if let Some(theta) = self.theta_step {
             if self.steps_are_unique() {
-                let meaning = "below 1: each step has one solution";
-                verdict.words.push(format!("theta of a step = {theta:.4}, {meaning}{covered}"));
+                let steps = self.steps_in_words();
+                verdict.words.push(format!(
+                    "theta of a step = {theta:.4}, below 1: each step{steps} has one solution{covered}"
+                ));
             } else {
-                verdict.uniqueness(theta, step, unique_step, accepted.contains(&Accept::Uniqueness));
+                let steps = self.step_range.unwrap_or([step; 2]);
+                verdict.uniqueness(theta, steps, unique_step, accepted.contains(&Accept::Uniqueness));
             }
         }
         if let Some(bound) = self.explicit_step_bound {
@@ -89,17 +92,37 @@ impl Certificates {
 
 impl Verdict {
     /// The verdict on a `theta` of a step that is not below 1 by the margin.
-    fn uniqueness(&mut self, theta: f64, step: f64, unique_step: Option<f64>, accepted: bool) {
+    fn uniqueness(
+        &mut self,
+        theta: f64,
+        [shortest, longest]: [f64; 2],
+        unique_step: Option<f64>,
+        accepted: bool,
+    ) {
+        let steps = if shortest == longest {
+            format!("a step of {longest} s")
+        } else {
+            format!("a step between {shortest:.4e} and {longest:.4e} s")
+        };
         let found = format!(
-            "theta of a step = {} is not below {}: a step of {step} s may have several solutions",
+            "theta of a step = {} is not below {}: {steps} may have several solutions",
             short(theta),
             if theta < 1.0 { 1.0 - Certificates::MARGIN } else { 1.0 }
         );
         self.words.push(found.clone());
         let largest = unique_step.map_or_else(
-            || "no step is short enough: contact boundaries have no mass, because [material] density is absent or because of \
-             redistribute_mass"
-                .to_owned(),
+            || {
+                let longer = if shortest < longest {
+                    "; where a law decreases with the velocity, longer steps are safer, and [time] end, land_on, output times or \
+                     smallest_step allow the shortest"
+                } else {
+                    ""
+                };
+                format!(
+                    "no step is short enough: contact boundaries have no mass, because [material] density is absent or because of \
+                     redistribute_mass{longer}"
+                )
+            },
             |largest| format!("the largest step with one solution is {largest:.4e} s"),
         );
         self.judge(
@@ -157,6 +180,9 @@ mod tests {
         Certificates {
             theta: Some(0.3855),
             theta_step: Some(0.2),
+            step_range: None,
+            range: None,
+            covers_steps: true,
             viscosity_modulus: Some(50.0),
             monotonicity_constant: Some(10.0),
             growth_constants: Some([0.0, 10.0]),

@@ -105,6 +105,12 @@ impl<const D: usize> Adaptive<D> {
         self.length(self.highest)
     }
 
+    /// Length in s of its shortest steps that do not end at a prescribed time soon after another one: half of the shortest level, where a
+    /// whole step would leave a very short remainder.
+    pub fn shortest(&self) -> f64 {
+        0.5 * self.length(self.lowest)
+    }
+
     /// Length in s of a step at this level.
     fn length(&self, level: i32) -> f64 {
         self.first * 2f64.powi(level)
@@ -153,7 +159,7 @@ impl<const D: usize> Adaptive<D> {
             let length = self.next_length(target.time - state.time, state.step_length);
             let landing = self.landing(session, state, target, length);
             let length = self.next_length(landing.time - state.time, state.step_length);
-            let step = next_step(state, length, landing.time);
+            let step = next_step([state.time, state.step_length], length, landing.time);
             let deviation = self
                 .time_dependent_data
                 .as_ref()
@@ -210,7 +216,7 @@ impl<const D: usize> Adaptive<D> {
         target: Landing,
     ) -> Result<(), Agreed> {
         let landing = self.landing(session, state, target, self.longest());
-        let step = next_step(state, self.longest(), landing.time);
+        let step = next_step([state.time, state.step_length], self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
             Ok((_, _, found)) => {
                 self.step_level.keep_largest(&found);

@@ -8,6 +8,8 @@ use crate::{
 
 /// Velocities that differ by more than this share of the larger one are different.
 const RELATIVE_DIFFERENCE: f64 = 1e-6;
+/// The same for velocities of which one is certainly not an inaccurate solution of the step of the other.
+const CERTAIN_DIFFERENCE: f64 = 1e-3;
 /// Uniform normal velocity of all contact points, relative to the largest velocity at which a law has a kink; every second
 /// start has random velocities instead.
 const UNIFORM_VELOCITIES: [f64; 6] = [1.5, 0.25, 0.75, 4.0, -0.5, -2.0];
@@ -25,11 +27,13 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
     let session = problem.session;
     let mut others = Vec::new();
     let mut velocity = trial.like()?;
+    let mut fastest = 0.0;
     for number in 0..starts {
         velocity.copy_from(trial)?;
         write_start(problem, number, &mut velocity)?;
+        fastest = f64::max(fastest, velocity.norm()?);
         match session.agree(solver.solve(problem, &mut velocity)) {
-            Ok(_) if is_new(&others, &velocity)? => {
+            Ok(_) if is_new(&others, &velocity, [RELATIVE_DIFFERENCE, fastest])? => {
                 let mut solution = velocity.like()?;
                 solution.copy_from(&velocity)?;
                 others.push(solution);
@@ -41,8 +45,14 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
     session.agree(restore_pressures(problem.body, problem.state))?;
     match session.agree(solver.solve(problem, trial)) {
         Ok(outcome) => {
-            let solutions = others.len() + usize::from(is_new(&others, trial)?);
-            Ok(StepOutcome { solutions, ..outcome })
+            let solutions =
+                others.len() + usize::from(is_new(&others, trial, [RELATIVE_DIFFERENCE, fastest])?);
+            let mut solutions_differ = false;
+            for other in &others {
+                let alone = std::slice::from_ref(other);
+                solutions_differ |= is_new(alone, trial, [CERTAIN_DIFFERENCE, fastest])?;
+            }
+            Ok(StepOutcome { solutions, solutions_differ, ..outcome })
         }
         Err(error) if error.is_failure() => {
             Err(Error::Failed(format!("{error}; solutions from other start velocities: {}", others.len())))
@@ -67,13 +77,18 @@ fn write_start<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Whether a velocity differs from all of these. Collective.
-fn is_new(found: &[DistributedVector], velocity: &DistributedVector) -> Result<bool> {
+/// Whether a velocity differs from all of these by more than this share of the larger one and of the fastest start: a solution at rest is
+/// found up to rounding errors of the start. Collective.
+fn is_new(
+    found: &[DistributedVector],
+    velocity: &DistributedVector,
+    [share, fastest]: [f64; 2],
+) -> Result<bool> {
     for other in found {
         let mut difference = velocity.like()?;
         difference.copy_from(velocity)?;
         difference.add_scaled(-1.0, other)?;
-        if difference.norm()? <= RELATIVE_DIFFERENCE * f64::max(velocity.norm()?, other.norm()?) {
+        if difference.norm()? <= share * f64::max(velocity.norm()?, other.norm()?).max(fastest) {
             return Ok(false);
         }
     }

@@ -360,6 +360,7 @@ impl Newton {
             inclusion_residual: inclusion,
             fell: self.has_descended && self.counts.unstable > 0,
             solutions: 0,
+            solutions_differ: false,
             landed_on: None,
             energy: Energy::default(),
             powers: Energy::default(),

@@ -24,6 +24,8 @@ pub struct StepOutcome {
     pub fell: bool,
     /// Number of different solutions found, if a search was requested; otherwise 0.
     pub solutions: usize,
+    /// Whether some of them differ by far more than the accuracy of a solution.
+    pub solutions_differ: bool,
     /// The name of the time at which the step ended, if the log reports it.
     pub landed_on: Option<&'static str>,
     /// Energies of the step, over all ranks.

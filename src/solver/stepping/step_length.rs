@@ -1,6 +1,6 @@
 //! Times at which steps end.
 
-use crate::fem::{effect::Step, state::State};
+use crate::fem::effect::Step;
 
 /// A step whose end differs from a prescribed time by at most this share of its length ends at that time.
 pub const TIME_TOLERANCE: f64 = 1e-6;
@@ -67,14 +67,43 @@ impl Landings {
         first.map_or(landing, |first| Landing { time: first.time, name: Some(first.name) })
     }
 
-    /// The fixed step from here that does not pass `target`. A two-step scheme starts anew after a jump and after a short step.
-    pub fn fixed_step(&self, state: &State, target: Landing, is_two_step: bool) -> Step {
-        let mut step = next_step(state, self.length, target.time);
+    /// The fixed step from this time in s, after a step of the length `last` in s, that does not pass `target`. A two-step scheme starts
+    /// anew after a jump and after a short step.
+    pub fn fixed_step(&self, [time, last]: [f64; 2], target: Landing, is_two_step: bool) -> Step {
+        let mut step = next_step([time, last], self.length, target.time);
         let has_grown = step.length > LARGEST_GROWTH * step.previous_length;
-        if is_two_step && (has_grown || self.has_jump(state.time)) {
+        if is_two_step && (has_grown || self.has_jump(time)) {
             step.previous_length = 0.0;
         }
         step
+    }
+
+    /// Visits the fixed steps of a run from time 0; of several that follow steps of their own length, some.
+    pub(super) fn visit_fixed_steps(&self, is_two_step: bool, mut visit: impl FnMut(Step)) {
+        let [mut time, mut last] = [0.0; 2];
+        while time < self.end {
+            let step = self.fixed_step([time, last], self.next(time), is_two_step);
+            visit(step);
+            let whole = ((self.next(step.time).time - step.time) / self.length - 2.0).floor();
+            let repeats = step.length == self.length && step.previous_length == last && whole >= 1.0;
+            let passed = if repeats && last == self.length { whole * self.length } else { 0.0 };
+            (time, last) = (snapped_to_multiple(step.time + passed, self.length), step.length);
+        }
+    }
+
+    /// The shortest time in s between two times at which adaptive steps must end.
+    pub fn shortest_gap(&self) -> f64 {
+        let jumps = self.breakpoints.iter().filter(|breakpoint| breakpoint.is_jump);
+        let mut times: Vec<f64> = jumps.map(|jump| jump.time).collect();
+        times.extend(self.times.iter().chain(&self.output_times).chain([&0.0, &self.end]));
+        if let Some(interval) = self.interval {
+            let beside = |time: &f64| [0.0, 1.0].map(|more| interval * ((time / interval).floor() + more));
+            let multiples: Vec<f64> = times.iter().flat_map(beside).collect();
+            times.extend(multiples.into_iter().filter(|time| *time < self.end));
+        }
+        times.sort_by(f64::total_cmp);
+        let gaps = times.windows(2).map(|pair| pair[1] - pair[0]);
+        gaps.filter(|gap| *gap > TIME_TOLERANCE * self.length).fold(f64::INFINITY, f64::min)
     }
 
     /// Whether a load or an obstacle motion jumps at this time, the end of a step.
@@ -113,14 +142,13 @@ impl Landings {
     }
 }
 
-/// A step of `length` from here, shortened or extended to end at `end` if that is near.
-pub(super) fn next_step(state: &State, length: f64, end: f64) -> Step {
-    let previous_length = state.step_length;
-    let time = snapped_to_multiple(state.time + length, length);
+/// A step of `length` from a start, after one of `previous_length`, shortened or extended to end at `end` if that is near.
+pub(super) fn next_step([start, previous_length]: [f64; 2], length: f64, end: f64) -> Step {
+    let time = snapped_to_multiple(start + length, length);
     if (end - time).abs() <= TIME_TOLERANCE * length {
         Step { time: end, length, previous_length }
     } else if time > end {
-        Step { time: end, length: end - state.time, previous_length }
+        Step { time: end, length: end - start, previous_length }
     } else {
         Step { time, length, previous_length }
     }

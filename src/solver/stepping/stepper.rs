@@ -13,6 +13,7 @@ use super::{
     problem::StepProblem,
     step_clock::{Stages, StepClock, StepTraffic},
     step_error::{ErrorWorkspace, SolvedStep, StepError},
+    step_range::StepRange,
     step_solver::{Lengths, StepSolver},
     support_motion::MovingSupports,
 };
@@ -74,6 +75,8 @@ pub struct Stepper {
     other_starts: usize,
     /// Whether steps may exceed the stability bound of explicit flow at the actual stresses.
     accepts_fast_flow: bool,
+    /// The lengths of the steps attempted so far.
+    attempted: Option<StepRange>,
     /// Number of preconditioners built.
     pub set_ups: u64,
     /// Seconds by phase.
@@ -89,6 +92,8 @@ pub struct MatrixOfStep<'a> {
     pub scheme: Scheme,
     /// Length of the step in s.
     pub length: f64,
+    /// The range that contains this step only.
+    pub range: StepRange,
     solver: &'a mut StepSolver,
 }
 
@@ -131,6 +136,7 @@ impl Stepper {
             base_length: 1.0,
             other_starts: settings.guesses as usize,
             accepts_fast_flow: settings.accept.contains(&Accept::ExplicitStability),
+            attempted: None,
             set_ups: 0,
             clock: StepClock::default(),
             traffic: StepTraffic::default(),
@@ -141,6 +147,11 @@ impl Stepper {
     /// The scheme.
     pub fn scheme(&self) -> Scheme {
         self.scheme
+    }
+
+    /// The lengths of the steps attempted so far, the same on all ranks; none before the first.
+    pub fn attempted(&self) -> Option<StepRange> {
+        self.attempted
     }
 
     /// Whether steps are solved by Newton's method.
@@ -192,8 +203,10 @@ impl Stepper {
         length: f64,
     ) -> Result<MatrixOfStep<'_>> {
         self.base_length = length;
-        self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })?;
-        Ok(MatrixOfStep { scheme: self.scheme, length, solver: &mut self.solver })
+        let step = Step { time: length, length, previous_length: 0.0 };
+        self.prepare_matrix(session, body, step)?;
+        let range = StepRange::of(self.scheme, step);
+        Ok(MatrixOfStep { scheme: self.scheme, length, range, solver: &mut self.solver })
     }
 
     /// Assembles the matrix of a step, if the previous step had another length. Collective.
@@ -240,6 +253,8 @@ impl Stepper {
         state: &State,
         step: Step,
     ) -> Result<StepOutcome> {
+        let range = StepRange::of(self.scheme, step);
+        self.attempted = Some(self.attempted.map_or(range, |attempted| attempted.or(range)));
         self.prepare_matrix(session, body, step)?;
         self.is_finished = false;
         let start = Instant::now();

@@ -1,10 +1,6 @@
 //! The motions of nodes on which contact laws act.
 
-use super::{
-    Contact,
-    point::{Point, Unknown},
-    tangential_point::span_without,
-};
+use super::{Contact, point::Unknown, tangential_point::span_without};
 use crate::{fem::space::Held, linear_algebra::tensor::Vector};
 use std::collections::BTreeMap;
 
@@ -58,15 +54,24 @@ impl<const D: usize> Contact<D> {
     /// never presses or descends, and the tangents of friction.
     pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
         let presses = !self.law.is_zero() && self.law.monotonicity_constant(1.0) == 0.0;
-        let normal = |point: &Point<D>| {
+        let rubs = self.friction.as_ref().is_some_and(|friction| presses || !friction.law.follows_pressure());
+        let normals = presses.then(|| self.normal_directions()).into_iter().flatten();
+        normals.chain(rubs.then(|| self.tangential_directions()).into_iter().flatten()).collect()
+    }
+
+    /// The nodes of this rank, each with the normals of its points.
+    pub fn normal_directions(&self) -> impl Iterator<Item = (usize, Vector<D>)> {
+        self.points.iter().flat_map(|point| {
             let normal = point.normal;
             point.nodes().map(move |(node, _)| (node, normal)).collect::<Vec<_>>()
-        };
-        let points = self.points.iter().filter(|_| presses).flat_map(normal);
-        let frictions = self.friction.iter().filter(|friction| presses || !friction.law.follows_pressure());
-        let tangents = frictions
+        })
+    }
+
+    /// The nodes of this rank with friction, each with the tangents of its points.
+    pub fn tangential_directions(&self) -> impl Iterator<Item = (usize, Vector<D>)> {
+        self.friction
+            .iter()
             .flat_map(|friction| &friction.points)
-            .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)));
-        points.chain(tangents).collect()
+            .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)))
     }
 }

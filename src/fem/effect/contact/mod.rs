@@ -65,6 +65,7 @@ pub use loaded_obstacle::{
 };
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
+pub use sliding::Decrease;
 pub use unknowns::choose_unknowns;
 
 /// The law along the normal of a contact boundary, and its points.

@@ -32,8 +32,12 @@ impl<const D: usize> Contact<D> {
             let gap = self.gap.of_moved(time, &after, &point.normal, along - worn)?;
             let before = self.gap.of_moved(time - length, &before, &point.normal, along - worn)?;
             point.reach = gap;
-            point.context =
-                NodeContext { penetration: along - gap - worn, step_length: length, mean_from: None, erosion: 0.0 };
+            point.context = NodeContext {
+                penetration: along - gap - worn,
+                step_length: length,
+                mean_from: None,
+                erosion: 0.0,
+            };
             point.penetration_before = along - before - worn;
             point.blend_offset = 0.0;
             point.continued_wear = 0.0;

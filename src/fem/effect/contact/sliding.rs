@@ -211,6 +211,16 @@ impl<const D: usize> Contact<D> {
         [self.law.monotonicity_constant(step_length), tangential]
     }
 
+    /// The decreases of [`monotonicity_constants`](Self::monotonicity_constants) in steps between these two lengths in s.
+    pub fn decreases(&self, steps: [f64; 2]) -> [Decrease; 2] {
+        std::array::from_fn(|i| Decrease::of(|length| self.monotonicity_constants(length)[i], steps))
+    }
+
+    /// The decrease of [`decrease_per_pressure`](Self::decrease_per_pressure) in steps between these two lengths in s.
+    pub fn decreases_per_pressure(&self, steps: [f64; 2]) -> Decrease {
+        Decrease::of(|length| self.decrease_per_pressure(length).unwrap_or(0.0), steps)
+    }
+
     /// The steepest decrease of the normal law with the displacement in Pa/m, if it depends on the displacement and decreases.
     pub fn decrease_with_displacement(&self) -> Option<f64> {
         let decrease = self.law.monotonicity_constant(1.0);
@@ -253,6 +263,27 @@ fn worn_after<const D: usize>(point: &Point<D>, wear: Wear, (velocity, speed): (
 const NEGLIGIBLE_HISTORY: f64 = 1e-3;
 /// Share of a displacement or a velocity that is a rounding error.
 const ROUNDING_SHARE: f64 = 1e-9;
+
+/// A bound of the steepest decrease of a graph, `constant + length * proportional` in a step of this length.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Decrease {
+    /// In Pa s/m.
+    pub constant: f64,
+    /// In Pa/m.
+    pub proportional: f64,
+}
+
+impl Decrease {
+    /// The bound in steps between these two lengths in s of a decrease that depends on the length, and grows at most in proportion to it.
+    fn of(at: impl Fn(f64) -> f64, [shortest, longest]: [f64; 2]) -> Self {
+        let most = at(longest);
+        if most == at(0.5 * longest) {
+            Self { constant: most, proportional: 0.0 }
+        } else {
+            Self { constant: 0.0, proportional: at(shortest) / shortest }
+        }
+    }
+}
 
 /// Names of the depths of wear: the present one, and that before the last step.
 const WORN: [&str; 2] = ["wear", "previous_wear"];

@@ -1,0 +1,141 @@
+//! The lengths of the steps of a run.
+
+use super::step_length::{Landings, TIME_TOLERANCE};
+use crate::{fem::effect::Step, job::Scheme};
+use serde::{Deserialize, Serialize};
+
+/// The lengths that steps of a run may have, and what a scheme makes of them.
+///
+/// The matrix of a step of length `k` is that of a length `k' <= k` (see [`Scheme::formula`]), and friction takes the slip of the whole
+/// step, so that its dependence on the slip is scaled by `k`, and that of the matrix on the displacement by `k'`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StepRange {
+    /// The shortest and the longest step in s.
+    pub steps: [f64; 2],
+    /// The least and the greatest `k'` in s.
+    pub matrices: [f64; 2],
+    /// The greatest `k / k'`.
+    pub slip: f64,
+}
+
+impl StepRange {
+    /// The range of a single step under a scheme.
+    pub fn of(scheme: Scheme, step: Step) -> Self {
+        let length = scheme.formula().map_or(step.length, |formula| formula(step).length);
+        Self { steps: [step.length; 2], matrices: [length; 2], slip: step.length / length }
+    }
+
+    /// The range of all fixed steps of a run.
+    pub fn fixed(scheme: Scheme, landings: &Landings) -> Self {
+        let mut all = None;
+        landings.visit_fixed_steps(scheme.is_two_step(), |step| {
+            let own = Self::of(scheme, step);
+            all = Some(all.map_or(own, |all: Self| all.or(own)));
+        });
+        let whole = Step { time: landings.length, length: landings.length, previous_length: 0.0 };
+        all.unwrap_or_else(|| Self::of(scheme, whole))
+    }
+
+    /// The range of adaptive steps between these lengths in s, each after a step of any length.
+    pub fn adaptive(scheme: Scheme, [shortest, longest]: [f64; 2]) -> Self {
+        let first = |length| Self::of(scheme, Step { time: length, length, previous_length: 0.0 });
+        let all = first(shortest).or(first(longest));
+        if !scheme.is_two_step() {
+            return all;
+        }
+        // `k' / k = (1 + w) / (1 + 2 w)` for any ratio `w` of successive steps.
+        Self { matrices: [0.5 * all.matrices[0], all.matrices[1]], slip: 2.0, ..all }
+    }
+
+    /// The least range that contains both.
+    pub fn or(self, other: Self) -> Self {
+        let both =
+            |[low, high]: [f64; 2], [lower, higher]: [f64; 2]| [f64::min(low, lower), f64::max(high, higher)];
+        Self {
+            steps: both(self.steps, other.steps),
+            matrices: both(self.matrices, other.matrices),
+            slip: self.slip.max(other.slip),
+        }
+    }
+
+    /// Whether it contains another range, up to the rounding of times.
+    pub fn contains(&self, other: Self) -> bool {
+        let near = 1.0 + TIME_TOLERANCE;
+        let within =
+            |[low, high]: [f64; 2], [lower, higher]: [f64; 2]| low <= near * lower && higher <= near * high;
+        within(self.steps, other.steps)
+            && within(self.matrices, other.matrices)
+            && other.slip <= near * self.slip
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn landings(times: Vec<f64>, end: f64) -> Landings {
+        Landings {
+            times,
+            output_times: Vec::new(),
+            interval: None,
+            breakpoints: Vec::new(),
+            length: 0.1,
+            is_fixed: true,
+            end,
+        }
+    }
+
+    fn close(found: [f64; 2], expected: [f64; 2]) {
+        let near = |(a, b): (f64, f64)| (a - b).abs() <= 1e-12;
+        assert!(found.into_iter().zip(expected).all(near), "{found:?} instead of {expected:?}");
+    }
+
+    #[test]
+    fn equal_steps_have_one_length_except_under_a_two_step_scheme() {
+        let range = |scheme| StepRange::fixed(scheme, &landings(Vec::new(), 1e5));
+        for (scheme, matrix) in
+            [(Scheme::LaggedEuler, 0.1), (Scheme::ImplicitEuler, 0.1), (Scheme::Midpoint, 0.05)]
+        {
+            close(range(scheme).steps, [0.1; 2]);
+            close(range(scheme).matrices, [matrix; 2]);
+            close([range(scheme).slip, 1.0], [0.1 / matrix, 1.0]);
+        }
+        let two = range(Scheme::Bdf2);
+        close(two.matrices, [0.2 / 3.0, 0.1]);
+        close([two.slip, 1.0], [1.5, 1.0]);
+    }
+
+    #[test]
+    fn shortened_steps_are_in_the_range() {
+        close(StepRange::fixed(Scheme::ImplicitEuler, &landings(vec![0.13], 0.2)).steps, [0.03, 0.1]);
+        close(StepRange::fixed(Scheme::ImplicitEuler, &landings(Vec::new(), 0.04)).steps, [0.04; 2]);
+        close(StepRange::fixed(Scheme::ImplicitEuler, &landings(vec![7.25], 100.01)).steps, [0.01, 0.1]);
+        // After 0.1 s the step of 0.05 s has w = 1/2 and k' = 0.0375 s; that of 0.1 s after it w = 2 and k' = 0.06 s.
+        let two = StepRange::fixed(Scheme::Bdf2, &landings(vec![0.15], 0.25));
+        close(two.matrices, [0.0375, 0.1]);
+        close([two.slip, 1.0], [0.1 / 0.06, 1.0]);
+    }
+
+    #[test]
+    fn adaptive_steps_may_follow_any_other() {
+        let two = StepRange::adaptive(Scheme::Bdf2, [0.01, 0.1]);
+        close(two.matrices, [0.005, 0.1]);
+        assert!(
+            two.contains(StepRange::of(
+                Scheme::Bdf2,
+                Step { time: 1.0, length: 0.01, previous_length: 1e-9 }
+            ))
+        );
+        assert!(
+            !two.contains(StepRange::of(
+                Scheme::Bdf2,
+                Step { time: 1.0, length: 0.009, previous_length: 0.0 }
+            ))
+        );
+        assert!(!two.contains(StepRange::of(
+            Scheme::Bdf2,
+            Step { time: 1.0, length: f64::NAN, previous_length: 0.0 }
+        )));
+        close(StepRange::adaptive(Scheme::Midpoint, [0.01, 0.1]).matrices, [0.005, 0.05]);
+    }
+}
