@@ -240,7 +240,7 @@ fn a_run_may_land_on_its_end() {
 #[test]
 fn a_mesh_file_is_compared_with_the_job_once_it_is_read() {
     let names = ["a", "b", "c", "d", "e"];
-    let mesh = |boundaries| MeshNames { dimension: 3, boundaries, regions: &[], points: &[] };
+    let mesh = |boundaries| MeshNames { dimension: 3, boundaries, regions: &[], points: &[], inner: &[] };
     let mut loaded = load(RICH, &[]);
     assert_eq!(loaded.warnings, Vec::<String>::new());
     loaded.check_mesh(mesh(&names)).unwrap_or_else(|error| panic!("{error}"));
@@ -251,7 +251,16 @@ fn a_mesh_file_is_compared_with_the_job_once_it_is_read() {
     let points = MeshNames { points: &["pin"], ..mesh(&["a", "c", "d", "e"]) };
     let error = load(RICH, &[]).check_mesh(points).expect_err("no boundary b").to_string();
     assert!(error.contains("no boundary, point or curve \"b\"") && error.contains("e, pin"), "{error}");
-    let plane = MeshNames { dimension: 2, boundaries: &names, regions: &[], points: &[] };
+    let inner = [["e", "(1, 2, 3)"], ["f", "(4, 5, 6)"]];
+    let inside = MeshNames { inner: &inner, ..mesh(&names[..4]) };
+    let mut job = load(RICH, &[]);
+    let error = job.check_mesh(inside).expect_err("e is inside").to_string();
+    assert!(error.contains("\"e\" has facets inside the body, for example around (1, 2, 3)"), "{error}");
+    assert!(!error.contains("has no boundary"), "one fault: {error}");
+    job.check_mesh(MeshNames { inner: &inner[1..], ..mesh(&names) })
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert!(job.warnings.iter().any(|warning| warning.contains("\"f\"") && warning.contains("is ignored")));
+    let plane = MeshNames { dimension: 2, boundaries: &names, regions: &[], points: &[], inner: &[] };
     let error = loaded.check_mesh(plane).expect_err("2D").to_string();
     for part in [
         "a 2D body needs a hypothesis",

@@ -8,6 +8,7 @@ use super::schema::{Kind, Schema};
 use super::source::{Node, Value};
 use crate::laws::{
     expression::{Expression, Variable},
+    law::header,
     nearest::nearest,
 };
 
@@ -120,13 +121,13 @@ impl Walk<'_> {
         present.sort_by_key(|(_, child)| &child.key);
         for (name, child) in present.iter().skip(1) {
             let message = format!("`{name}` and `{}` exclude each other", present[0].0);
-            let help = format!("give exactly one of {} in [{path}]", list(&choices));
+            let help = format!("give exactly one of {} in {}", list(&choices), header(path));
             self.faults
                 .push(Fault::new(child.key.clone(), message, "only one of them is allowed").help(help));
         }
         if present.is_empty() && meant.is_none() {
             let lacks = if table.is_empty() { "is empty" } else { "is incomplete" };
-            let message = format!("[{path}] {lacks}");
+            let message = format!("{} {lacks}", header(path));
             let help = format!("give exactly one of {}", list(&choices));
             self.faults.push(Fault::new(node.key.clone(), message, "").help(help));
         }
@@ -143,7 +144,7 @@ impl Walk<'_> {
         let place = if path.is_empty() {
             format!("at the top of a {}", self.kind.name)
         } else {
-            format!("in [{path}]")
+            format!("in {}", header(path))
         };
         let mut fault =
             Fault::new(child.key.clone(), format!("unknown key `{key}` {place}"), "not a key here");
@@ -157,7 +158,7 @@ impl Walk<'_> {
     }
 
     fn missing(&mut self, node: &Node, key: &str, schema: Option<Schema>, path: &str) {
-        let place = if path.is_empty() { format!("the {}", self.kind.name) } else { format!("[{path}]") };
+        let place = if path.is_empty() { format!("the {}", self.kind.name) } else { header(path) };
         let message = format!("missing key `{key}` in {place}");
         let label = if path.is_empty() { "" } else { "this key is missing here" };
         let mut fault = Fault::new(node.key.clone(), message, label);
@@ -169,7 +170,7 @@ impl Walk<'_> {
                     fault = fault.help(format!("for example: {key} = {}", describe::toml(example)))
                 }
                 None if schema.accepts("object") => {
-                    fault = fault.help(format!("add a table [{}]", join(path, key)))
+                    fault = fault.help(format!("add a table {}", header(&join(path, key))))
                 }
                 None => {}
             }
@@ -287,10 +288,13 @@ impl Walk<'_> {
         let key = path.rsplit('.').next().unwrap_or(path);
         match &node.value {
             Value::Table(_) if schema.accepts("array") && item_accepts("object") => {
-                fault = fault.help(format!("several are possible: write [[{path}]] with two brackets"));
+                fault = fault.help(format!(
+                    "several are possible: write {} with two brackets",
+                    header(&join(path, "0"))
+                ));
             }
             Value::Array(_) if schema.accepts("object") => {
-                fault = fault.help(format!("only one is possible: write [{path}] with one bracket"));
+                fault = fault.help(format!("only one is possible: write {} with one bracket", header(path)));
             }
             Value::Text(text)
                 if schema.accepts("array") && (item_accepts("string") || schema.words().is_empty()) =>

@@ -30,6 +30,15 @@ impl LawFault {
     }
 }
 
+/// The header of a table in a job file, given its path: without the positions of items of lists, `[contact.normal]` for
+/// `contact.0.normal`, and with two brackets for an item of a list, `[[contact]]` for `contact.0`.
+pub(crate) fn header(path: &str) -> String {
+    let is_position = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
+    let is_item = path.rsplit('.').next().is_some_and(is_position);
+    let keys: Vec<&str> = path.split('.').filter(|part| !is_position(part)).collect();
+    if is_item { format!("[[{}]]", keys.join(".")) } else { format!("[{}]", keys.join(".")) }
+}
+
 /// The root of an increasing function that is negative at `low` and not negative at `high`, by Newton's method within a bracket.
 /// `function` returns value and derivative.
 pub(crate) fn increasing_root(

@@ -33,6 +33,38 @@ pub fn norm<const N: usize>(a: &[f64; N]) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// The part of a unit vector outside of the span of orthonormal vectors, scaled to length 1; `None` if it is shorter than `least`.
+pub fn outside<const D: usize>(vector: &Vector<D>, span: &[Vector<D>], least: f64) -> Option<Vector<D>> {
+    let mut rest = *vector;
+    // Twice, so that the result is orthogonal up to rounding.
+    for _ in 0..2 {
+        for known in span {
+            rest = add_scaled(&rest, -dot(known, &rest), known);
+        }
+        let size = norm(&rest);
+        if size < least {
+            return None;
+        }
+        rest = rest.map(|x| x / size);
+    }
+    Some(rest)
+}
+
+/// The dual basis of unit vectors in their span: the product of a vector with its dual is 1, with the others 0. `None` if the part of a
+/// vector outside of the span of the others is shorter than `least`.
+pub fn dual_basis<const D: usize>(vectors: &[Vector<D>], least: f64) -> Option<Vec<Vector<D>>> {
+    let dual = |at: usize| {
+        let mut others: Vec<Vector<D>> = Vec::new();
+        for (_, other) in vectors.iter().enumerate().filter(|(k, _)| *k != at) {
+            others.push(outside(other, &others, least)?);
+        }
+        let rest = outside(&vectors[at], &others, least)?;
+        let along = dot(&rest, &vectors[at]);
+        Some(rest.map(|x| x / along))
+    };
+    (0..vectors.len()).map(dual).collect()
+}
+
 /// `a + factor * b`.
 #[inline(always)]
 pub fn add_scaled<const N: usize>(a: &[f64; N], factor: f64, b: &[f64; N]) -> [f64; N] {
@@ -208,5 +240,19 @@ mod tests {
         assert!((von_mises(&[0.0, 0.0, 2.0 * SQRT_2]) - 2.0 * 3f64.sqrt()).abs() < 1e-14);
         assert!(von_mises(&[5.0, 5.0, 5.0, 0.0, 0.0, 0.0]) < 1e-14);
         assert!((von_mises(&[3.0, 0.0, 0.0, 0.0]) - 3.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn vectors_and_their_dual_basis_are_biorthogonal_and_dependent_vectors_have_none() {
+        let vectors = [[1.0, 0.0, 0.0], [0.6, 0.8, 0.0]];
+        let dual = dual_basis(&vectors, 0.1).expect("independent");
+        for (i, vector) in vectors.iter().enumerate() {
+            for (j, dual) in dual.iter().enumerate() {
+                assert!((dot(vector, dual) - f64::from(u8::from(i == j))).abs() < 1e-15, "{i} {j}");
+            }
+        }
+        assert!((dual[0][1] + 0.75).abs() < 1e-15 && dual[0][2] == 0.0, "{dual:?}");
+        assert_eq!(dual_basis(&[vectors[0], vectors[1], [0.0, 1.0, 0.0]], 0.1), None);
+        assert_eq!(dual_basis(&[[1.0, 0.0], [-1.0, 0.0]], 0.1), None);
     }
 }

@@ -1,7 +1,7 @@
 //! One rank's part of a mesh, assembled from pieces; and the distribution of a whole mesh by rank 0.
 
 use super::{
-    Boundary, GlobalMesh, Names, PointSet, Tags,
+    Boundary, GlobalMesh, InnerGroup, Names, PointSet, Tags,
     partition::Partition,
     piece::{Cutter, Piece},
     surface::Topology,
@@ -66,6 +66,8 @@ pub struct Mesh<const D: usize> {
     pub boundaries: Vec<Boundary>,
     /// Named points and curves, the same on all ranks.
     pub point_sets: Vec<PointSet>,
+    /// Names of facets inside the body.
+    pub inner_groups: Vec<InnerGroup>,
     /// Number of facets between ranks.
     pub edge_cut: usize,
     /// Ratio of the largest number of cells on a rank to the mean.
@@ -220,6 +222,7 @@ impl<const D: usize> Mesh<D> {
             facet_cells: piece.facet_cells,
             boundaries,
             point_sets: names.point_sets,
+            inner_groups: names.inner_groups,
             node_starts,
             ..Self::default()
         };

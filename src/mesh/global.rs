@@ -30,13 +30,16 @@ pub struct GlobalMesh<const D: usize> {
     pub boundaries: Vec<Boundary>,
     /// Named points and curves.
     pub point_sets: Vec<PointSet>,
+    /// Names that are given to facets inside the body.
+    pub inner_groups: Vec<InnerGroup>,
 }
 
 impl<const D: usize> GlobalMesh<D> {
     /// Names of regions and boundaries.
     pub fn names(&self) -> Names {
         let boundaries = self.boundaries.iter().map(|boundary| boundary.name.clone()).collect();
-        Names { regions: self.regions.clone(), boundaries, point_sets: self.point_sets.clone() }
+        let (regions, point_sets) = (self.regions.clone(), self.point_sets.clone());
+        Names { regions, boundaries, point_sets, inner_groups: self.inner_groups.clone() }
     }
 }
 
@@ -74,6 +77,28 @@ impl PointSet {
     }
 }
 
+/// A named group of facets of which some have a cell on both sides. It can't be a boundary.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct InnerGroup {
+    /// Its name.
+    pub name: String,
+    /// Number of its facets inside the body.
+    pub facets: usize,
+    /// The place of one of them, in words.
+    pub place: String,
+}
+
+impl InnerGroup {
+    /// Its line in the description of a mesh.
+    pub fn line(&self) -> String {
+        let Self { name, facets, place } = self;
+        let plural = if *facets == 1 { "" } else { "s" };
+        format!(
+            "inside      {name}: {facets} facet{plural} inside the body, around {place}; it is not a boundary"
+        )
+    }
+}
+
 /// Names of a mesh, the same on all ranks.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Names {
@@ -83,4 +108,6 @@ pub struct Names {
     pub boundaries: Vec<String>,
     /// Points and curves.
     pub point_sets: Vec<PointSet>,
+    /// Names of facets inside the body.
+    pub inner_groups: Vec<InnerGroup>,
 }

@@ -20,7 +20,7 @@ mod tags;
 pub mod tree;
 
 pub use distributed::{Mesh, distribute};
-pub use global::{Boundary, GlobalMesh, Names, PointSet};
+pub use global::{Boundary, GlobalMesh, InnerGroup, Names, PointSet};
 pub use midsides::midpoint;
 pub use skeleton::{count_free_motions, free_motions};
 pub use tags::Tags;

@@ -117,6 +117,7 @@ impl<const D: usize> Piece<D> {
             facet_cells: self.facet_cells,
             boundaries,
             point_sets: names.point_sets,
+            inner_groups: names.inner_groups,
         })
     }
 }

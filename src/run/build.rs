@@ -39,7 +39,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
     let load = load(job, &mesh, &materials.all);
-    let elastic_support = elastic_support::<D, S>(session, job, &mesh, &materials)?;
+    let elastic_support = elastic_support::<D, S>(session, job, &mesh, &held, &materials)?;
     let mut contacts = Vec::new();
     let mut taken = BTreeSet::new();
     let mut parts = Vec::new();
@@ -66,7 +66,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         }
         contacts.push(laws);
     }
-    let surface_effects = surface_effects(session, &job.contact, &mesh, &parts)?;
+    let surface_effects = surface_effects(session, &job.contact, &mesh, &parts, &held)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
@@ -168,6 +168,7 @@ fn elastic_support<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
     mesh: &Mesh<D>,
+    held: &Held<D>,
     materials: &Materials,
 ) -> Result<ElasticSupport<D>> {
     let mut all = ElasticSupport::default();
@@ -185,7 +186,7 @@ fn elastic_support<const D: usize, const S: usize>(
             let points = surface_points(session, mesh, &facets)?;
             all.points.extend(points.into_iter().map(|point| ElasticPoint {
                 support: number,
-                point,
+                point: held.whole(point),
                 stiffness,
                 damping,
             }));
@@ -219,7 +220,7 @@ fn elastic_support<const D: usize, const S: usize>(
             let stiffness = Resistances::default();
             all.points.extend(points.into_iter().map(|(point, [normal, tangential])| ElasticPoint {
                 support: number,
-                point,
+                point: held.whole(point),
                 stiffness,
                 damping: Resistances { normal, tangential },
             }));
@@ -287,13 +288,16 @@ fn refuse_moving_contact<const D: usize>(
     points: &[SurfacePoint<D>],
     (held, motion): (&Held<D>, &SupportMotion<D>),
 ) -> Result<()> {
-    for point in points {
+    for point in points.iter().map(|point| held.whole(*point)) {
         let (node, place) = (point.node as usize, mesh.nodes[point.node as usize]);
         let free = norm(&held.free_part(node, &point.normal)) > 1e-9;
         let is_nodal = contact.quadrature == Quadrature::Nodal;
         if motion.moves(node, &point.normal) && (free || !is_nodal) {
-            let remedy =
-                if is_nodal { "fix all components there, or none" } else { "use quadrature = \"nodal\"" };
+            let remedy = if is_nodal {
+                "exclude the facets around by the `where` of the contact"
+            } else {
+                "use quadrature = \"nodal\""
+            };
             return Err(Error::Refused(format!(
                 "contact at {place:?} m: a support moves this point in a direction that is not tangential to the boundary; {remedy}"
             )));
@@ -303,7 +307,7 @@ fn refuse_moving_contact<const D: usize>(
         if contact.friction.is_some() && slides && count > usize::from(free) {
             return Err(Error::Refused(format!(
                 "friction at {place:?} m: a support moves one tangential component there and leaves another free, and friction \
-                 depends on both; fix all components there, or none"
+                 depends on both; hold all components there, or exclude the facets around by the `where` of the contact"
             )));
         }
     }

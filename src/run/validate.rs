@@ -17,7 +17,14 @@ pub(super) fn validate<const D: usize>(
     let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
     let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
     let points: Vec<&str> = mesh.point_sets.iter().map(|set| set.name.as_str()).collect();
-    let names = MeshNames { dimension: D, boundaries: &boundaries, regions: &regions, points: &points };
+    let inner: Vec<[&str; 2]> = mesh.inner_groups.iter().map(|group| [&*group.name, &*group.place]).collect();
+    let names = MeshNames {
+        dimension: D,
+        boundaries: &boundaries,
+        regions: &regions,
+        points: &points,
+        inner: &inner,
+    };
     session.agree(loaded.check_mesh(names))?;
     session.agree(refuse_empty_matrix(mesh, loaded))?;
     refuse_conflicts(session, mesh, loaded)?;

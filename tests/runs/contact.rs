@@ -1,6 +1,11 @@
 //! Vertical parts of contact graphs: rest at a jump, rigid obstacles; and foundations that store energy.
 
-use crate::{case::Case, launch, results::assert_same_answer};
+use crate::{
+    case::Case,
+    hdf5_file::NumberFile,
+    launch,
+    results::{assert_same_answer, relative_difference},
+};
 use clarke::linear_algebra::tensor::larger;
 
 #[test]
@@ -380,4 +385,72 @@ fn cells_that_are_too_large_for_the_bonds_are_warned_of_on_any_number_of_ranks()
             assert!(!fine.contains(warning), "{cells} {order} {strength}: {fine}");
         }
     }
+}
+
+/// A block of quadratic cells that its right side presses to the ground and pushes against a wall.
+fn pushed_block(contacts: &str) -> Case {
+    Case::cube(2)
+        .set("mesh", "{order = 2, box = {size = [0.6, 0.4, 0.5], cells = [4, 2, 2]}}")
+        .set("material", "{density = 700, elasticity = {youngs_modulus = 3e6, poisson_ratio = 0.3}}")
+        .set("support", "[{on = ['right'], fix = 'all', displacement = ['-0.03*t', '0.01*t', '-0.06*t']}]")
+        .without("traction")
+        .set("contact", contacts)
+        .set(
+            "output",
+            "{folder = 'out', also = ['contact_pressure', 'contact_status', 'gap', 'branch', 'sliding_velocity'], \
+             profile = [{on = 'bottom'}], fields.every = 1}",
+        )
+        .set("time", "{scheme = 'bdf2', end = 0.01, step = 0.001}")
+}
+
+/// The largest difference of a field of two runs in all steps, relative to its largest value.
+fn differs(field: &str, cases: [&Case; 2]) -> f64 {
+    let [one, other] = cases.map(|case| NumberFile::open(&case.results().path("fields.vtkhdf")));
+    let off = (0..one.times().len()).map(|step| {
+        let [one, other] = [&one, &other].map(|file| file.field(field, step));
+        let size = one.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        let worst = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, larger);
+        if size > 0.0 { worst / size } else { worst }
+    });
+    off.fold(0.0, larger)
+}
+
+const GROUND: &str = "{on = ['bottom'], normal.unilateral = {}, friction.coulomb = {coefficient = 0.35}}";
+const WALL: &str = "{on = ['left'], normal.compliance = {stiffness = 2e8}, friction.tresca = {bound = 500}}";
+
+#[test]
+fn fields_at_edges_do_not_depend_on_the_order_of_the_tables_or_the_ranks() {
+    let ordered = pushed_block(&format!("[{GROUND}, {WALL}]")).run_and_keep(1);
+    let swapped = pushed_block(&format!("[{WALL}, {GROUND}]")).run_and_keep(1);
+    let parts = pushed_block(&format!("[{WALL}, {GROUND}]")).run_and_keep(3);
+    for field in
+        ["contact_pressure", "contact_status", "gap", "branch", "sliding_velocity", "contact_traction"]
+    {
+        for other in [&swapped, &parts] {
+            let off = differs(field, [&ordered, other]);
+            assert!(off < 1e-6, "{field} differs by {off}");
+        }
+    }
+}
+
+#[test]
+fn corners_of_quadratic_cells_have_the_mean_traction_around_for_any_division_into_tables() {
+    let whole = pushed_block(&format!("[{GROUND}]")).run_and_keep(1);
+    let half = |part: &str| GROUND.replace("normal", &format!("where = '{part}', normal"));
+    let halves = pushed_block(&format!("[{}, {}]", half("x < 0.3"), half("x > 0.3"))).run_and_keep(2);
+    for field in ["contact_pressure", "contact_traction", "gap", "contact_status"] {
+        let off = differs(field, [&whole, &halves]);
+        assert!(off < 1e-6, "{field} differs by {off}");
+    }
+    for column in ["contact_pressure", "gap", "friction_traction_x", "sliding_velocity_x"] {
+        let [one, other] = [&whole, &halves].map(|case| case.results().table("profiles.csv").numbers(column));
+        let size = one.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        assert!(size > 0.0 && one.iter().all(|x| x.is_finite()), "{column} has a value at each node");
+        let off = relative_difference(&one, &other);
+        assert!(off < 1e-6, "{column} differs by {off}");
+    }
+    // No checkerboard: corners are under pressure as midpoints are.
+    let file = NumberFile::open(&whole.results().path("fields.vtkhdf"));
+    let pressed = file.field("contact_pressure", file.times().len() - 1).iter().filter(|p| **p > 0.0).count();
+    assert!(pressed > 12, "{pressed} nodes, corners and midpoints, are under pressure");
 }

@@ -97,3 +97,44 @@ fn points_are_refused_where_boundaries_are_meant() {
     refused(spring, "only a support with `fix` acts on them");
     refused(make().set("support.1.on", "['axle']"), "the mesh has no boundary, point or curve \"axle\"");
 }
+
+/// A line inside the square, from the middle of the bottom to the middle of the top, that has a name.
+fn with_a_fault() -> (tempfile::TempDir, PathBuf) {
+    let nodes = "0 0 0\n1 0 0\n2 0 0\n0 1 0\n1 1 0\n2 1 0\n";
+    let text = format!(
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n1 1 \"left\"\n1 2 \"bottom\"\n1 3 \"fault\"\n\
+         $EndPhysicalNames\n$Entities\n0 3 1 0\n1 0 0 0 0 1 0 1 1 0\n2 0 0 0 2 0 0 1 2 0\n3 1 0 0 1 1 0 1 3 0\n\
+         1 0 0 0 2 1 0 0 0\n$EndEntities\n$Nodes\n1 6 1 6\n2 1 0 6\n1\n2\n3\n4\n5\n6\n{nodes}$EndNodes\n\
+         $Elements\n4 8 1 8\n1 1 1 1\n1 1 4\n1 2 1 2\n2 1 2\n3 2 3\n1 3 1 1\n4 2 5\n\
+         2 1 2 4\n5 1 2 5\n6 1 5 4\n7 2 3 6\n8 2 6 5\n$EndElements\n"
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("fault.msh");
+    std::fs::write(&file, text).expect("written");
+    (folder, file)
+}
+
+#[test]
+fn a_group_inside_the_body_is_noted_and_no_table_may_name_it() {
+    let (folder, file) = with_a_fault();
+    let parts = folder.path().join("parts.h5");
+    let text = |path: &Path| path.to_str().expect("a path").to_owned();
+    launch::run_alone(&["partition", &text(&file), "-n", "2", "-o", &text(&parts)]).expect(0);
+    for (file, ranks) in [(&file, 1), (&file, 2), (&parts, 1), (&parts, 2)] {
+        let outcome = launch::run_alone(&["inspect", &text(file)]).expect(0);
+        outcome.says("inside      fault: 1 facet inside the body, around (1, 0.5)");
+        let case = || {
+            Case::square(2)
+                .without("mesh.rectangle")
+                .without("output.probe")
+                .set("mesh.file", &format!("{file:?}"))
+                .set("traction", "[{on = ['bottom'], value = [0, -1]}]")
+                .without("contact")
+        };
+        let outcome = case().run_with(ranks, &["--force"]).expect(0);
+        outcome.says("physical group \"fault\" has facets inside the body, for example around (1, 0.5)");
+        let named = case().set("traction", "[{on = ['bottom', 'fault'], value = [0, -1]}]");
+        let outcome = named.run_with(ranks, &["--force"]).expect(2);
+        outcome.says("\"fault\" has facets inside the body").says("name a boundary");
+    }
+}

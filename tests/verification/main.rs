@@ -17,6 +17,7 @@ mod effects;
 mod energy;
 mod fast_flow;
 mod flowing_contact;
+mod half_models;
 mod held_by_contact;
 mod inclusion;
 mod indefinite;
@@ -110,6 +111,8 @@ fn scenario() {
         "several_laws" => obstacles::several(&session, &folder),
         "random_laws" => random_laws::solve(&session),
         "supports" => supports::all(&session),
+        "half_models" => half_models::all(&session),
+        "contact_edges" => half_models::edges(&session),
         "subspace" => subspace::solve(&session),
         "carried" => resultants::carried(&session),
         "orders_plane" => orders::plane(&session),

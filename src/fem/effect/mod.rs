@@ -35,12 +35,12 @@ mod viscous_stress;
 
 use crate::{
     error::{Error, Result},
-    fem::space::{CellRun, Geometry, surface_points},
+    fem::space::{CellRun, Geometry, Held, surface_points},
     job::{self, Material},
     laws::material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
     linear_algebra::{simd::Pack, tensor::Mandel},
     mesh::Mesh,
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
 };
 
 pub use crate::laws::step::{Blend, Evaluation, Step};
@@ -49,6 +49,7 @@ pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode, Decrease,
     Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, PointCount,
     PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns, contact_nodes,
+    set_walls,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};
@@ -134,17 +135,22 @@ pub fn effects<const D: usize, const S: usize>(
     Ok(effects)
 }
 
-/// The effects at nodes of contact boundaries in addition to contact, given the facets of each contact on this rank. Collective.
+/// The effects at nodes of contact boundaries in addition to contact, given the facets of each contact on this rank and what
+/// supports hold. Collective.
 pub fn surface_effects<const D: usize>(
     session: &Session,
     contacts: &[job::Contact],
     mesh: &Mesh<D>,
     facets: &[Vec<u32>],
+    held: &Held<D>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
     for (at, (contact, facets)) in contacts.iter().zip(facets).enumerate() {
-        let points = || surface_points(session, mesh, facets);
+        let points = || {
+            let points = surface_points(session, mesh, facets)?;
+            Ok::<Vec<_>, Agreed>(points.into_iter().map(|point| held.whole(point)).collect())
+        };
         if let Some(law) = contact.memory {
             foundations.push((at, law, points()?));
         }

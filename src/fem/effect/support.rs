@@ -7,7 +7,7 @@ use crate::{
     job::{Fix, FixedDirections, Scalar, Support},
     linear_algebra::{
         petsc::DistributedVector,
-        tensor::{Vector, add_scaled, dot, norm},
+        tensor::{Vector, add_scaled, dot, dual_basis, norm},
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -327,25 +327,10 @@ impl<const D: usize> MovedNode<D> {
                 )));
             }
         }
-        let dual = |at: usize| {
-            // What is left of this direction without the span of the others, scaled to a component of 1 along it.
-            let mut others: Vec<Vector<D>> = Vec::new();
-            let out = |rest: Vector<D>, known: &Vector<D>| add_scaled(&rest, -dot(known, &rest), known);
-            for (_, (other, _)) in independent.iter().enumerate().filter(|(k, _)| *k != at) {
-                let rest = others.iter().chain(&others).fold(*other, out);
-                let size = norm(&rest);
-                others.push(rest.map(|x| x / size));
-            }
-            let direction = independent[at].0;
-            let rest = others.iter().chain(&others).fold(direction, out);
-            let along = dot(&rest, &direction);
-            rest.map(|x| x / along)
-        };
-        let parts = independent
-            .iter()
-            .enumerate()
-            .map(|(at, (direction, value))| Part { value: *value, direction: *direction, dual: dual(at) })
-            .collect();
+        let directions: Vec<Vector<D>> = independent.iter().map(|(direction, _)| *direction).collect();
+        let duals = dual_basis(&directions, INDEPENDENT).unwrap_or_default();
+        let parts = independent.iter().zip(duals);
+        let parts = parts.map(|(&(direction, value), dual)| Part { value, direction, dual }).collect();
         Ok(Self { node, place, parts })
     }
 

@@ -1,6 +1,7 @@
 //! The directions in which supports hold nodes.
 
-use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
+use super::surface::{FACE_AND_MIRROR_IMAGE, SurfacePoint};
+use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm, outside};
 
 /// A unit direction with a smaller part outside of a span is in this span.
 const INDEPENDENT: f64 = 1e-9;
@@ -52,14 +53,14 @@ impl<const D: usize> Held<D> {
         let axes = (0..D).filter(|&i| flags[i]).map(axis::<D>);
         let (mut held, mut count) = ([[0.0; D]; D], 0);
         for direction in axes.chain(directions) {
-            if let Some(rest) = outside(&direction, &held[..count]).filter(|_| count < D) {
+            if let Some(rest) = outside(&direction, &held[..count], INDEPENDENT).filter(|_| count < D) {
                 held[count] = rest;
                 count += 1;
             }
         }
         let held = &held[..count];
         // Components along which the span contains the axis.
-        let along: Vec<bool> = (0..D).map(|i| outside(&axis(i), held).is_none()).collect();
+        let along: Vec<bool> = (0..D).map(|i| outside(&axis(i), held, INDEPENDENT).is_none()).collect();
         if along.iter().filter(|along| **along).count() == count {
             flags.copy_from_slice(&along);
             return;
@@ -71,7 +72,9 @@ impl<const D: usize> Held<D> {
             let known: Vec<Vector<D>> = held.iter().chain(&frame[..free]).copied().collect();
             let left = |i: usize| (1.0 - known.iter().map(|k| k[i] * k[i]).sum::<f64>(), i);
             let farthest = (0..D).map(left).reduce(|a, b| if b.0 > a.0 { b } else { a });
-            let Some(next) = farthest.and_then(|(_, i)| outside(&axis(i), &known)) else { break };
+            let Some(next) = farthest.and_then(|(_, i)| outside(&axis(i), &known, INDEPENDENT)) else {
+                break;
+            };
             frame[free] = next;
             free += 1;
         }
@@ -122,6 +125,17 @@ impl<const D: usize> Held<D> {
             Some(slanted) => add_scaled(vector, -1.0, &slanted.held_part(vector)),
             None => std::array::from_fn(|i| if self.flags[node * D + i] { 0.0 } else { vector[i] }),
         }
+    }
+
+    /// A point of a boundary as a body sees it of which supports leave a half, a quarter or an eighth: if the boundary and its mirror
+    /// images make one face, the node has the mean normal of this face, which is the free part of the normal.
+    pub fn whole(&self, mut point: SurfacePoint<D>) -> SurfacePoint<D> {
+        let free = self.free_part(point.node as usize, &point.normal);
+        let length = norm(&free);
+        if free != point.normal && length > FACE_AND_MIRROR_IMAGE {
+            point.normal = free.map(|x| x / length);
+        }
+        point
     }
 
     /// Sets the held parts of nodal values to zero, of all nodes that the slice has.
@@ -185,23 +199,6 @@ impl<const D: usize> Held<D> {
 
 pub(super) fn axis<const D: usize>(i: usize) -> Vector<D> {
     std::array::from_fn(|j| f64::from(u8::from(i == j)))
-}
-
-/// The part of a unit direction outside of the span of orthonormal vectors, scaled to length 1; `None` if it is in the span.
-fn outside<const D: usize>(direction: &Vector<D>, span: &[Vector<D>]) -> Option<Vector<D>> {
-    let mut rest = *direction;
-    // Twice, so that the result is orthogonal up to rounding.
-    for _ in 0..2 {
-        for known in span {
-            rest = add_scaled(&rest, -dot(known, &rest), known);
-        }
-        let size = norm(&rest);
-        if size < INDEPENDENT {
-            return None;
-        }
-        rest = rest.map(|x| x / size);
-    }
-    Some(rest)
 }
 
 #[cfg(test)]

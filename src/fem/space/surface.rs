@@ -5,11 +5,7 @@ use super::{
     quadrature::{facet_rule, fine_facet_rule},
 };
 use crate::{
-    error::Result,
-    linear_algebra::{
-        petsc::DistributedVector,
-        tensor::{Vector, dot, norm},
-    },
+    linear_algebra::tensor::{Vector, dot, norm},
     mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
@@ -54,6 +50,8 @@ pub fn facets<'a, const D: usize>(mesh: &Mesh<D>, names: impl IntoIterator<Item 
 
 /// Cosine of the angle beyond which facets around a node count as different faces of the body (40 degrees).
 const SAME_FACE: f64 = 0.766_044_443_118_978;
+/// Cosine of half of this angle: facets at a smaller one to a direction that is held make one face with their mirror images.
+pub(super) const FACE_AND_MIRROR_IMAGE: f64 = 0.939_692_620_785_908;
 
 /// The quadrature points of these boundaries at nodes owned here, ordered by node. Collective.
 ///
@@ -97,8 +95,15 @@ pub fn surface_means<const D: usize, const N: usize>(
             }
         }
     }
-    let incoming = exchange_lists(session.world(), &outgoing)?;
-    let mut shares: Vec<Share<D, N>> = incoming
+    Ok(points_of_shares(mesh, &exchange_lists(session.world(), &outgoing)?))
+}
+
+/// The points at the nodes of this rank, from the records of the facets around them: node, factor, normal and values.
+fn points_of_shares<const D: usize, const N: usize>(
+    mesh: &Mesh<D>,
+    records: &[f64],
+) -> Vec<(SurfacePoint<D>, [f64; N])> {
+    let mut shares: Vec<Share<D, N>> = records
         .chunks_exact(D + 2 + N)
         .map(|record| Share {
             node: record[0] as u32,
@@ -113,7 +118,7 @@ pub fn surface_means<const D: usize, const N: usize>(
             vectors.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
         })
     });
-    Ok(shares.chunk_by(|a, b| a.node == b.node).flat_map(|around| points_of_node(mesh, around)).collect())
+    shares.chunk_by(|a, b| a.node == b.node).flat_map(|around| points_of_node(mesh, around)).collect()
 }
 
 /// A linear facet at one of its nodes.
@@ -133,46 +138,44 @@ pub fn acts_at_midsides<const D: usize>(mesh: &Mesh<D>) -> bool {
     D == 3 && mesh.order() == 2
 }
 
-/// Adds to the corners of quadratic facets in space, at which [`surface_points`] have no weight, the means of the values at the
-/// midside nodes of these facets: `width` values for each node, which `of_midsides` holds in the first places of each node and `nodal`
-/// without gaps. Collective.
-pub fn add_corner_means<const D: usize>(
+/// The points of these boundaries at corners of quadratic facets in space, where laws do not act, with the means of values at the
+/// midpoints of the edges that meet there: `of_midside` gives those at an owned node for the facets of such a normal. No points for
+/// other cells. Collective.
+pub fn corner_means<const D: usize, const N: usize>(
+    session: &Session,
     mesh: &Mesh<D>,
     facets: &[u32],
-    of_midsides: &mut DistributedVector,
-    width: usize,
-    nodal: &mut [f64],
-) -> Result<()> {
+    of_midside: impl Fn(u32, &Vector<D>) -> Option<[f64; N]>,
+) -> Result<Vec<(SurfacePoint<D>, [f64; N])>, Agreed> {
     if !acts_at_midsides(mesh) {
-        return Ok(());
+        return Ok(Vec::new());
     }
-    of_midsides.update_ghosts()?;
-    let (mut sums, mut counts) = (of_midsides.like()?, of_midsides.like()?);
-    {
-        let (values, mut sums, mut counts) = (of_midsides.local()?, sums.local_mut()?, counts.local_mut()?);
-        sums.fill(0.0);
-        counts.fill(0.0);
-        for &facet in facets {
-            let corners = mesh.facets[facet as usize];
-            for (i, midside) in mesh.facet_midsides(facet).into_iter().enumerate() {
-                let value = &values[midside as usize * D..][..width];
-                for corner in [corners[i], corners[(i + 1) % D]] {
-                    let at = corner as usize * D;
-                    counts[at] += 1.0;
-                    value.iter().zip(&mut sums[at..]).for_each(|(value, sum)| *sum += value);
-                }
+    let mut questions = vec![Vec::new(); session.ranks()];
+    for &facet in facets {
+        let corners = mesh.facets[facet as usize];
+        let normal = facet_normal(&mesh.facet_corners(facet));
+        for (i, midside) in mesh.facet_midsides(facet).into_iter().enumerate() {
+            let midside = mesh.global_node(midside);
+            for corner in [corners[i], corners[(i + 1) % D]] {
+                let record = &mut questions[mesh.owner(midside)];
+                record.extend([f64::from(midside), f64::from(mesh.global_node(corner))]);
+                record.extend(normal);
             }
         }
     }
-    sums.add_ghosts_to_owners()?;
-    counts.add_ghosts_to_owners()?;
-    let (sums, counts) = (sums.owned()?, counts.owned()?);
-    for (node, nodal) in nodal.chunks_exact_mut(width).enumerate().filter(|(node, _)| counts[node * D] > 0.0)
-    {
-        let sums = &sums[node * D..][..width];
-        nodal.iter_mut().zip(sums).for_each(|(value, sum)| *value += sum / counts[node * D]);
+    let questions = exchange_lists(session.world(), &questions)?;
+    let mut answers = vec![Vec::new(); session.ranks()];
+    for question in questions.chunks_exact(D + 2) {
+        let [midside, corner] = [0, 1].map(|i| question[i] as u32);
+        let normal: Vector<D> = std::array::from_fn(|i| question[i + 2]);
+        if let Some(values) = of_midside(mesh.owned_node(midside) as u32, &normal) {
+            let record = &mut answers[mesh.owner(corner)];
+            record.extend([f64::from(corner), 0.0]);
+            record.extend(normal);
+            record.extend(values);
+        }
     }
-    Ok(())
+    Ok(points_of_shares(mesh, &exchange_lists(session.world(), &answers)?))
 }
 
 /// A Gauss point of a facet.

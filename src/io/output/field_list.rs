@@ -58,8 +58,8 @@ fields! {
         |at| error_indicator::compute(at)?;
     /// Contact traction at the nodes, where it is an unknown of steps.
     CONTACT_TRACTION = OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa"),
-        |at| match &at.state.contact_traction {
-            Some(traction) => Computed::of(traction.owned()?),
+        |at| match further::contact_traction(at)? {
+            Some(traction) => traction,
             None => return Ok(None),
         };
     /// See [`FurtherField`](crate::job::FurtherField), as all fields below.
@@ -75,15 +75,15 @@ fields! {
     /// Pressure.
     PRESSURE = further::PRESSURE, |at| further::pressure(at);
     /// Contact pressure.
-    CONTACT_PRESSURE = further::CONTACT_PRESSURE, |at| further::means_of_contacts(at, |point| [point.pressure])?;
+    CONTACT_PRESSURE = further::CONTACT_PRESSURE, |at| further::of_contacts(at, |point| [point.pressure])?;
     /// Gap.
-    GAP = further::GAP, |at| further::means_of_contacts(at, |point| [point.gap])?;
+    GAP = further::GAP, |at| further::of_contacts(at, |point| [point.gap])?;
     /// State of contact points.
     CONTACT_STATUS = further::CONTACT_STATUS, |at| further::of_contacts(at, |point| [further::status(point)])?;
     /// Branch of the normal law.
     BRANCH = further::BRANCH, |at| further::of_contacts(at, |point| [point.branch as f64])?;
     /// Sliding velocity.
-    SLIDING_VELOCITY = further::SLIDING_VELOCITY, |at| further::means_of_contacts(at, |point| point.sliding)?;
+    SLIDING_VELOCITY = further::SLIDING_VELOCITY, |at| further::of_contacts(at, |point| point.sliding)?;
 }
 
 #[cfg(test)]

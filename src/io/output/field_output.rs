@@ -1,6 +1,7 @@
 //! The field file of a run.
 
 use super::{
+    contact_points::fill_corners,
     field_list::{COUNT, ERROR_INDICATOR, FIELDS, computations},
     fields::{Field, FieldFile, FieldMesh, Place, Shape},
     log::Log,
@@ -8,7 +9,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, effect::History},
+    fem::{body::Body, effect::History, space::acts_at_midsides},
     job::Job,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -95,7 +96,10 @@ impl<const D: usize> FieldOutput<D> {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Cell, shape, values: &history.values });
         }
-        let of_nodes: Vec<History> = at.body.node_histories().collect();
+        let mut of_nodes: Vec<History> = at.body.node_histories().collect();
+        for history in of_nodes.iter_mut().filter(|_| acts_at_midsides(&at.body.mesh)) {
+            fill_corners(at, history.name, history.values.to_mut())?;
+        }
         for history in &of_nodes {
             let shape = if history.width == D { Shape::Vector } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Node, shape, values: &history.values });

@@ -1,15 +1,13 @@
 //! Fields that are written only if a job asks for them in `[output] also`.
 
 use super::{
+    contact_points::{contact_points, largest},
     field::{Place, Shape},
     output_field::{Computed, Converged, OutputField},
 };
 use crate::{
     error::Result,
-    fem::{
-        effect::{Contact, PointState},
-        space::{acts_at_midsides, add_corner_means},
-    },
+    fem::{effect::PointState, space::acts_at_midsides},
     job::FurtherField,
     linear_algebra::tensor::{Mandel, principal_values},
 };
@@ -67,57 +65,33 @@ pub(super) fn pressure<'a, const D: usize, const S: usize>(at: Converged<'a, D, 
     Computed::of(at.stress.iter().map(of_cell).collect::<Vec<_>>())
 }
 
-/// Values of the states of nodal contact points, `W` for each owned node; zero at other nodes. At a node with several points, the last
-/// one that touches counts, or the last one. Corners of quadratic facets in space, where no law acts, have the
-/// means of the midside nodes around. Collective.
-pub(super) fn means_of_contacts<'a, const D: usize, const S: usize, const W: usize>(
-    at: Converged<'a, D, S>,
-    value: impl Fn(&PointState<D>) -> [f64; W],
-) -> Result<Computed<'a>> {
-    let mut values = point_values(at, value)?;
-    if acts_at_midsides(&at.body.mesh) {
-        let mut of_midsides = at.state.velocity.like()?;
-        for (target, value) in of_midsides.owned_mut()?.chunks_exact_mut(D).zip(values.chunks_exact(W)) {
-            target[..W].copy_from_slice(value);
-        }
-        let facets = at.body.contacts.iter().filter(|contact| !contact.needs_ghosts()).map(Contact::facets);
-        add_corner_means(
-            &at.body.mesh,
-            &facets.flatten().copied().collect::<Vec<_>>(),
-            &mut of_midsides,
-            W,
-            &mut values,
-        )?;
-    }
-    Ok(Computed::of(values))
-}
-
-/// Values of the states of nodal contact points, `W` for each owned node; zero at nodes that are none. At a node with several points,
-/// the last one that touches counts, or the last one.
+/// Values of the states of nodal contact points, `W` for each owned node; zero at other nodes. At a node with several points the one
+/// with the largest pressure counts. Collective.
 pub(super) fn of_contacts<'a, const D: usize, const S: usize, const W: usize>(
     at: Converged<'a, D, S>,
     value: impl Fn(&PointState<D>) -> [f64; W],
 ) -> Result<Computed<'a>> {
-    Ok(Computed::of(point_values(at, value)?))
+    let mut values = vec![0.0; at.body.mesh.owned * W];
+    for of_node in contact_points(at)?.chunk_by(|a, b| a.0 == b.0) {
+        values[of_node[0].0 * W..][..W].copy_from_slice(&value(largest(of_node)));
+    }
+    Ok(Computed::of(values))
 }
 
-fn point_values<const D: usize, const S: usize, const W: usize>(
-    at: Converged<'_, D, S>,
-    value: impl Fn(&PointState<D>) -> [f64; W],
-) -> Result<Vec<f64>> {
-    let mut values = vec![0.0; at.body.mesh.owned * W];
-    let mut touched = vec![false; at.body.mesh.owned];
-    let (displacement, velocity) = (at.state.displacement.local()?, at.state.velocity.local()?);
-    for contact in &at.body.contacts {
-        contact.states(at.state.time, [&displacement, &velocity], |node, state| {
-            let touches = state.pressure != 0.0;
-            if touches || !touched[node] {
-                touched[node] = touches;
-                values[node * W..][..W].copy_from_slice(&value(&state));
-            }
-        })?;
+/// Contact traction at the nodes; `None` if no contact acts at nodes. Corners of quadratic facets in space have means. Collective.
+pub(super) fn contact_traction<'a, const D: usize, const S: usize>(
+    at: Converged<'a, D, S>,
+) -> Result<Option<Computed<'a>>> {
+    let Some(traction) = &at.state.contact_traction else { return Ok(None) };
+    if !acts_at_midsides(&at.body.mesh) {
+        return Ok(Some(Computed::of(traction.owned()?)));
     }
-    Ok(values)
+    let mut values = vec![0.0; at.body.mesh.owned * D];
+    for (node, state) in contact_points(at)? {
+        let target = &mut values[node * D..][..D];
+        (0..D).for_each(|i| target[i] += state.pressure * state.direction[i] + state.friction[i]);
+    }
+    Ok(Some(Computed::of(values)))
 }
 
 /// The number of a state in the field `contact_status`.

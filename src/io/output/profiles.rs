@@ -1,6 +1,10 @@
 //! `profiles.csv`: values along boundaries, with one row per facet node, output time and profile.
 
-use super::csv::{CsvFile, Numbers, Time, entry};
+use super::{
+    contact_points::contact_points,
+    csv::{CsvFile, Numbers, Time, entry},
+    output_field::Converged,
+};
 use crate::{
     error::Result,
     fem::{
@@ -14,7 +18,7 @@ use crate::{
     mesh::shape::facet_normal,
     parallel::{agreement::Agreed, exchange::exchange, session::Session},
 };
-use std::{collections::HashMap, path::Path};
+use std::path::Path;
 
 /// A boundary whose values are written.
 #[derive(Debug)]
@@ -35,6 +39,9 @@ struct Columns {
     friction: bool,
 }
 
+/// Cosine of the angle up to which the normals of a profile and of a contact point are those of the same side of an edge.
+const SAME_SIDE: f64 = 0.7;
+
 /// The profiles of a job.
 #[derive(Debug)]
 pub struct Profiles<const D: usize> {
@@ -53,6 +60,9 @@ impl<const D: usize> Profiles<D> {
         let prepare = |(name, contacts): &(String, Vec<usize>)| {
             let facets = body.mesh.boundary(name).map(|b| b.facets.clone()).unwrap_or_default();
             let points = surface_points(session, &body.mesh, &facets)?;
+            // With the normals of the contact points.
+            let whole = |point| if contacts.is_empty() { point } else { body.held.whole(point) };
+            let points = points.into_iter().map(whole).collect();
             Ok(Profile { name: entry(name), facets, points, contacts: contacts.clone() })
         };
         let contacts = || boundaries.iter().flat_map(|(_, contacts)| contacts).map(|at| &body.contacts[*at]);
@@ -100,9 +110,11 @@ impl<const D: usize> Profiles<D> {
         state: &State,
         stress: &[Mandel<S>],
     ) -> Result<(), Agreed> {
+        let at = Converged { session, body, state, stress };
+        let states = session.agree(contact_points(at))?;
         let width = 2 * D + 3 + usize::from(self.with.gap) + if self.with.friction { 2 * D } else { 0 };
         for profile in &self.profiles {
-            let rows = session.agree(profile.rows(body, state, stress, self.with))?;
+            let rows = session.agree(profile.rows(at, &states, self.with))?;
             // All rows to rank 0.
             let mut counts = vec![0; session.ranks()];
             counts[0] = rows.len();
@@ -145,52 +157,41 @@ impl<const D: usize> Profile<D> {
     /// the sliding velocity, and tangential displacement of each point on this rank.
     fn rows<const S: usize>(
         &self,
-        body: &Body<D, S>,
-        state: &State,
-        stress: &[Mandel<S>],
+        Converged { body, state, stress, .. }: Converged<'_, D, S>,
+        states: &[(usize, PointState<D>)],
         with: Columns,
     ) -> Result<Vec<f64>> {
         let by_stress =
             if self.contacts.is_empty() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
-        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
-        let mut states: HashMap<usize, Vec<(usize, PointState<D>)>> = HashMap::new();
-        for &contact in self.contacts.iter().filter(|_| with.gap || with.friction) {
-            body.contacts[contact].states(state.time, [&displacement, &velocity], |node, state| {
-                states.entry(node).or_default().push((contact, state));
-            })?;
-        }
         let mut out = Vec::with_capacity(self.points.len() * (4 * D + 4));
         for (at, point) in self.points.iter().enumerate() {
             let node = point.node as usize;
             let along = |field: &[f64]| (0..D).map(|i| field[node * D + i] * point.normal[i]).sum::<f64>();
             let normal_velocity = along(&velocity);
+            // At an edge there is a point for each direction of the facets around it.
+            let first = states.partition_point(|(other, _)| *other < node);
+            let here = states[first..].iter().take_while(|(other, _)| *other == node).map(|(_, state)| state);
+            let along_normal = |state: &&PointState<D>| dot(&state.normal, &point.normal);
+            let here = here
+                .filter(|state| along_normal(state) > SAME_SIDE)
+                .max_by(|a, b| along_normal(a).total_cmp(&along_normal(b)));
             let pressure = match self.contacts.first() {
-                Some(&contact) => match &traction {
-                    Some(traction) if !body.contacts[contact].needs_ghosts() => {
-                        free_component(body, traction, point)
-                    }
-                    _ => body.contacts[contact].law.pressure(normal_velocity, NodeContext::default()),
-                },
+                Some(&contact) if body.contacts[contact].needs_ghosts() => {
+                    body.contacts[contact].law.pressure(normal_velocity, NodeContext::default())
+                }
+                Some(_) => here.map_or(0.0, |state| state.pressure),
                 None => by_stress[at],
             };
             out.extend(body.mesh.nodes[node]);
             let normal_displacement = along(&displacement);
             out.extend([normal_displacement, normal_velocity, pressure]);
-            // At an edge, a contact has a point for each direction of its facets.
-            let along_normal = |(_, state): &(usize, PointState<D>)| dot(&state.normal, &point.normal);
-            let here = states
-                .get(&node)
-                .and_then(|states| states.iter().max_by(|a, b| along_normal(a).total_cmp(&along_normal(b))));
             if with.gap {
                 // Written as an empty entry.
-                out.push(here.map_or(f64::NAN, |(_, state)| state.gap));
+                out.push(here.map_or(f64::NAN, |state| state.gap));
             }
             if with.friction {
-                let rubbing =
-                    here.zip(traction.as_ref()).map_or([[0.0; D]; 2], |((contact, state), traction)| {
-                        [body.contacts[*contact].friction_traction(node, traction), state.sliding]
-                    });
+                let rubbing = here.map_or([[0.0; D]; 2], |state| [state.friction, state.sliding]);
                 out.extend(rubbing.concat());
             }
             out.extend(add_scaled(&point.value(&displacement), -normal_displacement, &point.normal));
@@ -227,17 +228,6 @@ impl<const D: usize> Profile<D> {
         let sums = sums.owned()?;
         Ok(self.points.iter().map(|p| sums[p.node as usize * D] / sums[p.node as usize * D + 1]).collect())
     }
-}
-
-/// The component of a nodal field along the part of the normal of a point that no support fixes.
-fn free_component<const D: usize, const S: usize>(
-    body: &Body<D, S>,
-    nodal: &[f64],
-    point: &SurfacePoint<D>,
-) -> f64 {
-    let free = body.held.free_part(point.node as usize, &point.normal);
-    let size = norm(&free);
-    if size < 1e-9 { 0.0 } else { dot(&free, &point.value(nodal)) / size }
 }
 
 fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {

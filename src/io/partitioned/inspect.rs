@@ -4,6 +4,7 @@ use super::{Header, MESH};
 use crate::{
     error::{Error, Result},
     io::output::seal,
+    mesh::InnerGroup,
 };
 use std::path::Path;
 
@@ -40,6 +41,7 @@ fn words(header: &Header, counts: &[[u64; 4]]) -> String {
     lines.extend(named.map(|(name, facets)| format!("boundary    {name}: {facets} facets")));
     let points = header.point_sets.iter();
     lines.extend(points.map(|set| format!("points      {}: {} nodes", set.name, set.places.len())));
+    lines.extend(header.inner_groups.iter().map(InnerGroup::line));
     lines.push(format!("digest      {}", header.digest));
     lines.push(format!("runs on     1 to {} ranks", header.parts));
     lines.join("\n")

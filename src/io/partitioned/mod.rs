@@ -31,7 +31,7 @@ pub use write::write;
 
 use crate::{
     io::output::seal::{self, Kind},
-    mesh::{Names, PointSet},
+    mesh::{InnerGroup, Names, PointSet},
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -72,6 +72,9 @@ pub struct Header {
     /// Named points and curves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub point_sets: Vec<PointSet>,
+    /// Names of facets inside the body.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inner_groups: Vec<InnerGroup>,
     /// Facets between parts.
     pub edge_cut: usize,
     /// Ratio of the largest number of cells in a part to the mean.
@@ -82,8 +85,8 @@ pub struct Header {
 
 impl Header {
     fn names(&self) -> Names {
-        let Self { regions, boundaries, point_sets, .. } = self.clone();
-        Names { regions, boundaries, point_sets }
+        let Self { regions, boundaries, point_sets, inner_groups, .. } = self.clone();
+        Names { regions, boundaries, point_sets, inner_groups }
     }
 }
 

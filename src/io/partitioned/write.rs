@@ -65,6 +65,7 @@ fn write_sealed<const D: usize>(
         regions: names.regions,
         boundaries: names.boundaries,
         point_sets: names.point_sets,
+        inner_groups: names.inner_groups,
     };
     let file = ParallelFile::create_behind(path, seal::SEAL_BYTES, alone)?;
     let written = write_tables(&file, &header, &pieces);

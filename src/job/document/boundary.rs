@@ -169,8 +169,9 @@ pub struct Initial {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("variables" = "x, y, z", "unit" = "m/s"), example = [0.0, 0.0])]
     pub velocity: Option<Vec<Scalar>>,
-    /// The elastic stress at displacement zero of all materials with elasticity, constant in each cell: the values at its centre.
-    /// Viscoplastic flow relaxes it; with `from` the saved history of these materials takes its place. Absent: none.
+    /// The elastic stress at displacement zero of all materials with elasticity: the values at the centre of each linear cell, and at
+    /// the three quadrature points (in 3D four) of each quadratic one. Viscoplastic flow relaxes it; with `from` the saved history of
+    /// these materials takes its place. Absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<InitialStress>,
 }

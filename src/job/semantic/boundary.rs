@@ -204,6 +204,7 @@ fn holds_all(fix: Option<Fix>, root: &Node) -> bool {
 /// Checks that depend on the dimension and the names of the mesh.
 pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
+    check_inner_names(findings, mesh);
     for table in TABLES {
         for (path, name) in names_in(root, table) {
             check_place(findings, (&path, &name), mesh);
@@ -235,8 +236,39 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     check_vector(findings, "initial.velocity", mesh.dimension);
 }
 
+/// Refuses names of facets inside the body in tables, and notes the others.
+fn check_inner_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+    let root = findings.root;
+    let profiles = items(root, "output.profile").into_iter().map(|profile| format!("{profile}.on"));
+    let profiles = profiles.filter_map(|path| Some((path.clone(), root.read::<String>(&path)?)));
+    let named: Vec<_> = TABLES.iter().flat_map(|table| names_in(root, table)).chain(profiles).collect();
+    for [name, place] in mesh.inner {
+        let used = named.iter().filter(|(_, other)| other == name && !mesh.points.contains(name));
+        let mut is_used = false;
+        for (path, _) in used {
+            is_used = true;
+            let help =
+                "name a boundary, or take the facets with a cell on both sides out of this physical group";
+            findings.fault(
+                path,
+                format!("\"{name}\" has facets inside the body, for example around {place}: no table can act there"),
+                help,
+            );
+        }
+        if !is_used {
+            findings.warnings.push(format!(
+                "the physical group \"{name}\" has facets inside the body, for example around {place}: it is not a boundary, and is ignored"
+            ));
+        }
+    }
+}
+
 /// Boundaries are in all tables; points and curves only in supports that hold nodes.
 fn check_place(findings: &mut Findings<'_>, (path, name): (&str, &str), mesh: MeshNames<'_>) {
+    let is_inner = mesh.inner.iter().any(|[inner, _]| *inner == name);
+    if is_inner && !mesh.points.contains(&name) {
+        return;
+    }
     let table = path.split(".on.").next().unwrap_or_default();
     let holds_nodes = table.starts_with("support") && findings.root.find(&format!("{table}.fix")).is_some();
     if mesh.boundaries.contains(&name) || !mesh.points.contains(&name) {

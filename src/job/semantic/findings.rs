@@ -14,6 +14,8 @@ pub struct MeshNames<'a> {
     pub regions: &'a [&'a str],
     /// Names of points and curves.
     pub points: &'a [&'a str],
+    /// Names of facets inside the body, each with the place of one of them.
+    pub inner: &'a [[&'a str; 2]],
 }
 
 /// Faults and warnings found so far.

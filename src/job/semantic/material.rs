@@ -4,6 +4,7 @@ use super::boundary::check_flat;
 use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
 use crate::laws::expression::Scalar;
+use crate::laws::law::header;
 use crate::laws::material::{Elasticity, Hypothesis, Material, Viscoplasticity, Viscosity};
 
 /// Poisson's ratio above which linear elements lock.
@@ -22,12 +23,18 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         let present = |key: &str| material.child(key).is_some();
         let may_be_empty = path == "material" && root.count("region") > 0;
         if !may_be_empty && !["density", "elasticity", "viscosity"].into_iter().any(present) {
-            let message = format!("[{path}] has no density, no elasticity and no viscosity");
-            findings.fault(&path, message, format!("add density, [{path}.elasticity] or [{path}.viscosity]"));
+            let [whole, elasticity, viscosity] =
+                ["", ".elasticity", ".viscosity"].map(|key| header(&(path.clone() + key)));
+            let message = format!("{whole} has no density, no elasticity and no viscosity");
+            findings.fault(&path, message, format!("add density, {elasticity} or {viscosity}"));
         }
         for (key, message) in Material::REQUIRING_ELASTICITY {
             if present(key) && !present("elasticity") {
-                findings.fault(&format!("{path}.{key}"), message, format!("add [{path}.elasticity]"));
+                findings.fault(
+                    &format!("{path}.{key}"),
+                    message,
+                    format!("add {}", header(&format!("{path}.elasticity"))),
+                );
             }
         }
         for (name, _) in Viscoplasticity::NAMES {

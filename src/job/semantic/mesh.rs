@@ -10,12 +10,14 @@ const RECTANGLE: MeshNames<'static> = MeshNames {
     boundaries: &["left", "right", "bottom", "top"],
     regions: &["body"],
     points: &[],
+    inner: &[],
 };
 const CUBOID: MeshNames<'static> = MeshNames {
     dimension: 3,
     boundaries: &["left", "right", "front", "back", "bottom", "top"],
     regions: &["body"],
     points: &[],
+    inner: &[],
 };
 
 /// The names of a generated mesh; `None` for a file, or if the job does not define exactly one mesh.

@@ -4,6 +4,7 @@ use super::boundary::{check_name, check_repeats};
 use super::findings::{Findings, MeshNames, items};
 use crate::job::report::Fault;
 use crate::job::source::Value;
+use crate::laws::law::header;
 
 /// Checks that do not depend on the mesh.
 pub(super) fn check(findings: &mut Findings<'_>) {
@@ -29,7 +30,11 @@ fn check_indicator(findings: &mut Findings<'_>) {
         std::iter::once("material".to_owned()).chain(items(root, "region").into_iter().map(of_region));
     for material in materials {
         if root.find(&material).is_some() && root.find(&format!("{material}.elasticity")).is_none() {
-            let message = format!("the error indicator needs [{material}.elasticity]");
+            let table = header(&format!("{material}.elasticity"));
+            let region =
+                material.strip_suffix(".material").and_then(|region| root.read(&format!("{region}.name")));
+            let whose = region.map_or(String::new(), |name: String| format!(" of region \"{name}\""));
+            let message = format!("the error indicator needs {table}{whose}");
             let help = "it measures stress errors in the elastic energy norm: add elasticity, or delete error_indicator";
             findings.fault("output.error_indicator", message, help);
         }
@@ -95,7 +100,8 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     }
     for profile in items(root, "output.profile") {
         let path = format!("{profile}.on");
-        if let Some(name) = root.read::<String>(&path) {
+        let Some(name) = root.read::<String>(&path) else { continue };
+        if !mesh.inner.iter().any(|[inner, _]| *inner == name) {
             check_name(findings, &path, &name, mesh.boundaries, "boundary");
         }
     }

@@ -25,7 +25,7 @@
 
 use super::{interface::Interface, laws::NormalLaw};
 use crate::{
-    laws::law::LawFault,
+    laws::law::{LawFault, header},
     linear_algebra::tensor::{Vector, add_scaled, dot, norm},
 };
 use schemars::JsonSchema;
@@ -158,7 +158,7 @@ impl Adhesion {
     /// The faults of the parameters, and of tables that adhesion cannot be combined with. Bonds connect a boundary that touches from the start to an
     /// obstacle at rest. Keys are those of the table of the contact.
     pub fn faults(&self, interface: &Interface) -> Vec<LawFault> {
-        let help = format!("delete it, or [{}.adhesion]", interface.path);
+        let help = format!("delete it, or {}", header(&format!("{}.adhesion", interface.path)));
         let gap = interface.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
             let message = "adhesion requires contact from the start: no gap is allowed";
             LawFault::at_value(gap, message, help.as_str())

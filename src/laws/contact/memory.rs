@@ -13,7 +13,7 @@
 //! history-dependent frictionless contact problem, Math. Mech. Solids 18 (2013), 409-430.)
 
 use super::{interface::Interface, laws::NormalLaw};
-use crate::laws::law::LawFault;
+use crate::laws::law::{LawFault, header};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +37,7 @@ impl Memory {
     pub fn faults(interface: &Interface) -> Vec<LawFault> {
         let mut faults = Vec::new();
         let mut refuse = |key: String, message: &str, other: &str| {
-            let help = format!("delete it, or [{}.memory]{other}", interface.path);
+            let help = format!("delete it, or {}{other}", header(&format!("{}.memory", interface.path)));
             faults.push(LawFault::at_key(key, message, help));
         };
         if let Some(wall) = interface.normal.as_ref().filter(|law| law.is_bound()) {

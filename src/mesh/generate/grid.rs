@@ -29,7 +29,7 @@ pub trait Grid<const D: usize> {
     /// Names of region and boundaries.
     fn names(&self) -> Names {
         let boundaries = self.sides().iter().map(|&side| side.to_owned()).collect();
-        Names { regions: vec!["body".into()], boundaries, point_sets: Vec::new() }
+        Names { regions: vec!["body".into()], boundaries, ..Names::default() }
     }
 
     /// The whole mesh; refused if METIS could not partition it.

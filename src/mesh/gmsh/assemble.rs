@@ -7,8 +7,8 @@ use crate::linear_algebra::tensor::{Vector, add_scaled, norm};
 use crate::mesh::shape::edges_of_cell;
 use crate::mesh::surface::{Topology, sorted};
 use crate::mesh::tags::{Tags, place};
-use crate::mesh::{Boundary, GlobalMesh, check, midpoint, shape};
-use std::collections::BTreeMap;
+use crate::mesh::{Boundary, GlobalMesh, InnerGroup, check, midpoint, shape};
+use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
 /// Marker, in place of an id, of a node without a cell.
@@ -313,7 +313,8 @@ fn reorient<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -> Ve
     reversed
 }
 
-/// Finds the facets of each physical group of dimension `D - 1` on the surface. `id` is a node's id by its tag.
+/// Finds the facets of each physical group of dimension `D - 1`: boundaries on the surface, and groups with facets inside the body. `id`
+/// is a node's id by its tag.
 fn name_boundaries<const D: usize>(
     mesh: &mut GlobalMesh<D>,
     document: &Document,
@@ -323,7 +324,7 @@ fn name_boundaries<const D: usize>(
         mesh.facets.iter().zip(0..).map(|(&facet, position)| (sorted(facet).0, position)).collect();
     surface.sort_unstable();
     // Boundaries are in the order of the numbers of their groups.
-    let mut boundaries: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    let mut groups_of_facets: BTreeMap<u32, Group<D>> = BTreeMap::new();
     for block in blocks(document, D) {
         let groups = document.groups.get(&(D - 1, block.entity)).map_or(&[][..], Vec::as_slice);
         if groups.is_empty() {
@@ -336,7 +337,7 @@ fn name_boundaries<const D: usize>(
                 groups.len()
             )));
         }
-        let mut facets = Vec::with_capacity(block.tags.len());
+        let mut found = Group::default();
         for (element, nodes) in block.elements() {
             let mut facet = [0; D];
             for (node, &tag) in facet.iter_mut().zip(nodes) {
@@ -344,43 +345,81 @@ fn name_boundaries<const D: usize>(
             }
             let facet = sorted(facet).0;
             match surface.binary_search_by_key(&facet, |entry| entry.0) {
-                Ok(at) => facets.push(surface[at].1),
-                Err(_) => return Err(not_outer(mesh, element, &facet, &name(document, D - 1, groups[0]))),
+                Ok(at) => found.outer.push(surface[at].1),
+                Err(_) => found.inner.push((facet, element)),
             }
         }
         for &group in groups {
-            boundaries.entry(group).or_default().extend(&facets);
+            let all = groups_of_facets.entry(group).or_default();
+            all.outer.extend(&found.outer);
+            all.inner.extend(&found.inner);
         }
     }
-    let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
-    for (group, facets) in boundaries {
+    let mut by_name: Vec<(String, Group<D>)> = Vec::new();
+    for (group, found) in groups_of_facets {
         let name = name(document, D - 1, group);
-        let number = *numbers.entry(name.clone()).or_insert(mesh.boundaries.len());
-        match mesh.boundaries.get_mut(number) {
-            Some(boundary) => boundary.facets.extend(facets),
-            None => mesh.boundaries.push(Boundary { name, facets }),
+        match by_name.iter_mut().find(|(other, _)| *other == name) {
+            Some((_, all)) => {
+                all.outer.extend(found.outer);
+                all.inner.extend(found.inner);
+            }
+            None => by_name.push((name, found)),
         }
     }
-    for boundary in &mut mesh.boundaries {
-        boundary.facets.sort_unstable();
-        boundary.facets.dedup();
+    refuse_facets_of_no_cell(mesh, &by_name)?;
+    for (name, Group { outer: mut facets, mut inner }) in by_name {
+        inner.sort_unstable();
+        inner.dedup_by_key(|(facet, _)| *facet);
+        if let Some((facet, _)) = inner.iter().min_by_key(|(_, element)| element) {
+            let corners: Vec<Vector<D>> = facet.iter().map(|&node| mesh.nodes[node as usize]).collect();
+            let at = place(&shape::centroid(&corners));
+            mesh.inner_groups.push(InnerGroup { name, facets: inner.len(), place: at });
+            continue;
+        }
+        facets.sort_unstable();
+        facets.dedup();
+        mesh.boundaries.push(Boundary { name, facets });
     }
     Ok(())
 }
 
-fn not_outer<const D: usize>(mesh: &GlobalMesh<D>, element: u64, facet: &[u32; D], name: &str) -> Error {
-    let kind = if D == 2 { "line" } else { "triangle" };
-    let inside = mesh.cells.chunks_exact(D + 1).any(|cell| facet.iter().all(|node| cell.contains(node)));
-    if !inside {
-        return Error::Refused(format!(
-            "element {element}, a {kind} of the boundary `{name}`, is not a facet of any cell: mesh the body and its \
-             boundary together"
-        ));
+/// The facets of a physical group.
+struct Group<const D: usize> {
+    /// Positions of those on the surface.
+    outer: Vec<u32>,
+    /// The sorted nodes of the others, with their elements.
+    inner: Vec<([u32; D], u64)>,
+}
+
+impl<const D: usize> Default for Group<D> {
+    fn default() -> Self {
+        Self { outer: Vec::new(), inner: Vec::new() }
     }
-    let corners: Vec<Vector<D>> = facet.iter().map(|&node| mesh.nodes[node as usize]).collect();
-    Error::Refused(format!(
-        "element {element}, a {kind} of the boundary `{name}`, lies inside the body around {}: a boundary is made of \
-         facets with a cell on one side only. Take it out of the physical group",
-        place(&shape::centroid(&corners))
-    ))
+}
+
+/// Refuses facets that are not on the surface, unless they are facets of cells.
+fn refuse_facets_of_no_cell<const D: usize>(
+    mesh: &GlobalMesh<D>,
+    groups: &[(String, Group<D>)],
+) -> Result<()> {
+    let all = || groups.iter().flat_map(|(name, group)| group.inner.iter().map(move |inner| (name, inner)));
+    let mut left: HashSet<[u32; D]> = all().map(|(_, (facet, _))| *facet).collect();
+    if left.is_empty() {
+        return Ok(());
+    }
+    for cell in mesh.cells.chunks_exact(D + 1) {
+        for without in 0..=D {
+            left.remove(&sorted(std::array::from_fn(|i| cell[if i < without { i } else { i + 1 }])).0);
+        }
+    }
+    match all().find(|(_, (facet, _))| left.contains(facet)) {
+        None => Ok(()),
+        Some((name, (_, element))) => {
+            let kind = if D == 2 { "line" } else { "triangle" };
+            Err(Error::Refused(format!(
+                "element {element}, a {kind} of the boundary `{name}`, is not a facet of any cell: mesh the body and its \
+                 boundary together"
+            )))
+        }
+    }
 }

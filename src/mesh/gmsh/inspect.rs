@@ -1,7 +1,12 @@
 //! Description of a mesh file.
 
 use super::{AnyMesh, read};
-use crate::{error::Result, linear_algebra::tensor::norm, mesh::GlobalMesh, mesh::shape::facet_normal};
+use crate::{
+    error::Result,
+    linear_algebra::tensor::norm,
+    mesh::shape::facet_normal,
+    mesh::{GlobalMesh, InnerGroup},
+};
 use std::path::Path;
 
 /// Describes a mesh: cells by region, nodes, extent and boundaries. An invalid mesh is refused with the reason.
@@ -42,6 +47,7 @@ fn words<const D: usize>(mesh: &GlobalMesh<D>) -> String {
         let (count, plural) = (set.places.len(), if set.places.len() == 1 { "" } else { "s" });
         lines.push(format!("points      {}: {count} node{plural}", set.name));
     }
+    lines.extend(mesh.inner_groups.iter().map(InnerGroup::line));
     lines.push(format!("surface     {} facets", mesh.facets.len()));
     lines.join("\n")
 }

@@ -5,7 +5,6 @@ use crate::{
     fem::{
         body::Body,
         effect::{CONTACT, Energy, NUMERICAL, Step, WORK},
-        space::{acts_at_midsides, add_corner_means},
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
@@ -103,15 +102,6 @@ pub(super) fn commit_tractions<const D: usize, const S: usize>(
     traction.owned_mut()?.fill(0.0);
     for contact in &body.contacts {
         contact.add_tractions(&velocity, &mut traction.owned_mut()?);
-    }
-    if !acts_at_midsides(&body.mesh) {
-        return Ok(());
-    }
-    let mut of_contact = traction.like()?;
-    for contact in body.contacts.iter().filter(|contact| !contact.needs_ghosts()) {
-        of_contact.owned_mut()?.fill(0.0);
-        contact.add_tractions(&velocity, &mut of_contact.owned_mut()?);
-        add_corner_means(&body.mesh, contact.facets(), &mut of_contact, D, &mut traction.owned_mut()?)?;
     }
     Ok(())
 }

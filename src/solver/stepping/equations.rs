@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    fem::effect::Contact,
+    fem::effect::{Contact, set_walls},
     linear_algebra::petsc::{
         DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator, ProjectedOutcome,
     },
@@ -243,6 +243,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         {
             let (x, mut velocity) = (x.owned()?, velocity.owned_mut()?);
             self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x, &mut velocity));
+            set_walls(self.contacts);
         }
         if let Some(cells) = &mut self.cells {
             cells.linearise(velocity)?;

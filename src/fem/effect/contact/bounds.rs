@@ -41,7 +41,7 @@ impl<const D: usize> Contact<D> {
         let law = &self.law;
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let bound = law.velocity_bound(point.context).unwrap_or(f64::INFINITY) / point.free_length;
-            let reaction = -point.along(Newton, residual) / (point.weight * point.free_length);
+            let reaction = -point.share(Newton, residual) / (point.weight * point.free_length);
             point.pressure = if point.along(Newton, velocity) >= bound { reaction.max(0.0) } else { 0.0 };
         }
     }

@@ -75,11 +75,6 @@ impl<const D: usize> Friction<D> {
                     "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, on which this friction law depends; free the normal component there, or use tresca"
                 )));
             }
-            if !is_held && point.free_length < 1.0 - ROUNDING {
-                return Err(Error::Refused(format!(
-                    "friction at {place:?} m: a support fixes a component that is neither along the normal of the contact nor perpendicular to it, so that no free direction is tangential; fix all components there, or none"
-                )));
-            }
             let (tangents, count) = span_without(&frame[..free], &[point.direction]);
             if obstacle_moves && count > 0 {
                 held_tangents.extend(tangents_held(point, &frame[free..]).map(|tangent| (at, tangent)));
@@ -275,7 +270,7 @@ impl<const D: usize> Friction<D> {
     pub(super) fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
         for point in self.points.iter().filter(|p| !p.tangent.sticks) {
             let normal = &points[point.at];
-            let pressed = normal.slope * normal.along(Newton, direction);
+            let pressed = normal.slope * normal.free_length * normal.along(Newton, direction);
             point.add(Newton, point.weight, &point.sliding_change(direction, pressed), forces);
         }
     }
@@ -286,7 +281,7 @@ impl<const D: usize> Friction<D> {
         for point in self.points.iter().filter(|p| p.tangent.coefficient > 0.0) {
             let normal = &points[point.at];
             if normal.theta == 0.0 {
-                let open = normal.along(Newton, values);
+                let open = normal.share(Newton, values) / normal.free_length;
                 point.add(Newton, -point.tangent.coefficient * open, &point.tangent.toward, values);
             }
         }
@@ -316,7 +311,8 @@ impl<const D: usize> Friction<D> {
                 point.set(&open.map(|force| force / (self.scale * point.weight)), values);
             } else {
                 let normal = &points[point.at];
-                let pressed = normal_scale * (1.0 - normal.theta) * normal.along(Newton, values);
+                let pressed =
+                    normal_scale * normal.free_length * (1.0 - normal.theta) * normal.along(Newton, values);
                 point.add(Newton, 1.0 / self.scale, &point.sliding_change(values, pressed), values);
             }
         }
@@ -348,13 +344,6 @@ impl<const D: usize> Friction<D> {
             let found = point.law.resolve(norm(&parameter), self.scale, point.pressure);
             (if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }, point.weight)
         })
-    }
-
-    /// The part of a nodal value along the tangents at a node; zero at nodes without friction.
-    pub(super) fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
-        // Points are ordered by node, at most one for each node.
-        let found = self.points.binary_search_by_key(&node, TangentialPoint::node);
-        found.map_or([0.0; D], |at| self.points[at].along(Body, nodal))
     }
 
     /// Power in W dissipated by friction at these velocities.

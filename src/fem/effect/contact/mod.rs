@@ -17,8 +17,11 @@
 //! Vectors contain `D` values for each node of the body on this rank; those of Newton's method, in `newton.rs`, may contain the
 //! nodes of contacts only.
 //!
-//! At points where this is impossible (Gauss quadrature; normals at a node that are not orthogonal) the velocity remains the
-//! unknown; their law must not have vertical parts.
+//! If points meet at a node whose directions are not orthogonal, but independent, `v = x + sum (V(s) / f - x . m) d` with the dual basis
+//! `d` of these directions `m`: each point changes its own component of the velocity only.
+//!
+//! At Gauss points, and at edges where smooth laws without friction act, the velocity remains the unknown; these laws must not have
+//! vertical parts.
 
 mod bounds;
 mod closeness;
@@ -66,7 +69,7 @@ pub use loaded_obstacle::{
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use sliding::Decrease;
-pub use unknowns::choose_unknowns;
+pub use unknowns::{choose_unknowns, set_walls};
 
 /// The law along the normal of a contact boundary, and its points.
 #[derive(Debug)]
@@ -105,6 +108,9 @@ pub struct Contact<const D: usize> {
     facets: Vec<u32>,
     points: Vec<Point<D>>,
     friction: Option<Friction<D>>,
+    /// Nodes at which points meet whose normals are not orthogonal, as lists of contacts and their points; each node is in the list of
+    /// one of these contacts.
+    edges: Vec<Vec<(usize, usize)>>,
     needs_ghosts: bool,
     derivatives: Derivatives,
     /// The share of the slopes of decreasing branches in the derivatives.
@@ -137,7 +143,7 @@ impl<const D: usize> Contact<D> {
             Quadrature::Nodal => surface_points(session, mesh, facets)?
                 .into_iter()
                 .filter(|p| p.weight > 0.0)
-                .map(|p| Point::nodal(p.node, p.normal, p.weight, held))
+                .map(|p| Point::nodal(held.whole(p), held))
                 .collect(),
             Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, held)).collect(),
         };
@@ -167,6 +173,7 @@ impl<const D: usize> Contact<D> {
             facets: facets.to_vec(),
             points,
             friction: None,
+            edges: Vec::new(),
             needs_ghosts,
             derivatives: Derivatives::Unknown,
             softening: 1.0,
@@ -264,7 +271,7 @@ impl<const D: usize> Contact<D> {
     /// along the free normal, and `-sigma_tau`.
     pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
-            point.add_along(Body, point.pressure_at(&self.law, Body, velocity), nodal);
+            point.add_traction(point.pressure_at(&self.law, Body, velocity), nodal);
         }
         if let Some(friction) = &self.friction {
             friction.add_tractions(nodal);

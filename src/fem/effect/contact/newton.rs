@@ -198,9 +198,7 @@ impl<const D: usize> Contact<D> {
     /// Removes from nodal values the motions of points on vertical parts of the graph.
     pub fn project(&self, values: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
-        for point in self.points.iter().filter(|p| p.theta == 0.0) {
-            point.add_along(Newton, -point.along(Newton, values), values);
-        }
+        self.points.iter().filter(|p| p.theta == 0.0).for_each(|point| point.hold(Newton, values));
         if let Some(friction) = &self.friction {
             friction.project(values);
         }
@@ -212,7 +210,7 @@ impl<const D: usize> Contact<D> {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let change = if point.theta == 0.0 {
-                point.along(Newton, open)
+                point.share(Newton, open)
                     / (self.scale * point.weight * point.free_length * point.free_length)
             } else {
                 (1.0 / point.theta - 1.0) * point.along(Newton, values)

@@ -3,7 +3,7 @@
 //! A point reads the values of its nodes from two kinds of vectors, [`Vectors`]. It stores the numbers of its nodes in both.
 
 use crate::{
-    fem::space::{Held, facet_points},
+    fem::space::{Held, SurfacePoint, facet_points},
     laws::contact::{NodeContext, NormalResponse, Resolved},
     linear_algebra::tensor::{Vector, norm},
     mesh::Mesh,
@@ -55,6 +55,11 @@ pub(super) struct Point<const D: usize> {
     others: Box<[OtherNode<D>]>,
     /// At nodal points: the normal without prescribed components, scaled to length 1.
     pub direction: Vector<D>,
+    /// The change of a velocity that changes its component along `direction` by 1 and those along the directions of other points at the
+    /// node not at all. Forces along the directions of all of them have this component: only that of this point.
+    pub dual: Vector<D>,
+    /// On a vertical part of the graph: the motion that is held here beside those that other points at the node hold, a unit vector.
+    pub wall: Vector<D>,
     /// Length of the normal without prescribed components before scaling.
     pub free_length: f64,
     pub unknown: Unknown,
@@ -97,6 +102,8 @@ impl<const D: usize> Point<D> {
             force: [[0.0; D]; D],
             others: Box::default(),
             direction: [0.0; D],
+            dual: [0.0; D],
+            wall: [0.0; D],
             free_length: 0.0,
             unknown: Unknown::Velocity,
             place: [0.0; D],
@@ -132,13 +139,14 @@ impl<const D: usize> Point<D> {
     }
 
     /// A point at a node, whose unknown is the parameter of the law.
-    pub(super) fn nodal(node: u32, normal: Vector<D>, weight: f64, held: &Held<D>) -> Self {
+    pub(super) fn nodal(SurfacePoint { node, normal, weight }: SurfacePoint<D>, held: &Held<D>) -> Self {
         let mut point = Self::new(&[node], &[1.0], normal, weight, held);
         let free = held.free_part(node as usize, &normal);
         point.free_length = norm(&free);
         // A smaller length is a rounding error in the normal of a face that supports fix.
         if point.free_length > 1e-9 {
             point.direction = free.map(|x| x / point.free_length);
+            (point.dual, point.wall) = (point.direction, point.direction);
             point.unknown = Unknown::Parameter;
         } else {
             point.force = [[0.0; D]; D];
@@ -207,23 +215,60 @@ impl<const D: usize> Point<D> {
         norm::<D>(&std::array::from_fn(mean))
     }
 
-    /// The component of a nodal value along the free part of the normal.
+    /// The component of a nodal velocity along the free part of the normal.
     #[inline]
     pub(super) fn along(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+        self.component(&self.direction, vectors, nodal)
+    }
+
+    /// The component of a nodal force or traction that acts here, where several points at a node have a share of it.
+    #[inline]
+    pub(super) fn share(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+        self.component(&self.dual, vectors, nodal)
+    }
+
+    #[inline]
+    fn component(&self, direction: &Vector<D>, vectors: Vectors, nodal: &[f64]) -> f64 {
         let value = &nodal[self.first(vectors) * D..][..D];
         let mut sum = 0.0;
         for i in 0..D {
-            sum += self.direction[i] * value[i];
+            sum += direction[i] * value[i];
         }
         sum
     }
 
-    /// Adds to a nodal value along the free part of the normal.
+    /// Adds to the component of a nodal velocity along the free part of the normal.
     #[inline]
     pub(super) fn add_along(&self, vectors: Vectors, amount: f64, nodal: &mut [f64]) {
         let target = &mut nodal[self.first(vectors) * D..][..D];
         for i in 0..D {
+            target[i] += amount * self.dual[i];
+        }
+    }
+
+    /// The pressure in Pa in nodal tractions of the body.
+    pub(super) fn pressure_in(&self, traction: &[f64]) -> f64 {
+        let share = self.share(Vectors::Body, traction);
+        let whole: Vector<D> = std::array::from_fn(|i| traction[self.node() * D + i]);
+        // Less is rounding of the pressures of other points at the node and of friction.
+        let rounding = 4.0 * f64::EPSILON * norm(&whole) * norm(&self.dual);
+        if share.abs() <= rounding { 0.0 } else { share }
+    }
+
+    /// Adds to a nodal traction along the free part of the normal.
+    pub(super) fn add_traction(&self, amount: f64, nodal: &mut [f64]) {
+        let target = &mut nodal[self.node() * D..][..D];
+        for i in 0..D {
             target[i] += amount * self.direction[i];
+        }
+    }
+
+    /// Removes the motion along its wall from a nodal value.
+    pub(super) fn hold(&self, vectors: Vectors, nodal: &mut [f64]) {
+        let along = self.component(&self.wall, vectors, nodal);
+        let target = &mut nodal[self.first(vectors) * D..][..D];
+        for i in 0..D {
+            target[i] -= along * self.wall[i];
         }
     }
 
@@ -283,6 +328,15 @@ impl<const D: usize> Point<D> {
 
     /// The unbalanced normal force per area at this point, from a residual, a vector of Newton's method.
     pub(super) fn open_pressure(&self, residual: &[f64]) -> f64 {
+        if self.unknown == Unknown::Parameter {
+            let at = self.first(Vectors::Newton) * D;
+            let is_there = residual.get(at..at + D).is_some();
+            return if is_there {
+                self.share(Vectors::Newton, residual) / (self.weight * self.free_length)
+            } else {
+                0.0
+            };
+        }
         let mut largest = 0.0f64;
         let first = self.numbers[Vectors::Newton as usize][..self.count].iter().zip(&self.force);
         let others = self.others.iter().map(|other| (&other.numbers[Vectors::Newton as usize], &other.force));

@@ -103,7 +103,7 @@ impl<const D: usize> Contact<D> {
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
     pub fn restore_pressures(&mut self, traction: &[f64]) {
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
-            point.pressure = point.along(Body, traction);
+            point.pressure = point.pressure_in(traction);
             point.pressure_before = point.pressure;
         }
         if let Some(friction) = &mut self.friction {
@@ -147,7 +147,7 @@ impl<const D: usize> Contact<D> {
             let along = dot(tangent, &velocity);
             if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
                 return Err(Error::Refused(format!(
-                    "friction at {:?} m: a support fixes a direction in which the obstacle moves (at {along} m/s at t = {} s) but not the other tangential direction, so that the friction is not determined; fix all components there, or none",
+                    "friction at {:?} m: a support fixes a direction in which the obstacle moves (at {along} m/s at t = {} s) but not the other tangential direction, on which the friction depends, too; hold all components there, or exclude the facets around by the `where` of the contact",
                     point.place, rate.time
                 )));
             }

@@ -33,6 +33,8 @@ pub struct ContactAreas {
 pub struct PointState<const D: usize> {
     /// Outward unit normal of the boundary.
     pub normal: Vector<D>,
+    /// The direction of the pressure in the traction: the normal without what supports hold, scaled to length 1; 0 if nothing is left.
+    pub direction: Vector<D>,
     /// Contact pressure in Pa.
     pub pressure: f64,
     /// Distance to the obstacle in m; 0 if the law has no gap.
@@ -43,11 +45,14 @@ pub struct PointState<const D: usize> {
     pub sticks: Option<bool>,
     /// Velocity relative to the obstacle along the boundary in m/s, with friction.
     pub sliding: Vector<D>,
+    /// Friction traction `-sigma_tau` in Pa.
+    pub friction: Vector<D>,
 }
 
 impl<const D: usize> Default for PointState<D> {
     fn default() -> Self {
-        Self { normal: [0.0; D], pressure: 0.0, gap: 0.0, branch: 0, sticks: None, sliding: [0.0; D] }
+        let [normal, direction, sliding, friction] = [[0.0; D]; 4];
+        Self { normal, direction, pressure: 0.0, gap: 0.0, branch: 0, sticks: None, sliding, friction }
     }
 }
 
@@ -75,11 +80,12 @@ impl<const D: usize> Contact<D> {
         areas
     }
 
-    /// Visits the states of nodal points on this rank in the step just solved, at its time, displacements and velocities with ghosts.
+    /// Visits the states of nodal points on this rank in the step just solved, at its time, displacements and velocities with ghosts and
+    /// its nodal tractions.
     pub fn states(
         &self,
         time: f64,
-        [displacement, velocity]: [&[f64]; 2],
+        [displacement, velocity, traction]: [&[f64]; 3],
         mut visit: impl FnMut(usize, PointState<D>),
     ) -> Result<()> {
         if self.needs_ghosts {
@@ -90,13 +96,18 @@ impl<const D: usize> Contact<D> {
             friction.into_iter().flat_map(|friction| friction.sliding(Body, velocity)).peekable();
         let mut motions = friction.into_iter().flat_map(|friction| friction.motions(Body, velocity));
         for (at, point) in self.points.iter().enumerate() {
-            let mut state = PointState { normal: point.normal, ..PointState::default() };
-            while let Some((_, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
+            let mut state =
+                PointState { normal: point.normal, direction: point.direction, ..PointState::default() };
+            while let Some((tangential, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
                 state.sliding = sliding;
+                state.friction = tangential.along(Body, traction);
                 state.sticks = motions.next().map(|(motion, _)| motion == Motion::Sticks);
             }
             if point.unknown != Unknown::Held {
-                state.pressure = point.pressure_at(&self.law, Body, velocity);
+                state.pressure = match point.unknown {
+                    Unknown::Parameter => point.pressure_in(traction),
+                    _ => point.pressure_at(&self.law, Body, velocity),
+                };
                 let along = point.normal_component(Body, velocity);
                 let parameter = self.scale * along + state.pressure;
                 state.branch = match point.unknown {

@@ -15,7 +15,7 @@ use crate::{
         space::Held,
     },
     laws::contact::{FrictionLaw, NodeContext, Wear},
-    linear_algebra::tensor::{Vector, larger, norm},
+    linear_algebra::tensor::{larger, norm},
     mesh::Mesh,
 };
 
@@ -240,11 +240,6 @@ impl<const D: usize> Contact<D> {
         self.points
             .iter()
             .fold(0.0, |most, point| larger(most, point.pressure_at(&self.law, Vectors::Body, velocity)))
-    }
-
-    /// The friction traction `-sigma_tau` in Pa at an owned node, from the nodal tractions of the state.
-    pub fn friction_traction(&self, node: usize, traction: &[f64]) -> Vector<D> {
-        self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))
     }
 }
 

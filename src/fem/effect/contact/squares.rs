@@ -18,7 +18,7 @@ impl<const D: usize> Contact<D> {
     /// Adds the normals at the points to nodal values.
     pub fn add_normals(&self, nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
-            point.add_along(Body, point.free_length, nodal);
+            point.add_traction(point.free_length, nodal);
         }
     }
 

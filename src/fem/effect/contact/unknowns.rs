@@ -3,18 +3,21 @@
 use super::{Contact, point::Unknown};
 use crate::{
     error::{Error, Result},
-    linear_algebra::tensor::dot,
+    linear_algebra::tensor::{Vector, dot, dual_basis, outside},
     mesh::Mesh,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Cosine below which directions at a node count as orthogonal.
 const ORTHOGONAL: f64 = 1e-9;
+/// Sine below which the angle between a direction at a node and the span of the others is too small.
+const INDEPENDENT: f64 = 0.02;
 /// Cosine of 40 degrees, the angle by which facets of a smooth boundary turn at most.
 const SMOOTH: f64 = 0.766;
 
-/// Gives each node of a smooth boundary to one contact, and each edge to the friction of one boundary. Selects the velocity as the unknown
-/// at points where directions at a node are not orthogonal; refuses laws with vertical parts there and at Gauss points.
+/// Gives each node of a smooth boundary to one contact, and each edge to the friction of one boundary. Where directions at a node
+/// are not orthogonal, selects their dual basis or, for smooth laws without friction, the velocity as the unknown. Refuses laws with
+/// vertical parts at Gauss points.
 pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
     give_nodes_to_one_contact(contacts);
     let mut around: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
@@ -43,21 +46,43 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
             continue;
         }
         let is_sharp = places.iter().any(|&(number, _)| contacts[number].law.has_vertical_parts());
-        let acting = match (with_friction.contains(&node), is_sharp) {
-            (true, _) => "friction acts",
-            (_, true) => "a law with jumps or constraints acts",
-            _ => "",
-        };
-        if !acting.is_empty() {
-            let place = mesh.nodes[node];
-            return Err(Error::Refused(format!(
-                "contact at {place:?} m: boundaries meet at an angle other than 90 degrees, and {acting} there; round the edge with \
-                 facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact"
-            )));
+        if is_sharp || with_friction.contains(&node) {
+            let directions: Vec<Vector<D>> = places.iter().map(direction).collect();
+            let Some(dual) = dual_basis(&directions, INDEPENDENT) else {
+                let place = mesh.nodes[node];
+                return Err(Error::Refused(format!(
+                    "contact at {place:?} m: friction or a law with jumps or constraints acts on boundaries whose normals there depend on \
+                     each other, so that their pressures are not determined; leave one of the boundaries out of contact, or exclude \
+                     the facets around by `where`"
+                )));
+            };
+            places.iter().zip(dual).for_each(|(&(number, at), dual)| contacts[number].points[at].dual = dual);
+            contacts[places[0].0].edges.push(places);
+            continue;
         }
         places.into_iter().for_each(|(number, at)| contacts[number].points[at].unknown = Unknown::Velocity);
     }
     Ok(())
+}
+
+/// Sets the motions that points on vertical parts of their graphs hold at edges, where the normals are not orthogonal: a basis of the
+/// span of the normals of these points.
+pub fn set_walls<const D: usize>(contacts: &mut [Contact<D>]) {
+    for owner in 0..contacts.len() {
+        for edge in 0..contacts[owner].edges.len() {
+            let (mut known, mut count) = ([[0.0; D]; D], 0);
+            for place in 0..contacts[owner].edges[edge].len() {
+                let (number, at) = contacts[owner].edges[edge][place];
+                let point = &mut contacts[number].points[at];
+                if point.theta == 0.0
+                    && let Some(wall) = outside(&point.direction, &known[..count], INDEPENDENT)
+                {
+                    (point.wall, known[count]) = (wall, wall);
+                    count += 1;
+                }
+            }
+        }
+    }
 }
 
 /// Friction at an edge acts along the direction that is tangential to every contact boundary there.
@@ -80,14 +105,16 @@ fn keep_tangents_free_of_normals<const D: usize>(
 }
 
 /// Leaves each edge to the friction of the boundary that has the larger part of a node there, because along one direction only one friction
-/// can act. Returns the nodes with friction.
+/// can act; of equal parts their normals decide, so that the order of the tables does not matter. Returns the nodes with friction.
 fn give_edges_to_one_friction<const D: usize>(contacts: &mut [Contact<D>]) -> BTreeSet<usize> {
-    let mut strongest: BTreeMap<usize, ((usize, usize), f64)> = BTreeMap::new();
+    let mut strongest: BTreeMap<usize, ((usize, usize), f64, Vector<D>)> = BTreeMap::new();
     for (number, contact) in contacts.iter().enumerate() {
         for point in contact.friction.iter().flat_map(|friction| &friction.points) {
-            let this = ((number, point.at), point.weight);
+            let this = ((number, point.at), point.weight, contact.points[point.at].normal);
             let best = strongest.entry(point.node()).or_insert(this);
-            if is_larger(point.weight, best.1) {
+            let comes_first = is_larger(point.weight, best.1)
+                || (!is_larger(best.1, point.weight) && is_before(&this.2, &best.2));
+            if comes_first {
                 *best = this;
             }
         }
@@ -135,4 +162,9 @@ fn give_nodes_to_one_contact<const D: usize>(contacts: &mut [Contact<D>]) {
 /// Whether a weight is larger by more than rounding, which differs between partitions of the mesh.
 fn is_larger(weight: f64, other: f64) -> bool {
     weight > other * (1.0 + 1e-9)
+}
+
+/// Whether the first component in which two normals differ by more than rounding is smaller in the first one.
+fn is_before<const D: usize>(normal: &Vector<D>, other: &Vector<D>) -> bool {
+    normal.iter().zip(other).find(|(a, b)| (*a - *b).abs() > ORTHOGONAL).is_some_and(|(a, b)| a < b)
 }

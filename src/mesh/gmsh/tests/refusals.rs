@@ -2,6 +2,7 @@
 
 use super::samples::{SQUARE, Sample, TENT};
 use super::*;
+use crate::mesh::InnerGroup;
 
 /// The refusal of a file must contain all these texts.
 #[track_caller]
@@ -156,15 +157,32 @@ fn two_groups_of_one_name_are_one_region() {
 }
 
 #[test]
-fn a_boundary_inside_the_body_or_off_it_is_refused() {
-    let inside = SQUARE.text().replace("1 1 4\n", "1 1 3\n");
-    refused(&inside, &["element 1", "boundary `left`", "inside the body around (0.5, 0.5)"]);
+fn a_boundary_off_the_body_is_refused() {
     refused(&SQUARE.text().replace("1 1 4\n", "1 2 4\n"), &["element 1", "not a facet of any cell"]);
     refused(&SQUARE.text().replace("1 1 4\n", "1 1 9\n"), &["not a facet of any cell"]);
-    refused(
-        &TENT.text().replace("1 1 2 3\n", "1 2 3 4\n"),
-        &["triangle of the boundary `floor`", "inside the body"],
-    );
+    // The diagonal is inside, the other diagonal no facet at all.
+    let both = SQUARE.text().replace("1 1 4\n", "1 1 3\n").replace("2 1 2\n", "2 2 4\n");
+    refused(&both, &["element 2", "not a facet of any cell"]);
+}
+
+#[test]
+fn a_group_with_facets_inside_the_body_is_no_boundary() {
+    let inside = SQUARE.text().replace("1 1 4\n", "1 1 3\n");
+    let AnyMesh::Two(mesh) = parse(inside.as_bytes()).unwrap() else { panic!("a mesh of the plane") };
+    assert_eq!(mesh.boundaries.iter().map(|b| &*b.name).collect::<Vec<_>>(), ["7"]);
+    let group = |name: &str, place: &str| InnerGroup { name: name.into(), facets: 1, place: place.into() };
+    assert_eq!(mesh.inner_groups, [group("left", "(0.5, 0.5)")]);
+    // Two names for one line, and a group with a facet inside and one on the surface.
+    let entities = SQUARE.entities.replace("1 3 0\n2", "2 3 8 0\n2").replace("1 7 2 1 -2", "1 3 2 1 -2");
+    let text = SQUARE.text().replace(SQUARE.entities, &entities).replace("1 1 4\n", "1 1 3\n");
+    let AnyMesh::Two(mesh) = parse(text.as_bytes()).unwrap() else { panic!("a mesh of the plane") };
+    assert!(mesh.boundaries.is_empty(), "{:?}", mesh.boundaries);
+    assert_eq!(mesh.inner_groups, [group("left", "(0.5, 0.5)"), group("8", "(0.5, 0.5)")]);
+    let AnyMesh::Three(mesh) = parse(TENT.text().replace("1 1 2 3\n", "1 2 3 4\n").as_bytes()).unwrap()
+    else {
+        panic!("a mesh in space")
+    };
+    assert_eq!(mesh.inner_groups, [group("floor", "(0.333333, 0.333333, 0.333333)")]);
 }
 
 #[test]

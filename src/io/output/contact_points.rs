@@ -1,0 +1,113 @@
+//! States of contact points for fields and profiles.
+
+use super::output_field::Converged;
+use crate::{
+    error::Result,
+    fem::{
+        effect::{Contact, PointState},
+        space::corner_means,
+    },
+    linear_algebra::tensor::{Vector, dot, larger},
+};
+use std::cmp::Ordering;
+
+/// Values of a state that corners have as means, vectors as in space.
+const VALUES: usize = 14;
+/// Pressures and normals that differ by a smaller share are the same: the rest is rounding, which depends on the partition.
+const SAME: f64 = 1e-9;
+
+/// The states of the nodal points of all contacts at the nodes of this rank, those of a node together, in the order of
+/// their normals: neither the order of the tables of the job nor the partition matters. Corners of quadratic facets in space, where no law acts,
+/// have the means of the points at the midpoints of edges around, a mean for each face of the body. Collective.
+pub(super) fn contact_points<const D: usize, const S: usize>(
+    at: Converged<'_, D, S>,
+) -> Result<Vec<(usize, PointState<D>)>> {
+    let Some(traction) = &at.state.contact_traction else { return Ok(Vec::new()) };
+    let contacts = || at.body.contacts.iter().filter(|contact| !contact.needs_ghosts());
+    let mut points: Vec<(usize, PointState<D>)> = Vec::new();
+    let mut visit_all = || {
+        let (displacement, velocity) = (at.state.displacement.local()?, at.state.velocity.local()?);
+        let nodal = [&*displacement, &*velocity, &*traction.owned()?];
+        contacts().try_for_each(|contact| {
+            contact.states(at.state.time, nodal, |node, state| points.push((node, state)))
+        })
+    };
+    let visited = visit_all();
+    at.session.agree(visited)?;
+    points.sort_by(in_order);
+    let facets: Vec<u32> = contacts().flat_map(|contact| contact.facets()).copied().collect();
+    let of_midside = |node: u32, normal: &Vector<D>| {
+        let first = points.partition_point(|(other, _)| *other < node as usize);
+        let here = points[first..].iter().take_while(|(other, _)| *other == node as usize);
+        let along = |point: &&(usize, PointState<D>)| dot(&point.1.normal, normal);
+        here.max_by(|a, b| along(a).total_cmp(&along(b))).map(|(_, state)| values_of(state))
+    };
+    let corners = corner_means(at.session, &at.body.mesh, &facets, of_midside)?;
+    points.extend(corners.into_iter().map(|(point, values)| {
+        let normal = at.body.held.whole(point).normal;
+        (point.node as usize, PointState { normal, ..state_of(&values) })
+    }));
+    points.sort_by(in_order);
+    Ok(points)
+}
+
+/// The state that counts of those at a node: the one with the largest pressure, or the first.
+pub(super) fn largest<const D: usize>(of_node: &[(usize, PointState<D>)]) -> &PointState<D> {
+    let larger = |best: &PointState<D>, other: &PointState<D>| {
+        other.pressure.abs() > best.pressure.abs() * (1.0 + SAME)
+    };
+    let states = of_node.iter().map(|(_, state)| state);
+    states.fold(&of_node[0].1, |best, other| if larger(best, other) { other } else { best })
+}
+
+/// Fills a history of contact points, given at the owned nodes, at corners of quadratic facets in space, where no law acts: with the
+/// largest of the means of the faces there. Collective.
+pub(super) fn fill_corners<const D: usize, const S: usize>(
+    at: Converged<'_, D, S>,
+    name: &str,
+    values: &mut [f64],
+) -> Result<()> {
+    let keeps = |contact: &&Contact<D>| contact.history_names(false).any(|other| other == name);
+    let facets: Vec<u32> =
+        at.body.contacts.iter().filter(keeps).flat_map(|contact| contact.facets()).copied().collect();
+    let of_midside = |node: u32, _: &Vector<D>| Some([values[node as usize]]);
+    for (point, [mean]) in corner_means(at.session, &at.body.mesh, &facets, of_midside)? {
+        let value = &mut values[point.node as usize];
+        *value = larger(*value, mean);
+    }
+    Ok(())
+}
+
+fn in_order<const D: usize>(a: &(usize, PointState<D>), b: &(usize, PointState<D>)) -> Ordering {
+    let rounded = |x: &f64| (x / SAME).round();
+    let pairs = a.1.normal.iter().zip(&b.1.normal);
+    let by_normal = pairs.map(|(x, y)| rounded(x).total_cmp(&rounded(y))).find(|order| order.is_ne());
+    a.0.cmp(&b.0).then(by_normal.unwrap_or(Ordering::Equal))
+}
+
+fn values_of<const D: usize>(state: &PointState<D>) -> [f64; VALUES] {
+    let mut out = [0.0; VALUES];
+    let rubs = f64::from(u8::from(state.sticks.is_some()));
+    let sticks = f64::from(u8::from(state.sticks == Some(true)));
+    out[..5].copy_from_slice(&[state.pressure, state.gap, state.branch as f64, rubs, sticks]);
+    for (at, vector) in [state.direction, state.sliding, state.friction].iter().enumerate() {
+        out[5 + 3 * at..][..D].copy_from_slice(vector);
+    }
+    out
+}
+
+/// The state with such means: on the nearest branch, and sticking if the greater part sticks.
+fn state_of<const D: usize>(values: &[f64; VALUES]) -> PointState<D> {
+    let [pressure, gap, branch, rubs, sticks, ..] = *values;
+    let vector = |at: usize| std::array::from_fn(|i| values[5 + 3 * at + i]);
+    PointState {
+        normal: [0.0; D],
+        direction: vector(0),
+        pressure,
+        gap,
+        branch: branch.round() as usize,
+        sticks: (rubs > 0.0).then_some(sticks >= 0.5 * rubs),
+        sliding: vector(1),
+        friction: vector(2),
+    }
+}
