@@ -14,7 +14,7 @@ use crate::{
             HistoryStore, KINETIC, Load, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, RedistributedMass,
             STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect, SurfaceForce, Term,
         },
-        space::{Batch, CellMatrix, Geometry, Held, Needs, Nodal, SurfacePoint, assemble},
+        space::{Batch, CellMatrix, Geometry, Held, Needs, Nodal, assemble, facet_points},
         state::State,
     },
     laws::material::Isotropic,
@@ -100,10 +100,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.evaluation == Evaluation::Converged
     }
 
-    /// Moves the mass of these nodes of boundaries to the other nodes of their cells. `layout` is a vector with ghosts. Collective.
+    /// Lets other cells carry the mass of the cells at these facets of this rank, so that the nodes of the facets have none. `layout` is a
+    /// vector with ghosts. Collective.
     pub fn redistribute_mass(
         &mut self,
-        boundary: &[SurfacePoint<D>],
+        session: &Session,
+        facets: &[u32],
         layout: &DistributedVector,
     ) -> Result<()> {
         let inertia: Vec<_> = self.terms().filter(|term| term.form() == Some(Form::Mass)).collect();
@@ -113,12 +115,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
         };
         let mut flags = layout.like()?;
         {
-            let mut values = flags.owned_mut()?;
-            boundary.iter().for_each(|point| values[point.node as usize * D] = 1.0);
+            let mut values = flags.local_mut()?;
+            values.fill(0.0);
+            let nodes = facets.iter().flat_map(|facet| facet_points(&self.mesh, *facet).0);
+            nodes.for_each(|node| values[node as usize * D] = 1.0);
         }
+        flags.add_ghosts_to_owners()?;
         flags.update_ghosts()?;
         let is_massless: Vec<bool> = flags.local()?.iter().step_by(D).map(|flag| *flag > 0.0).collect();
-        let mass = RedistributedMass::new(&self.mesh, is_massless, add_mass);
+        let mass = RedistributedMass::new(session, &self.mesh, &is_massless, layout, add_mass)?;
         self.redistributed_mass = Some(mass);
         Ok(())
     }
@@ -495,13 +500,27 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(out)
     }
 
-    /// Writes the nodal forces of the loads at `time`. Collective, also where a rank fails.
+    /// Writes the nodal forces of the loads at `time`: those in the interior act on the nodes that carry the mass of their cells.
+    /// Collective, also where a rank fails.
     pub fn write_loads(&self, time: f64, forces: &mut DistributedVector) -> Result<()> {
+        let moved = self.redistributed_mass.as_ref().filter(|_| self.load.has_body_forces());
+        moved.inspect(|mass| mass.restart_loads());
         let result = {
             let mut values = forces.local_mut()?;
             values.fill(0.0);
-            self.load.add(&self.mesh, &self.geometry, time, &mut values)
+            self.load.forces(&self.mesh, &self.geometry, time, |cell, node, force| {
+                let is_taken = |(mass, cell): (&RedistributedMass<D>, usize)| {
+                    mass.take_load(&self.mesh, cell, node, force)
+                };
+                if !moved.zip(cell).is_some_and(is_taken) {
+                    let sums = &mut values[node as usize * D..][..D];
+                    sums.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+                }
+            })
         };
+        if let Some(mass) = moved {
+            mass.add_loads(&self.mesh, forces)?;
+        }
         forces.add_ghosts_to_owners()?;
         result
     }

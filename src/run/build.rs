@@ -89,8 +89,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
         let facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
-        let points = surface_points(session, &body.mesh, &facets)?;
-        session.agree(body.redistribute_mass(&points, &state.velocity))?;
+        session.agree(body.redistribute_mass(session, &facets, &state.velocity))?;
         session.agree(refuse_remaining_mass(job, &body))?;
     }
     if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
@@ -107,8 +106,8 @@ fn refuse_remaining_mass<const D: usize, const S: usize>(job: &Job, body: &Body<
     let keeps_mass = body.redistributed_mass.as_ref().and_then(|mass| mass.keeps_mass);
     let Some(cell) = keeps_mass.filter(|_| job.time.scheme.is_midpoint()) else { return Ok(()) };
     Err(Error::Refused(format!(
-        "scheme \"{}\" requires contact nodes without mass, but all nodes of the cell with a corner at {:?} m are on contact boundaries \
-         and keep their mass; use another mesh there (in a rectangle another `diagonal`), or scheme \"bdf2\"",
+        "scheme \"{}\" requires contact nodes without mass, but all nodes of the body with a corner at {:?} m are on contact boundaries \
+         and keep their mass; use a finer mesh there, or scheme \"bdf2\"",
         job.time.scheme.name(),
         body.mesh.corners(cell)[0]
     )))

@@ -174,9 +174,10 @@ fn a_run_with_contact_memory_continues_to_the_last_bit_and_on_any_number_of_rank
 fn a_restarted_run_with_an_obstacle_that_a_force_moves_is_the_straight_run_to_the_last_bit() {
     for scheme in ["'implicit_euler'", "'bdf2'", "'lagged_euler'", "'midpoint'"] {
         let make = || {
-            let case = saving().set("time.scheme", scheme);
-            let is_midpoint = scheme == "'midpoint'";
-            if is_midpoint { case.set("contact.0.redistribute_mass", "true") } else { case }
+            let is_massless = if scheme == "'midpoint'" { "true" } else { "false" };
+            saving()
+                .set("time.scheme", scheme)
+                .set("contact.0.redistribute_mass", is_massless)
                 .set("contact.0.normal", "{ unilateral = {} }")
                 .set("contact.0.friction", "{ coulomb = { coefficient = 0.3 } }")
                 .set("contact.0.obstacle", "{ plane = { point = [0, -0.002], normal = [0, 1] } }")

@@ -17,6 +17,7 @@ mod effects;
 mod energy;
 mod fast_flow;
 mod flowing_contact;
+mod free_bodies;
 mod half_models;
 mod held_by_contact;
 mod inclusion;
@@ -136,6 +137,7 @@ fn scenario() {
         "quadratic_bars" => quadratic::bars(&session),
         "power_laws" => fast_flow::power_laws(&session),
         "flowing_contact" => flowing_contact::all(&session),
+        "free_bodies" => free_bodies::all(&session),
         "flow_together" => fast_flow::together(&session),
         "flowing_plane" => manufactured_flow::plane(&session),
         "flowing_space" => manufactured_flow::space(&session),

@@ -6,16 +6,16 @@ use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
 use clarke::{
     fem::{
         body::Body,
-        effect::{Contact, ContactConditions, Form, Quadrature, choose_unknowns},
+        effect::{Contact, ContactConditions, Form, Quadrature, Step, choose_unknowns},
         state::State,
     },
-    job::Job,
+    job::{Job, Scheme},
     laws::contact::Gap,
-    linear_algebra::petsc::DistributedVector,
+    linear_algebra::{petsc::DistributedVector, tensor::larger},
     mesh::{GlobalMesh, generate::box_mesh},
     parallel::session::Session,
     run::Simulation,
-    solver::certificate::Certificates,
+    solver::{certificate::Certificates, stepping::StepRange},
 };
 use std::path::Path;
 
@@ -317,12 +317,92 @@ fn several(session: &Session) {
     assert!(words.contains("is not below 1: a step of 0.04 s may have several solutions"), "{words}");
 }
 
+/// Slope of the fall of a pressure with the displacement in Pa/m, and of a friction coefficient with the slip in 1/m.
+const FALL_WITH_DISPLACEMENT: f64 = 300.0;
+const FALL_WITH_SLIP: f64 = 0.2 / 0.25;
+
+/// Certificates of the worst step of a range under a scheme. Pressures fall with the velocity below, with slip on the same side, and
+/// with the displacement on the right; the least resistance is between the shortest and the longest step.
+fn worst_step<const D: usize, const S: usize>(
+    session: &Session,
+    mesh: &GlobalMesh<D>,
+    scheme: Scheme,
+    range: StepRange,
+) {
+    let contacts = format!(
+        "[[contact]]\non = ['bottom']\n{FALLING}[contact.friction.distance_weakening]\nstatic = 0.5\ndynamic = 0.3\ndistance = 0.25\n\
+         [[contact]]\non = ['right']\n[contact.normal.displacement_graph]\n\
+         points = [[0.0, 0.0], [0.1, 60.0], [0.2, 30.0]]\n"
+    );
+    let job = job::<D>(&contacts, 3.0)
+        .replace(
+            "[[support]]\non = ['left']",
+            "elasticity = { youngs_modulus = 900, poisson_ratio = 0.2 }\n[[support]]\non = ['left']",
+        )
+        .replace("[time]\n", &format!("[time]\nscheme = '{}'\n", scheme.name()));
+    let mut run = simulation::<D, S>(session, &job, mesh);
+    let [_, longest] = range.steps;
+    let mut of_step = run.scheme.matrix(session, &mut run.body, longest).expect("matrix");
+    let found = Certificates::of(session, &run.body, &run.state, &mut of_step, range).expect("certificates");
+    let whole = of_step.range.matrices[0];
+    let matrix = dense(session, (&run.body, &run.state), |x, y| of_step.multiply(x, y).expect("product"));
+    let form = |form| dense_form(session, &run, |x, y| run.body.add_form(form, x, y));
+    let (mass, viscosity, elasticity) = (form(Form::Mass), form(Form::Viscosity), form(Form::Elasticity));
+    let matrix_of = |k: f64| combine(1.0 / k, &mass, &combine(k, &elasticity, &viscosity));
+    let difference = combine(-1.0, &matrix, &matrix_of(whole));
+    let largest_entry = |m: &Dense| m.iter().flatten().fold(0.0, |most: f64, x| larger(most, x.abs()));
+    assert!(largest_entry(&difference) <= 1e-12 * largest_entry(&matrix), "the matrix of a step");
+    let normal =
+        |at: usize| dense_form(session, &run, |x, y| run.body.contacts[at].add_squares([1.0, 0.0], x, y));
+    let (below, beside) = (normal(0), normal(1));
+    let slip = sliding(session, &run, LARGEST * FALL_WITH_SLIP);
+    let theta = |matrix: f64, step: f64| {
+        let with_velocity = combine(FALL, &below, &combine(step - 1.0, &slip, &slip));
+        let falls = combine(matrix * FALL_WITH_DISPLACEMENT, &beside, &with_velocity);
+        largest(&falls, &matrix_of(matrix))
+    };
+    let [least, greatest] = range.matrices;
+    let at = |share: f64| {
+        let length = least * (greatest / least).powf(share);
+        theta(length, f64::min(range.slip * length, longest))
+    };
+    // The largest of samples, then by thirds.
+    let samples = 24;
+    let best = (0..=samples).map(|n| at(f64::from(n) / f64::from(samples))).enumerate();
+    let (best, _) = best.fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most });
+    let [mut low, mut high] =
+        [best as f64 - 1.0, best as f64 + 1.0].map(|n| (n / f64::from(samples)).clamp(0.0, 1.0));
+    for _ in 0..40 {
+        let [one, other] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+        if at(one) < at(other) { low = one } else { high = other }
+    }
+    let expected = [low, high, 0.5 * (low + high)].map(at).into_iter().fold(0.0, larger);
+    let what =
+        format!("worst step of {}, {D}D, {:?} s, {} ranks", scheme.name(), range.steps, session.ranks());
+    println!("{what}: theta {:.4} at the ends, {:.4} between", larger(at(0.0), at(1.0)), expected);
+    close(found.theta_step.expect("theta"), expected, &what);
+    assert_eq!(found.step_range, Some(range.steps));
+}
+
+fn worst_steps<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
+    let adaptive =
+        |scheme, steps| worst_step::<D, S>(session, mesh, scheme, StepRange::adaptive(scheme, steps));
+    adaptive(Scheme::ImplicitEuler, [2e-3, 1.0]);
+    adaptive(Scheme::ImplicitEuler, [0.2, 0.2]);
+    adaptive(Scheme::Bdf2, [0.01, 0.3]);
+    let step =
+        |length, previous_length| StepRange::of(Scheme::Bdf2, Step { time: 1.0, length, previous_length });
+    worst_step::<D, S>(session, mesh, Scheme::Bdf2, step(0.15, 0.0).or(step(0.15, 0.15)));
+}
+
 pub fn plane(session: &Session) {
     all::<2, 3>(session, &crossed([4, 3]));
+    worst_steps::<2, 3>(session, &crossed([3, 2]));
 }
 
 pub fn space(session: &Session) {
     all::<3, 6>(session, &brick([2, 2, 2]));
+    worst_steps::<3, 6>(session, &brick([1, 1, 1]));
     several(session);
 }
 

@@ -96,43 +96,39 @@ impl Load {
             .chain(gravity.map(|value| ("gravity", value)))
     }
 
-    /// Adds the nodal forces at `time` to `forces` (`D` a local node, ghosts to be added to their owners), by
-    /// quadrature of degree 2, on quadratic cells of degree 4.
-    pub fn add<const D: usize>(
+    /// Visits the nodal forces in N at `time` on this rank's cells and facets, by quadrature of degree 2, on quadratic cells of degree 4:
+    /// the cell of a force in the interior, the local node, the force.
+    pub fn forces<const D: usize>(
         &self,
         mesh: &Mesh<D>,
         geometry: &Geometry<D>,
         time: f64,
-        forces: &mut [f64],
+        mut visit: impl FnMut(Option<usize>, u32, &Vector<D>),
     ) -> Result<()> {
         for traction in &self.tractions {
-            traction.forces(mesh, time, |node, force| add_at(forces, node, &force))?;
+            traction.forces(mesh, time, |node, force| visit(None, node, &force))?;
         }
+        let mut in_cell = |cell: usize, node: u32, force: &Vector<D>| visit(Some(cell), node, force);
         for BodyForce { value } in &self.body_forces {
             let of_place = |at: &Vector<D>| evaluate(value, time, at, "body_force");
-            add_in_cells(mesh, geometry, |_| 1.0, of_place, forces)?;
+            forces_in_cells(mesh, geometry, |_| 1.0, of_place, &mut in_cell)?;
         }
         if let Some(Gravity { acceleration, density }) = &self.gravity {
             let of_place = |at: &Vector<D>| evaluate(acceleration, time, at, "gravity");
-            add_in_cells(
-                mesh,
-                geometry,
-                |material| density.get(material).copied().unwrap_or(0.0),
-                of_place,
-                forces,
-            )?;
+            let density = |material| density.get(material).copied().unwrap_or(0.0);
+            forces_in_cells(mesh, geometry, density, of_place, &mut in_cell)?;
         }
         Ok(())
     }
 }
 
-/// Adds the nodal forces of a force per volume: a factor for each material times the value at a place.
-fn add_in_cells<const D: usize>(
+/// Visits the nodal forces of a force per volume: a factor for each material times the value at a place.
+fn forces_in_cells<const D: usize>(
     mesh: &Mesh<D>,
     geometry: &Geometry<D>,
     factor: impl Fn(usize) -> f64,
     of_place: impl Fn(&Vector<D>) -> Result<Vector<D>>,
-    forces: &mut [f64],
+    visit: &mut impl FnMut(usize, u32, &Vector<D>),
 ) -> Result<()> {
     let materials = geometry.runs.iter().flat_map(|run| std::iter::repeat_n(run.material, run.count));
     for (number, (material, cell)) in materials.zip(geometry.cells()).enumerate() {
@@ -140,12 +136,16 @@ fn add_in_cells<const D: usize>(
         if factor == 0.0 {
             continue;
         }
+        let mut scatter = |shares: &[f64], weight: f64, value: &Vector<D>| {
+            for (node, share) in mesh.cell_nodes(number).zip(shares) {
+                visit(number, node, &value.map(|value| weight * share * value));
+            }
+        };
         let (volume, corners) = (factor * cell.whole().volume, mesh.corners(number));
         if let CellShape::Linear = cell.shape() {
-            let nodes = mesh.cell(number).iter().copied();
             for (place, weight) in cell_rule::<D>() {
                 let value = of_place(&point(corners[..=D].iter().copied(), place))?;
-                scatter(forces, nodes.clone(), place, volume * weight, &value);
+                scatter(place, volume * weight, &value);
             }
             continue;
         }
@@ -157,7 +157,7 @@ fn add_in_cells<const D: usize>(
                 CellShape::Curved(weights) => factor * weights[k][cell.lane()],
                 _ => volume * weight,
             };
-            scatter(forces, mesh.cell_nodes(number), &shares, weight, &value);
+            scatter(&shares, weight, &value);
         }
     }
     Ok(())
@@ -171,24 +171,6 @@ fn point<const D: usize>(coordinates: impl Iterator<Item = Vector<D>>, shares: &
         }
     }
     out
-}
-
-fn scatter<const D: usize>(
-    forces: &mut [f64],
-    nodes: impl Iterator<Item = u32>,
-    shares: &[f64],
-    weight: f64,
-    value: &Vector<D>,
-) {
-    for (node, share) in nodes.zip(shares) {
-        add_at(forces, node, &value.map(|value| weight * share * value));
-    }
-}
-
-fn add_at<const D: usize>(forces: &mut [f64], node: u32, force: &Vector<D>) {
-    for i in 0..D {
-        forces[node as usize * D + i] += force[i];
-    }
 }
 
 /// The components at a time and point; refused where one is not finite.

@@ -6,6 +6,7 @@
 //! An effect is called only in the phases that it declares in [`Effect::phases`].
 
 mod adhesion;
+mod carriers;
 mod cell_history;
 mod contact;
 mod contact_memory;
@@ -46,10 +47,10 @@ use crate::{
 pub use crate::laws::step::{Blend, Evaluation, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode, Decrease,
-    Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, PointCount,
-    PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns, contact_nodes,
-    set_walls,
+    CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
+    Decrease, Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK,
+    PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns,
+    contact_nodes, set_walls,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

@@ -1,21 +1,31 @@
-//! Mass of contact boundaries that is moved to the other nodes of their cells.
+//! Mass of contact boundaries that cells in the interior carry.
 //!
-//! In the kinetic energy of a cell, the velocity at a node without mass is replaced by the mean velocity of the cell's other nodes:
-//! `M' = T^T M T`, with `T` the identity but for the rows of nodes without mass. The total mass, and so the momentum of a rigid
-//! translation, stay the same. Without inertia, the pressure of a boundary that meets an obstacle is that of the stress behind the
-//! boundary: no kinetic energy is lost in the impact, and no impulse makes the pressure oscillate. (H. B. Khenous, P. Laborde, Y.
-//! Renard, European Journal of Mechanics A 27, 2008; C. Hager, S. Hueber, B. Wohlmuth, Int. J. Numer. Meth. Eng. 73, 2008.)
+//! In the kinetic energy the cells at these boundaries move as continuations of their carriers, see [`super::carriers`]: `M' = M - M_K + E^T
+//! M_K E` with the mass matrix `M_K` of a cell at the boundary and the velocities `E v` at its nodes. Total mass, first moments and moments
+//! of inertia stay the same, and loads in these cells act as `E^T f`, so that the weight is that of the mass. Without inertia, the pressure
+//! of a boundary that meets an obstacle is that of the stress behind the boundary: no kinetic energy is lost in the impact, and no impulse
+//! makes the pressure oscillate. (H. B. Khenous, P. Laborde, Y. Renard, European Journal of Mechanics A 27, 2008; C. Hager, S. Hueber,
+//! B. Wohlmuth, Int. J. Numer. Meth. Eng. 73, 2008.)
 
-use crate::{fem::space::CellMatrix, mesh::Mesh};
+use super::carriers::Carriers;
+use crate::{
+    error::Result,
+    fem::space::CellMatrix,
+    linear_algebra::{petsc::DistributedVector, tensor::Vector},
+    mesh::Mesh,
+    parallel::session::Session,
+};
+use std::collections::BTreeMap;
 
-/// What the redistribution changes in the mass matrix, for the cells of this rank at the boundaries without mass.
-#[derive(Debug, Clone, PartialEq)]
+/// What the redistribution changes in the mass matrix, for the cells of this rank.
+#[derive(Debug)]
 pub struct RedistributedMass<const D: usize> {
     cells: Vec<Change>,
-    /// Whether the mass is taken from each local node.
+    /// Whether each local node is without mass.
     is_massless: Vec<bool>,
-    /// A cell that keeps its mass, because it is to be taken from all of its nodes.
+    /// A cell that keeps its mass, because the mass is to be taken from all nodes of its body.
     pub keeps_mass: Option<usize>,
+    carriers: Carriers<D>,
 }
 
 /// The change of the mass matrix of a cell.
@@ -23,40 +33,99 @@ pub struct RedistributedMass<const D: usize> {
 struct Change {
     cell: usize,
     nodes: Vec<u32>,
-    /// `T^T M T - M`, in kg, row by row.
+    /// In kg, row by row.
     entries: Vec<f64>,
 }
 
 impl<const D: usize> RedistributedMass<D> {
     /// Takes the mass from those local nodes for which `is_massless` holds; `add_mass` adds the mass matrix of a cell, given its number. A
-    /// cell that has no other nodes keeps its mass.
+    /// body without other nodes keeps its mass. `layout` is a vector with ghosts. Collective.
     pub fn new(
+        session: &Session,
         mesh: &Mesh<D>,
-        is_massless: Vec<bool>,
+        is_massless: &[bool],
+        layout: &DistributedVector,
         mut add_mass: impl FnMut(usize, &mut CellMatrix<D>),
-    ) -> Self {
+    ) -> Result<Self> {
+        let carriers = Carriers::new(session, mesh, is_massless, layout)?;
+        let mut cells: BTreeMap<usize, Change> = BTreeMap::new();
         let mut matrix = CellMatrix::new(mesh);
-        let mut cells = Vec::new();
-        let mut keeps_mass = None;
-        for cell in 0..mesh.cell_count() {
-            let nodes: Vec<u32> = mesh.cell_nodes(cell).collect();
-            let of_cell: Vec<bool> = nodes.iter().map(|node| is_massless[*node as usize]).collect();
-            let others = of_cell.iter().filter(|massless| !**massless).count();
-            if others == 0 {
-                keeps_mass = Some(cell);
-            }
-            if others == 0 || others == nodes.len() {
-                continue;
-            }
+        let mut taken = Vec::with_capacity(carriers.moved().count());
+        let mass = |cell: usize| {
             matrix.clear();
             add_mass(cell, &mut matrix);
-            let mass = |a: usize, b: usize| matrix.blocks[a][b][0][0];
-            cells.push(Change { cell, entries: change(&of_cell, mass), nodes });
+            let count = matrix.nodes();
+            let entries: Vec<f64> =
+                (0..count * count).map(|at| matrix.blocks[at / count][at % count][0][0]).collect();
+            let nodes = mesh.cell_nodes(cell).collect();
+            taken.push(Change { cell, nodes, entries: entries.iter().map(|entry| -entry).collect() });
+            entries
+        };
+        carriers.move_mass(mesh, mass, |cell, corners, received| {
+            let change = cells.entry(cell).or_insert_with(|| {
+                let nodes: Vec<u32> = mesh.cell_nodes(cell).collect();
+                Change { cell, entries: vec![0.0; nodes.len() * nodes.len()], nodes }
+            });
+            let at: Vec<usize> = corners
+                .iter()
+                .filter_map(|corner| change.nodes.iter().position(|node| node == corner))
+                .collect();
+            for (row, received) in at.iter().zip(received.chunks_exact(at.len())) {
+                for (column, received) in at.iter().zip(received) {
+                    change.entries[row * change.nodes.len() + column] += received;
+                }
+            }
+        })?;
+        for Change { cell, nodes, entries } in taken {
+            let change = cells.entry(cell).or_insert_with(|| Change {
+                cell,
+                entries: vec![0.0; entries.len()],
+                nodes,
+            });
+            change.entries.iter_mut().zip(entries).for_each(|(sum, entry)| *sum += entry);
         }
-        Self { cells, is_massless, keeps_mass }
+        let cells: Vec<Change> = cells.into_values().collect();
+
+        let mut is_moved = vec![false; mesh.cell_count()];
+        carriers.moved().for_each(|cell| is_moved[cell] = true);
+        let keeping: Vec<usize> = (0..mesh.cell_count()).filter(|cell| !is_moved[*cell]).collect();
+        let keeps_mass = keeping
+            .iter()
+            .copied()
+            .find(|cell| mesh.cell_nodes(*cell).any(|node| is_massless[node as usize]));
+        let mut has_mass = layout.like()?;
+        {
+            let mut values = has_mass.local_mut()?;
+            values.fill(0.0);
+            let of_cells = keeping.iter().flat_map(|cell| mesh.cell_nodes(*cell));
+            let of_carriers = carriers.carriers().flat_map(|(_, corners)| corners).copied();
+            of_cells.chain(of_carriers).for_each(|node| values[node as usize * D] = 1.0);
+        }
+        has_mass.add_ghosts_to_owners()?;
+        has_mass.update_ghosts()?;
+        let is_massless = has_mass.local()?.iter().step_by(D).map(|mark| *mark == 0.0).collect();
+        Ok(Self { cells, is_massless, keeps_mass, carriers })
     }
 
-    /// Whether the mass is taken from a local node.
+    /// Forgets the loads taken so far.
+    pub fn restart_loads(&self) {
+        self.carriers.restart_forces();
+    }
+
+    /// Takes the load in N on a local node of a cell, if others carry the mass of the cell; gives whether they do.
+    pub fn take_load(&self, mesh: &Mesh<D>, cell: usize, node: u32, load: &Vector<D>) -> bool {
+        self.carriers.take_force(mesh, cell, node, load)
+    }
+
+    /// Adds the loads taken to the forces (with ghosts) on the nodes that carry the mass. Collective.
+    pub fn add_loads(&self, mesh: &Mesh<D>, forces: &mut DistributedVector) -> Result<()> {
+        let mut forces = forces.local_mut()?;
+        self.carriers.move_forces(mesh, |node, force| {
+            forces[node as usize * D..][..D].iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+        })
+    }
+
+    /// Whether a local node is without mass.
     pub fn is_massless(&self, node: usize) -> bool {
         self.is_massless[node]
     }
@@ -94,93 +163,5 @@ impl<const D: usize> RedistributedMass<D> {
         let Ok(at) = self.cells.binary_search_by_key(&cell, |change| change.cell) else { return };
         let Change { nodes, entries, .. } = &self.cells[at];
         matrix.add_scalar(|a, b| factor * entries[a * nodes.len() + b]);
-    }
-}
-
-/// `T^T M T - M`, row by row.
-fn change(is_massless: &[bool], mass: impl Fn(usize, usize) -> f64) -> Vec<f64> {
-    let count = is_massless.len();
-    let share = 1.0 / is_massless.iter().filter(|massless| !**massless).count() as f64;
-    // `T`: the share of node `b` in the velocity that node `a` has in the kinetic energy.
-    let t = |a: usize, b: usize| match (is_massless[a], is_massless[b]) {
-        (false, _) => f64::from(u8::from(a == b)),
-        (true, false) => share,
-        (true, true) => 0.0,
-    };
-    let all = |i: usize, j: usize| {
-        (0..count)
-            .flat_map(|a| (0..count).map(move |b| (a, b)))
-            .map(|(a, b)| t(a, i) * mass(a, b) * t(b, j))
-            .sum::<f64>()
-    };
-    (0..count * count).map(|at| all(at / count, at % count) - mass(at / count, at % count)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::fem::space::{
-        Geometry,
-        samples::{number, quadratic, row},
-    };
-
-    #[test]
-    fn a_triangle_passes_the_mass_of_a_corner_to_the_others() {
-        let twelfths = |a: usize, b: usize| if a == b { 2.0 } else { 1.0 };
-        let found = change(&[true, false, false], twelfths);
-        let expected = [-2.0, -1.0, -1.0, -1.0, 1.5, 1.5, -1.0, 1.5, 1.5];
-        assert!(
-            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-15),
-            "{found:?}"
-        );
-    }
-
-    /// Nodes without mass resist no acceleration, and the others resist a rigid translation as before.
-    fn check<const D: usize>(mesh: &Mesh<D>) {
-        let geometry = Geometry::new(mesh);
-        let is_massless: Vec<bool> = (0..mesh.nodes.len()).map(|node| node % (D + 2) == 0).collect();
-        let add_mass = |cell: usize, matrix: &mut CellMatrix<D>| matrix.add_mass(geometry.cell_at(cell), 1.7);
-        let redistributed = RedistributedMass::new(mesh, is_massless.clone(), add_mass);
-        let times_mass = |x: &[f64]| {
-            let mut force = vec![0.0; x.len()];
-            let mut matrix = CellMatrix::new(mesh);
-            for cell in 0..mesh.cell_count() {
-                matrix.clear();
-                add_mass(cell, &mut matrix);
-                redistributed.add_to_cell(cell, 1.0, &mut matrix);
-                for (a, row) in mesh.cell_nodes(cell).enumerate() {
-                    for (b, column) in mesh.cell_nodes(cell).enumerate() {
-                        for i in 0..D {
-                            force[row as usize * D + i] +=
-                                matrix.blocks[a][b][i][i] * x[column as usize * D + i];
-                        }
-                    }
-                }
-            }
-            force
-        };
-        let close = |a: f64, b: f64| (a - b).abs() < 1e-11 * (1.0 + b.abs());
-        let x: Vec<f64> = (0..mesh.nodes.len() * D).map(number).collect();
-        let force = times_mass(&x);
-        let massless = is_massless.iter().zip(force.chunks_exact(D)).filter(|(massless, _)| **massless);
-        assert!(
-            massless.clone().count() > 3 && massless.flat_map(|(_, force)| force).all(|f| close(*f, 0.0))
-        );
-        let mut product = vec![0.0; x.len()];
-        redistributed.add_product(1.0, |at| x[at], &mut product);
-        let square: f64 = product.iter().zip(&x).map(|(a, b)| a * b).sum();
-        let found = redistributed.square(|at| x[at]);
-        assert!(close(found, square) && square != 0.0, "{found} instead of {square}");
-        let ones = vec![1.0; x.len()];
-        let mass: f64 = geometry.iter().map(|cell| 1.7 * cell.volume * D as f64).sum();
-        assert!(close(times_mass(&ones).iter().sum(), mass));
-    }
-
-    #[test]
-    fn nodes_without_mass_resist_no_acceleration() {
-        check(&row::<2>());
-        check(&row::<3>());
-        check(&quadratic(row::<2>(), 0.0));
-        check(&quadratic(row::<3>(), 0.03));
     }
 }

@@ -61,9 +61,9 @@ pub struct Contact {
     pub quadrature: Quadrature,
     /// The normal law: the contact pressure -sigma_nu as a function of the normal velocity or the normal displacement.
     pub normal: NormalLaw,
-    /// Whether the mass of these boundaries is moved to the other nodes of their cells (mass redistribution), so that the boundary
-    /// loses no kinetic energy in impacts and the contact pressure does not oscillate. Total mass stays the same. Requires an
-    /// implicit scheme.
+    /// Whether the mass of the cells at these boundaries is moved to nodes behind them (mass redistribution), so that the boundary
+    /// loses no kinetic energy in impacts and the contact pressure does not oscillate. Total mass, centre of mass and moments of
+    /// inertia stay the same; gravity and body forces move with the mass. Requires an implicit scheme.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub redistribute_mass: bool,
     /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;

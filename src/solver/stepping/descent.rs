@@ -18,9 +18,7 @@ use crate::{
 };
 
 /// Largest number of directions.
-pub(super) const MAX_DIRECTIONS: usize = 500;
-/// Largest number of directions along which no velocity changes.
-const MAX_STALLS: usize = 20;
+const MAX_DIRECTIONS: usize = 1000;
 /// The ratio by which the share of softening decreases where the derivative is not positive definite, and by which it grows again.
 const DECREASE: f64 = 0.25;
 const INCREASE: f64 = 2.0;
@@ -74,13 +72,12 @@ impl Descent {
     }
 
     /// Descends from the unknowns `x`, where it writes the solution, or from the other start if it leaves a smaller residual, until the
-    /// norm of the residual is `absolute`, or `relative` times the first one; returns whether it did within so many directions. Collective.
+    /// norm of the residual is `absolute`, or `relative` times the first one; returns whether it did. Collective.
     pub(super) fn solve<const D: usize>(
         &mut self,
         equations: &mut ContactEquations<'_, D>,
         x: &mut DistributedVector,
         (absolute, relative): (f64, f64),
-        limit: usize,
     ) -> Result<bool> {
         equations.residual(x, &mut self.residual)?;
         let mut norm = self.residual.norm()?;
@@ -93,8 +90,8 @@ impl Descent {
             norm = self.residual.norm()?;
         }
         let tolerance = absolute.max(relative * norm);
-        let (mut share, mut stalls) = (1.0, 0);
-        for _ in 0..limit {
+        let mut share = 1.0;
+        for _ in 0..MAX_DIRECTIONS {
             if norm <= tolerance {
                 return Ok(true);
             }
@@ -111,21 +108,14 @@ impl Descent {
                 {
                     break place;
                 }
-                if share == 0.0 && curvature == Curvature::Positive {
-                    // At kinks of contact graphs the tractions must change first.
-                    break self.evaluate(equations, x, 1.0)?;
-                }
                 if share == 0.0 {
                     return Ok(false);
                 }
                 equations.counts.unstable += 1;
                 share = if share > LEAST_SHARE { DECREASE * share } else { 0.0 };
             };
-            if place.change <= ROUNDING * self.velocity.norm()? && place.residual > ENOUGH * norm {
-                stalls += 1;
-                if stalls > MAX_STALLS {
-                    return Ok(false);
-                }
+            if place.change <= ROUNDING * self.velocity.norm()? {
+                return Ok(false);
             }
             x.add_scaled(-place.length, &self.direction)?;
             equations.residual(x, &mut self.residual)?;

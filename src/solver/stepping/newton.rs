@@ -4,7 +4,7 @@ use super::{
     StepOutcome,
     bounded::Bounded,
     contacts::restore_pressures,
-    descent::{Descent, MAX_DIRECTIONS},
+    descent::Descent,
     equations::{CellForces, ContactEquations, Scratch, SolveCounts, cycle_message},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
@@ -198,12 +198,12 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<Attempt> {
         if fallback.iteration == FrictionIteration::Newton {
-            return self.iterate(problem, system, fallback, trial);
+            return self.iterate(problem, system, fallback.search, trial);
         }
         let mut sum = 0;
         for _ in 0..MAX_FIXED_POINT_ITERATIONS {
             problem.body.contacts.iter_mut().for_each(Contact::update_pressures);
-            let Attempt { iterations, failure } = self.iterate(problem, system, fallback, trial)?;
+            let Attempt { iterations, failure } = self.iterate(problem, system, fallback.search, trial)?;
             if failure.is_some() {
                 return Ok(Attempt { iterations: sum + iterations, failure });
             }
@@ -223,10 +223,10 @@ impl Newton {
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
-        fallback: Fallback,
+        search: Search,
         trial: &mut DistributedVector,
     ) -> Result<Attempt> {
-        let (session, search) = (problem.session, fallback.search);
+        let session = problem.session;
         self.has_descended = search == Search::Descent;
         if self.has_descended {
             let tolerance = LINEAR_SHARE * system.tolerance;
@@ -245,8 +245,6 @@ impl Newton {
         if !self.has_user_search {
             self.snes.search_along_steps(search != Search::FullSteps)?;
         }
-        let is_coupled = fallback.iteration == FrictionIteration::Newton
-            && problem.body.contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure()));
         self.counts.sets.clear();
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = match (&mut self.flow, problem.flow_start) {
@@ -269,15 +267,9 @@ impl Newton {
         // body.
         let tolerances = (system.tolerance, self.settings.tolerance);
         let limit = self.settings.max_newton_iterations as usize;
-        // Friction that follows the pressure has no energy: the descent converges soon, or not at all.
         let descent = self.descent.as_mut().filter(|_| search == Search::Descent);
         let solved = if let Some(descent) = descent {
-            let solved = descent.solve(
-                &mut equations,
-                trial,
-                tolerances,
-                if is_coupled { limit } else { MAX_DIRECTIONS },
-            );
+            let solved = descent.solve(&mut equations, trial, tolerances);
             equations.set_softening(1.0);
             solved.map(|converged| (!converged).then_some(NO_MINIMUM))
         } else {

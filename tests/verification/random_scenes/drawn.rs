@@ -259,6 +259,7 @@ fn same_dimension<const A: usize, const D: usize>(mesh: GlobalMesh<A>) -> Global
         facet_cells: mesh.facet_cells,
         boundaries: mesh.boundaries,
         point_sets: mesh.point_sets,
+        inner_groups: mesh.inner_groups,
     }
 }
 
