@@ -197,14 +197,17 @@ impl Shape {
             let is_near = value < NEAR * first.abs() && slope < 0.0;
             step = value * if is_near { (2.0 / -slope).min(FASTEST) } else { 1.0 };
         }
-        let length =
-            if side < 0.0 { self.from_beyond(offset, normal, ([size, slack], here)) } else { f64::INFINITY };
+        let length = if side < 0.0 {
+            self.seen_from_outside(offset, normal, ([size, slack], here))
+        } else {
+            f64::INFINITY
+        };
         Search { length, nearest }
     }
 
     /// The length of the ray from a place inside near a surface that is parallel to it, along which a search takes too many steps: from
     /// outside, back to the place. The surface is farther than `least`.
-    fn from_beyond<const D: usize>(
+    fn seen_from_outside<const D: usize>(
         &self,
         offset: &Vector<D>,
         normal: &Vector<D>,

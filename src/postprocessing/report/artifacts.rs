@@ -71,15 +71,18 @@ impl Found {
         found.history =
             found.take("history.csv", "energies, steps and iterations", |path| Table::read(path, ""));
         found.resultants = found.take("resultants.csv", "forces of supports, contacts and loads", |path| {
-            Table::read(path, "source")
+            Ok(Table::read(path, "source")?.without_unfinished("step"))
         });
         let wants = |there: fn(&Job) -> bool, job: &Option<Job>| job.as_ref().is_none_or(there);
         if folder.join("probes.csv").exists() || wants(|job| !job.output.probe.is_empty(), &found.job) {
-            found.probes = found.take("probes.csv", "probes over time", |path| Table::read(path, "probe"));
+            found.probes = found.take("probes.csv", "probes over time", |path| {
+                Ok(Table::read(path, "probe")?.without_unfinished("step"))
+            });
         }
         if folder.join("profiles.csv").exists() || wants(|job| !job.output.profile.is_empty(), &found.job) {
-            found.profiles =
-                found.take("profiles.csv", "values along boundaries", |path| Table::read(path, "profile"));
+            found.profiles = found.take("profiles.csv", "values along boundaries", |path| {
+                Ok(Table::read(path, "profile")?.without_unfinished("time"))
+            });
         }
         found.snapshot = found.take("fields.vtkhdf", "pictures of the body", Snapshot::read);
         Ok(found)

@@ -15,7 +15,7 @@ use crate::{
 
 /// Number of probes in one chart above which lines cannot be distinguished.
 const MOST_PROBES: usize = 7;
-/// A force below this share of the largest one of the run is a rounding error.
+/// A force or a component of a vector below this share of the largest one of the run is a rounding error.
 const ROUNDING: f64 = 1e-9;
 
 /// Each quantity of the probes over time, with a line for each probe.
@@ -31,6 +31,18 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
         let unit = unit_by_name(column);
         let last = |curve: &[[f64; 2]]| curve.last().map_or(0.0, |point| point[1]);
         let range = |curve: &Vec<[f64; 2]>| extent(curve.iter().map(|point| point[1]));
+        // Beside the other components of the same vector these may be rounding errors.
+        let names_of_vector =
+            table.header().iter().filter(|name| name.rsplit_once('_').is_some_and(|(of, _)| of == vector));
+        let largest = names_of_vector
+            .filter_map(|name| table.column(name))
+            .flatten()
+            .fold(0.0, |most: f64, value| most.max(value.abs()));
+        let is_noise = |curve: &Vec<[f64; 2]>| curve.iter().all(|point| point[1].abs() <= ROUNDING * largest);
+        if largest > 0.0 && curves.iter().all(is_noise) {
+            out.constant.extend(names.iter().map(|name| format!("{quantity} of {name}: 0 {unit}")));
+            continue;
+        }
         if curves.iter().filter_map(range).all(is_constant) {
             let pairs = names.iter().zip(&curves);
             let named =
@@ -259,6 +271,21 @@ fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn components_of_probes_that_are_rounding_errors_are_not_drawn() {
+        let text = "step,time,probe,velocity_x,velocity_y\n1,0.1,tip,0.5,1e-12\n2,0.2,tip,1,-2e-12\n";
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("probes.csv");
+        std::fs::write(&path, text).expect("written");
+        let Pictures { pictures, constant } =
+            probes(&Table::read(&path, "probe").expect("table")).expect("drawn");
+        assert_eq!(
+            pictures.iter().map(|picture| picture.name.as_str()).collect::<Vec<_>>(),
+            ["probes_velocity_x"]
+        );
+        assert_eq!(constant, ["velocity y of tip: 0 m/s"]);
+    }
 
     #[test]
     fn constant_quantities_and_rounding_errors_are_named_and_the_motion_of_the_obstacle_is_drawn() {

@@ -108,6 +108,17 @@ impl Table {
         self.at(column, values.iter().copied().fold(f64::NEG_INFINITY, f64::max))
     }
 
+    /// Without the rows of the last number in this column if they are fewer than those of the first: a run that is not over has yet to
+    /// write the others.
+    pub(super) fn without_unfinished(self, column: &str) -> Self {
+        let values = self.column(column).unwrap_or_default();
+        let count = |value: Option<&f64>| values.iter().filter(|other| Some(*other) == value).count();
+        if count(values.last()) >= count(values.first()) {
+            return self;
+        }
+        self.filtered(|at| values.get(at) != values.last())
+    }
+
     /// The rows with this number in this column.
     pub(super) fn at(&self, column: &str, number: f64) -> Self {
         let values = self.column(column).unwrap_or_default();
@@ -139,6 +150,16 @@ mod tests {
         assert_eq!(table.names(), ["left", "right"]);
         assert_eq!(table.of("left").last("time").column("x"), Some(vec![3.0, 4.0]));
         assert_eq!(table.column("y"), None);
+    }
+
+    #[test]
+    fn a_time_that_is_being_written_is_left_out() {
+        let table =
+            |text: &str| Table::parse(text.as_bytes(), "profile").expect("table").without_unfinished("time");
+        let whole = "time,profile,x\n0,left,1\n0,right,2\n1,left,3\n";
+        assert_eq!(table(whole).column("x"), Some(vec![1.0, 2.0]));
+        assert_eq!(table(&format!("{whole}1,right,4\n")).len(), 4);
+        assert_eq!(table("time,profile,x\n").len(), 0);
     }
 
     #[test]

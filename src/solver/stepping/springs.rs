@@ -33,6 +33,11 @@ pub(super) struct RowsWithSprings {
 }
 
 impl Springs {
+    /// Whether contact alone resists some rigid motion, so that a body at rest has no stiffness against it before it is pressed on.
+    pub(super) fn are_needed(&self) -> bool {
+        self.free_motions.as_ref().is_some_and(|motions| !motions.is_empty())
+    }
+
     /// Adds to the failure of a step the motions that only contact can prevent, if there are any.
     pub(super) fn explain(&self, failure: Agreed) -> Error {
         match &self.free_motions {

@@ -305,7 +305,8 @@ impl StepSolver {
     }
 
     /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails, it is repeated with a factor in
-    /// double precision and with the tolerance that rounding errors of the solution allow. Collective.
+    /// double precision, from the solution on soft springs where contact alone holds a body, and with the tolerance that rounding errors
+    /// of the solution allow. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -313,7 +314,7 @@ impl StepSolver {
     ) -> Result<StepOutcome> {
         let (session, state, forces) = (problem.session, problem.state, problem.forces);
         let mut tolerance = self.tolerance(problem, trial)?;
-        let mut is_relaxed = false;
+        let (mut is_relaxed, mut is_pressed_on) = (false, false);
         loop {
             let is_single = self.active_precision()? == Some(Precision::Single);
             let (_, matrix) =
@@ -345,6 +346,13 @@ impl StepSolver {
             // The start value may be much smaller than the solution, especially at rest.
             let mut solution = forces.like()?;
             self.precondition(forces, &mut solution)?;
+            if self.springs.are_needed() && !is_pressed_on {
+                // Foundations that nothing presses on yet do not resist: start where springs bear the loads.
+                trial.copy_from(&solution)?;
+                restore_pressures(problem.body, problem.state)?;
+                is_pressed_on = true;
+                continue;
+            }
             let floor = f64::EPSILON * self.matrix_norm * solution.norm()?;
             if !floor.is_finite() || floor <= tolerance {
                 return Err(self.springs.explain(failure));

@@ -127,7 +127,7 @@ impl<const D: usize> Trial<'_, D> {
             ("forces", plain.open[0]),
             ("moments", plain.open[1]),
         ] {
-            if !(worst < BALANCE || turnover < NONE) {
+            if turnover >= NONE && exceeds(worst, BALANCE) {
                 fault(format!("{what}: {worst:e} out of balance"));
             }
         }
@@ -192,7 +192,7 @@ impl<const D: usize> Trial<'_, D> {
         };
         let size = values[3].iter().map(|x| x.abs()).fold(0.0, f64::max);
         let [long, _, short] = [0, 1, 2].map(|at| distance(&values[at], &values[at + 1]));
-        if !(short <= 0.8 * long + 0.05 * size) {
+        if exceeds(short, 0.8 * long + 0.05 * size) {
             fault(format!(
                 "shorter steps do not converge: changes {long:e}, then {short:e} of {size:e}: {values:?}"
             ));
@@ -269,7 +269,7 @@ impl<const D: usize> Trial<'_, D> {
         let share = if is_adaptive { ADAPTED } else { EQUAL };
         for name in energies {
             let (expected, got) = (last(&plain, name), last(&other, name) / joule);
-            if !((got - expected).abs() <= share * turnover + NONE) {
+            if exceeds((got - expected).abs(), share * turnover + NONE) {
                 found.push(format!("{name} {got:e} instead of {expected:e} of {turnover:e} J"));
             }
         }
@@ -278,7 +278,7 @@ impl<const D: usize> Trial<'_, D> {
             let size = expected.iter().map(|x| x * x).sum::<f64>().sqrt();
             for i in 0..D {
                 let got = other.probe[at][i] / unit;
-                if !((got - expected[i]).abs() <= 10.0 * share * size.max(1e-6)) {
+                if exceeds((got - expected[i]).abs(), 10.0 * share * size.max(1e-6)) {
                     let what = ["displacement", "velocity"][at];
                     found.push(format!("{what} {got:e} instead of {:e}", expected[i]));
                 }
@@ -290,6 +290,11 @@ impl<const D: usize> Trial<'_, D> {
         }
         found
     }
+}
+
+/// Whether a number is above its bound, or NaN.
+fn exceeds(value: f64, bound: f64) -> bool {
+    value > bound || value.is_nan()
 }
 
 /// The largest of the magnitudes, or NaN.
