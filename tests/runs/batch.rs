@@ -125,7 +125,7 @@ fn a_job_that_is_submitted_to_pbs_again_continues_from_the_folder_that_it_names(
 
 #[test]
 fn the_margin_of_a_pbs_job_counts_from_its_start_and_paths_may_contain_commas() {
-    let submission = Submission::new("", "output.folder = \"a, b\"");
+    let submission = Submission::new("output.folder = \"a, b\"", "");
     let job = submission.path("a, job.toml");
     fs::rename(&submission.job, &job).expect("renamed");
     submission.command("slow", "sleep 2; exec \"$@\"");

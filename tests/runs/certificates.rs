@@ -378,7 +378,7 @@ fn a_restart_with_steps_outside_of_the_certified_range_renews_the_certificate() 
 #[test]
 fn a_search_finds_one_solution_of_a_body_at_rest() {
     for ranks in [1, 2] {
-        let results = layer("implicit_euler", 0.08, 0.16).without("traction").run(ranks);
-        assert_eq!(results.summary()["guesses"]["most_solutions"], 1, "on {ranks} ranks");
+        let case = layer("implicit_euler", 0.08, 0.16).without("traction");
+        assert_eq!(case.run(ranks).summary()["guesses"]["most_solutions"], 1, "on {ranks} ranks");
     }
 }

@@ -44,7 +44,7 @@ fn small_jobs_take_as_many_iterations_as_they_did() {
         ("lagged_euler, 64 steps", &many, 1, [153.0, 353.0]),
         ("implicit_euler", &euler, 1, [220.0, 490.0]),
         ("bdf2", &bdf2, 1, [199.0, 450.0]),
-        (jobs[0], &adaptive, 1, [251.0, 543.0]),
+        (jobs[0], &adaptive, 1, [255.0, 553.0]),
         (jobs[1], &jump, 1, [397.0, 396.0]),
         (jobs[2], &oblique, 1, [100.0, 105.0]),
         ("lagged_euler, 16 steps", &few, 2, [60.0, 141.0]),

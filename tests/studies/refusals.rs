@@ -19,7 +19,7 @@ fn all_faults_of_a_study_come_at_once_with_line_and_nearest_name() {
         "[[run]]\ncels = [4, 4]\nstep = -1\n[refrence.run]\n[[norm]]\nof = \"velocty\"\nin = \"H\"\nover = \"max\"\n",
     );
     for words in [
-        "unknown key `cels` in [run.0]",
+        "unknown key `cels` in [[run]]",
         "study.toml:4:1",
         "did you mean `cells`?",
         "`run.0.step` is out of range",

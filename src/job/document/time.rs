@@ -74,7 +74,8 @@ pub struct Solver {
     /// double precision.
     pub factor_precision: FactorPrecision,
     /// Number of Newton iterations after which a solve fails. A step may need several solves: other start values, obstacles moved by
-    /// a force; the Newton iterations of a step are the sum over its solves.
+    /// a force; the Newton iterations of a step are the sum over its solves. Where forces fall as the body moves, a descent to another
+    /// equilibrium may take 20 times as many.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
     /// How the dependence of friction bounds on the contact pressure is solved (all laws except tresca).

@@ -17,8 +17,8 @@ use crate::{
     linear_algebra::petsc::{DistributedVector, NonlinearProblem},
 };
 
-/// Largest number of directions.
-const MAX_DIRECTIONS: usize = 1000;
+/// Largest number of directions for each Newton iteration that a solve may take, on the way to another equilibrium.
+pub(super) const DIRECTIONS_PER_ITERATION: usize = 20;
 /// The ratio by which the share of softening decreases where the derivative is not positive definite, and by which it grows again.
 const DECREASE: f64 = 0.25;
 const INCREASE: f64 = 2.0;
@@ -78,6 +78,7 @@ impl Descent {
         equations: &mut ContactEquations<'_, D>,
         x: &mut DistributedVector,
         (absolute, relative): (f64, f64),
+        limit: usize,
     ) -> Result<bool> {
         equations.residual(x, &mut self.residual)?;
         let mut norm = self.residual.norm()?;
@@ -91,7 +92,7 @@ impl Descent {
         }
         let tolerance = absolute.max(relative * norm);
         let mut share = 1.0;
-        for _ in 0..MAX_DIRECTIONS {
+        for _ in 0..limit {
             if norm <= tolerance {
                 return Ok(true);
             }

@@ -4,7 +4,7 @@ use super::{
     StepOutcome,
     bounded::Bounded,
     contacts::restore_pressures,
-    descent::Descent,
+    descent::{DIRECTIONS_PER_ITERATION, Descent},
     equations::{CellForces, ContactEquations, Scratch, SolveCounts, cycle_message},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
@@ -245,6 +245,13 @@ impl Newton {
         if !self.has_user_search {
             self.snes.search_along_steps(search != Search::FullSteps)?;
         }
+        // Where pressures depend on the velocity alone, there is no other equilibrium to fall into.
+        let may_fall = self.flow.is_some()
+            || problem
+                .body
+                .contacts
+                .iter()
+                .any(|c| c.law.depends_on_displacement() || c.friction().is_some());
         self.counts.sets.clear();
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = match (&mut self.flow, problem.flow_start) {
@@ -269,7 +276,8 @@ impl Newton {
         let limit = self.settings.max_newton_iterations as usize;
         let descent = self.descent.as_mut().filter(|_| search == Search::Descent);
         let solved = if let Some(descent) = descent {
-            let solved = descent.solve(&mut equations, trial, tolerances);
+            let directions = if may_fall { DIRECTIONS_PER_ITERATION * limit } else { limit };
+            let solved = descent.solve(&mut equations, trial, tolerances, directions);
             equations.set_softening(1.0);
             solved.map(|converged| (!converged).then_some(NO_MINIMUM))
         } else {
