@@ -12,7 +12,8 @@ use crate::{
         effect::{
             Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
             HistoryStore, KINETIC, Load, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, RedistributedMass,
-            STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect, SurfaceForce, Term,
+            STORED_IN_CONTACT, SUPPORT_REACTION, Step, StressError, SupportMotion, SurfaceEffect,
+            SurfaceForce, Term,
         },
         space::{Batch, CellMatrix, Geometry, Held, Needs, Nodal, assemble, facet_points},
         state::State,
@@ -413,17 +414,38 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Visits the batches with the total stress in Pa after a committed step, unless nothing adds to it.
     pub fn visit_stress(&self, state: &State, mut visit: impl FnMut(&Batch<D, S>)) -> Result<()> {
-        let Some(needs) = self.needs(|p| p.stress) else { return Ok(()) };
         let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
+        with_nodal(state, |nodal| self.visit_stress_of(nodal, step, |batch| visit(batch)))
+    }
+
+    fn visit_stress_of(&self, nodal: Nodal<'_>, step: Step, mut visit: impl FnMut(&mut Batch<D, S>)) {
+        let Some(needs) = self.needs(|p| p.stress) else { return };
         let [weakening, called] = [self.called(|p| p.weakens), self.called(|p| p.stress.is_some())];
-        with_nodal(state, |nodal| {
-            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
-                weakening.select(&self.effects).for_each(|effect| effect.weaken(batch));
-                let effects = called.select(&self.effects);
-                effects.for_each(|effect| effect.add_stress(self.evaluation, step, batch));
-                visit(batch);
-            });
-        })
+        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
+            weakening.select(&self.effects).for_each(|effect| effect.weaken(batch));
+            let effects = called.select(&self.effects);
+            effects.for_each(|effect| effect.add_stress(self.evaluation, step, batch));
+            visit(batch);
+        });
+    }
+
+    /// Adds the nodal forces of stress, springs of supports and effects on the surface that a body at rest would have at the displacement
+    /// and with the histories of this state to `forces` (with ghosts).
+    pub fn add_forces_at_rest(&self, state: &State, forces: &mut [f64]) -> Result<()> {
+        let displacement = state.displacement.local()?;
+        let rest = vec![0.0; displacement.len()];
+        let nodal =
+            Nodal { displacement: &displacement, previous_displacement: &displacement, ..Nodal::all(&rest) };
+        let step = Step { time: state.time, ..Step::default() };
+        self.elastic_support.add_start_forces(&displacement, forces);
+        let mut surface = Vec::new();
+        self.surface_effects.iter().for_each(|e| e.write_forces(self.evaluation, step, nodal, &mut surface));
+        for SurfaceForce { node, force, .. } in surface {
+            let sums = &mut forces[node as usize * D..][..D];
+            sums.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+        }
+        self.visit_stress_of(nodal, step, |batch| batch.scatter(&self.mesh, forces));
+        Ok(())
     }
 
     /// The share of each point in the volume of its cell, cell by cell; empty where cells have one point.
@@ -500,7 +522,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(out)
     }
 
-    /// Writes the nodal forces of the loads at `time`: those in the interior act on the nodes that carry the mass of their cells.
+    /// Whether there are loads or reactions that supports have taken over, on all ranks alike.
+    pub fn is_loaded(&self) -> bool {
+        !self.load.is_empty() || self.elastic_support.has_reactions
+    }
+
+    /// Writes the nodal forces of the loads at `time` and the reactions that supports have taken over: those in the interior act on the nodes that carry the mass of their cells.
     /// Collective, also where a rank fails.
     pub fn write_loads(&self, time: f64, forces: &mut DistributedVector) -> Result<()> {
         let moved = self.redistributed_mass.as_ref().filter(|_| self.load.has_body_forces());
@@ -522,6 +549,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
             mass.add_loads(&self.mesh, forces)?;
         }
         forces.add_ghosts_to_owners()?;
+        let mut values = forces.owned_mut()?;
+        values.iter_mut().zip(&self.elastic_support.reactions).for_each(|(sum, force)| *sum += force);
         result
     }
 
@@ -582,12 +611,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
             .iter()
             .flat_map(|effect| all_of(effect.histories()))
             .chain(self.contact_histories(true))
+            .chain(self.elastic_support.reaction_history())
     }
 
     /// Restores the saved values of the history of this name.
     pub fn restore_history(&mut self, name: &str, values: &[f64]) {
         self.visit_histories(&mut |history| history.restore(name, values));
         self.contacts.iter_mut().for_each(|contact| contact.restore_history(name, values));
+        if name == SUPPORT_REACTION {
+            self.elastic_support.reactions = values.to_vec();
+        }
     }
 
     /// Directions other than axes in which supports hold this rank's nodes or resist their motion, each with its node.

@@ -328,7 +328,7 @@ impl<const D: usize> Sums<'_, D> {
         self.add(Source::Support(support as usize), (component / D) as u32, &reaction);
     }
 
-    /// Adds the tractions, and as body forces the rest of the nodal loads at owned nodes.
+    /// Adds the tractions, the reactions that supports have taken over, and as body forces the rest of the nodal loads at owned nodes.
     fn add_loads<const S: usize>(&mut self, body: &Body<D, S>, time: f64, load: &[f64]) -> Result<()> {
         let has_body_forces = body.load.has_body_forces();
         for (at, traction) in body.load.tractions.iter().enumerate() {
@@ -339,6 +339,12 @@ impl<const D: usize> Sums<'_, D> {
                 }
             })?;
         }
+        body.elastic_support.reaction_forces(|support, node, force| {
+            self.add(Source::Support(support), node, &force);
+            if has_body_forces {
+                self.add(Source::BodyForce, node, &force.map(|f| -f));
+            }
+        });
         if has_body_forces {
             for (node, force) in load.chunks_exact(D).enumerate() {
                 self.add(Source::BodyForce, node as u32, &std::array::from_fn(|i| force[i]));

@@ -170,31 +170,12 @@ fn elastic_support<const D: usize, const S: usize>(
     held: &Held<D>,
     materials: &Materials,
 ) -> Result<ElasticSupport<D>> {
-    let mut all = ElasticSupport::default();
-    let resistances = |given: Option<job::Resistance>| {
-        let job::Resistance { normal, tangential } = given.unwrap_or_default();
-        Resistances { normal, tangential }
-    };
+    let mut all = given_resistances(session, &job.support, mesh, held)?;
     for (number, support) in job.support.iter().enumerate() {
-        if support.fix.is_some() {
-            continue;
-        }
-        let facets = part_of(session, mesh, ("support", &support.on), support.part.as_ref())?;
-        let (stiffness, damping) = (resistances(support.stiffness), resistances(support.damping));
-        if support.stiffness.is_some() || support.damping.is_some() {
-            let points = surface_points(session, mesh, &facets)?;
-            all.points.extend(points.into_iter().map(|point| ElasticPoint {
-                support: number,
-                point: held.whole(point),
-                stiffness,
-                damping,
-            }));
-            all.has_stiffness |= support.stiffness.is_some();
-            all.has_damping |= support.damping.is_some();
-        }
         if !support.absorbing {
             continue;
         }
+        let facets = part_of(session, mesh, ("support", &support.on), support.part.as_ref())?;
         all.has_damping = true;
         let table_behind =
             |facet: u32| materials.table_of_cell(mesh, mesh.facet_cells[facet as usize] as usize);
@@ -228,6 +209,37 @@ fn elastic_support<const D: usize, const S: usize>(
     Ok(all)
 }
 
+/// The springs and dashpots whose stiffness and damping supports give. Collective.
+pub(super) fn given_resistances<const D: usize>(
+    session: &Session,
+    supports: &[job::Support],
+    mesh: &Mesh<D>,
+    held: &Held<D>,
+) -> Result<ElasticSupport<D>> {
+    let mut all = ElasticSupport::default();
+    let resistances = |given: Option<job::Resistance>| {
+        let job::Resistance { normal, tangential } = given.unwrap_or_default();
+        Resistances { normal, tangential }
+    };
+    for (number, support) in supports.iter().enumerate() {
+        if support.stiffness.is_none() && support.damping.is_none() {
+            continue;
+        }
+        let facets = part_of(session, mesh, ("support", &support.on), support.part.as_ref())?;
+        let (stiffness, damping) = (resistances(support.stiffness), resistances(support.damping));
+        let points = surface_points(session, mesh, &facets)?;
+        all.points.extend(points.into_iter().map(|point| ElasticPoint {
+            support: number,
+            point: held.whole(point),
+            stiffness,
+            damping,
+        }));
+        all.has_stiffness |= support.stiffness.is_some();
+        all.has_damping |= support.damping.is_some();
+    }
+    Ok(all)
+}
+
 /// The impedances in Pa s/m of pressure and shear waves: density times the speed of the waves; none without density or elasticity.
 fn impedances<const S: usize>(material: &Material<f64>) -> Option<[f64; 2]> {
     let (density, law) = (material.density?, material.elasticity?.tensor(Hypothesis::of(S)));
@@ -236,7 +248,7 @@ fn impedances<const S: usize>(material: &Material<f64>) -> Option<[f64; 2]> {
 }
 
 /// The facets of the boundaries of a table on this rank at whose centre the expression is not 0. Collective.
-fn part_of<const D: usize>(
+pub(super) fn part_of<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     (table, on): (&str, &[String]),

@@ -14,6 +14,7 @@ mod memory;
 mod obstacles;
 mod outputs;
 mod phases;
+mod reactions;
 mod restored;
 mod scene;
 mod setup;

@@ -1,9 +1,9 @@
 //! The checkpoint that a restarted run continues from.
 
-use super::Start;
+use super::{Start, reactions::take_over};
 use crate::{
     error::{Error, Exit, Result},
-    fem::{body::Body, state::State},
+    fem::{body::Body, effect::SUPPORT_REACTION, state::State},
     io::output::{
         checkpoint::{self, Identity},
         checkpoint_folder::{checkpoint_path, list},
@@ -74,6 +74,8 @@ pub(super) struct StartState {
     pub digest: String,
     /// The line of the log about it.
     pub words: String,
+    /// The warning about its balance.
+    pub warning: Option<String>,
 }
 
 /// Reads the state that a job starts from, if it names one, into body and state. Components that supports
@@ -106,7 +108,15 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         from.to_owned()
     };
     let physics = session.agree(loaded.job.physics())?;
-    let found = checkpoint::transfer(session, &file, &physics, body, state)?;
+    // Elastic supports keep the reactions that they have taken over before.
+    let [can_react] = session.largest([f64::from(u8::from(!body.elastic_support.points.is_empty()))]);
+    if can_react > 0.0 {
+        body.elastic_support.has_reactions = true;
+        body.elastic_support.reactions = vec![0.0; body.mesh.owned * D];
+    }
+    let mut found = checkpoint::transfer(session, &file, &physics, body, state)?;
+    found.at_rest.retain(|name| name != SUPPORT_REACTION);
+    let handover = take_over(session, &found.physics, body, state)?;
     for field in [&mut state.velocity, &mut state.previous_velocity] {
         body.held.clear(&mut field.owned_mut()?);
         field.update_ghosts()?;
@@ -122,7 +132,8 @@ pub(super) fn transfer<const D: usize, const S: usize>(
             words += &format!("; {what}: {}", names.join(", "));
         }
     }
-    Ok(Some(StartState { digest: found.digest, words }))
+    words += &handover.words();
+    Ok(Some(StartState { digest: found.digest, words, warning: handover.warning() }))
 }
 
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.

@@ -53,6 +53,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     refuse_free_bodies(session, &body, loaded)?;
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;
     warnings.extend(bonds::warnings(session, job, &body));
+    warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };
     let scheme = Stepper::new(session, &mut body, &state, settings);

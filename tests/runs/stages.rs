@@ -272,3 +272,169 @@ fn fields_profiles_and_checkpoints_come_at_the_times_listed() {
     let refused = late.run_with(1, &[]).expect(2);
     refused.says("in ascending order").says("after the end of the run");
 }
+
+/// Ground that settles under its weight between sides held by `sides`, in so long steps that it comes to rest.
+fn settled(mesh: &str, sides: &str) -> Case {
+    Case::of("indented_block")
+        .without("contact")
+        .set("mesh", mesh)
+        .set(
+            "material",
+            "{ hypothesis = 'plane_strain', density = 2e3, elasticity = { youngs_modulus = 5e7, poisson_ratio = 0.25 }, \
+             viscosity = { volumetric = 1e6, shear = 1e6 } }",
+        )
+        .set("support", &format!("[{{ on = ['bottom'], fix = 'all' }}, {{ on = ['left', 'right'], {sides} }}]"))
+        .set("gravity", "{ acceleration = [0, -9.0] }")
+        .set("time", "{ end = 30.0, step = 1.0, scheme = 'implicit_euler' }")
+        .set("output", "{ folder = 'out', probe = [{ name = 'side', point = [5.0, 1.0] }, { name = 'edge', point = [5.0, 2.0] }] }")
+        .set("checkpoint.every", "1000")
+}
+
+const GROUND: &str = "{ rectangle = { size = [5.0, 2.0], cells = [5, 4] } }";
+const QUADRATIC_GROUND: &str = "{ rectangle = { size = [5.0, 2.0], cells = [5, 2] }, order = 2 }";
+
+/// A stage after `first` with these sides.
+fn released(first: &Case, sides: &str, scheme: &str) -> Case {
+    settled(GROUND, sides)
+        .set("time", &format!("{{ end = 0.2, step = 0.01, scheme = '{scheme}' }}"))
+        .set("initial.from", &format!("{:?}", out(first)))
+}
+
+/// The largest difference of the displacements of the probes between the ends of two runs.
+fn moved(one: &Case, other: &Case) -> f64 {
+    let [one, other] = [one, other].map(|case| last(&case.results()));
+    assert_eq!(one.len(), other.len());
+    let differences = one[..4].iter().zip(&other[..4]).map(|(one, other)| (one - other).abs());
+    // Not a number if one is.
+    differences.fold(0.0, |most, next| if next <= most { most } else { next })
+}
+
+/// The components of the force of the sides at the last step.
+fn force_of_sides(case: &Case) -> Vec<f64> {
+    let table = case.results().table("resultants.csv");
+    let last = table.words("time").last().expect("a row").to_string();
+    let rows = table.only("time", &last).only("source", "support left+right");
+    assert_eq!(rows.rows.len(), 1);
+    ["force_x", "force_y"].iter().flat_map(|column| rows.numbers(column)).collect()
+}
+
+const SETTLEMENT: f64 = 6e-4;
+
+#[test]
+fn ground_at_rest_stays_at_rest_when_its_sides_give_way() {
+    let held = "fix = ['x']";
+    let first = settled(GROUND, held).run_and_keep(2);
+    let edge = last(&first.results());
+    assert!(edge[3] < -SETTLEMENT && edge[3] > -2.0 * SETTLEMENT, "{edge:?}");
+    for (sides, scheme, ranks) in [
+        ("absorbing = true", "implicit_euler", 1),
+        ("absorbing = true", "bdf2", 2),
+        ("stiffness = { normal = 1e7, tangential = 1e6 }", "implicit_euler", 3),
+        ("damping = { normal = 1e6 }", "lagged_euler", 1),
+        ("absorbing = true", "midpoint", 2),
+    ] {
+        let mut second = released(&first, sides, scheme);
+        if scheme == "lagged_euler" {
+            second = second.set("time.step", "1e-4").set("time.end", "0.01");
+        }
+        second.run_with(ranks, &[]).expect(0).says("take over reactions");
+        let way = moved(&first, &second);
+        // The springs have counted from the displacement along the sides that there was.
+        assert!(way < 1e-8 * SETTLEMENT, "{sides}, {scheme}: {way:e} m");
+        let history = second.results().table("history.csv");
+        let work =
+            history.numbers("external_work").into_iter().fold(0.0, |most: f64, work| most.max(work.abs()));
+        assert!(work < 1e-3, "{scheme}: {work:e} J");
+    }
+    // Without any replacement the ground flows, and the solver says so.
+    let free = released(&first, "fix = ['y']", "implicit_euler")
+        .set("support", "[{ on = ['bottom'], fix = 'all' }]");
+    free.run_with(2, &[]).expect(0).says("out of balance").says("% of the loads");
+    assert!(moved(&first, &free) > 1e-2 * SETTLEMENT);
+}
+
+#[test]
+fn reactions_that_were_taken_over_outlast_restarts_and_stages() {
+    let first = settled(QUADRATIC_GROUND, "where = 'x > 1', fix = 'all'").run_and_keep(1);
+    // The way to a new balance does work against the reaction.
+    let second = released(&first, "where = 'x > 1', stiffness = { normal = 3e6, tangential = 2e6 }", "bdf2")
+        .set("mesh", QUADRATIC_GROUND)
+        .set("traction", "[{ on = ['top'], value = [0, '-2e4*min(t/0.1, 1)'] }]");
+    second.run_with(2, &[]).expect(0);
+    let [expected, force] = [last(&second.results()), force_of_sides(&second)];
+    assert!(moved(&first, &second) > 1e-2 * SETTLEMENT);
+    let balance = second.results().number("max_energy_imbalance");
+    assert!(balance.abs() < 1e-6, "{balance:e}");
+    let stopped = second.set("checkpoint.every", "5");
+    stopped.run_with(1, &["--force", "--set", "time.end=0.1"]).expect(0);
+    stopped.run_with(3, &["--restart"]).expect(0).says("continuing from");
+    let difference = relative_difference(&expected, &last(&stopped.results()));
+    assert!(difference < 1e-8, "{difference:e}");
+    let difference = relative_difference(&force, &force_of_sides(&stopped));
+    assert!(difference < 1e-8, "{difference:e}");
+    // A third stage keeps the reaction while the body moves.
+    let straight = stopped.set("time.end", "0.3");
+    straight.run_with(1, &["--force"]).expect(0);
+    let expected = last(&straight.results());
+    let straight = straight.set("time.end", "0.2");
+    straight.run_with(2, &["--force"]).expect(0);
+    let third =
+        released(&straight, "where = 'x > 1', stiffness = { normal = 3e6, tangential = 2e6 }", "bdf2")
+            .set("mesh", QUADRATIC_GROUND)
+            .set("time.end", "0.1")
+            .set("traction", "[{ on = ['top'], value = [0, -2e4] }]");
+    let force = force_of_sides(&straight);
+    assert!(force[0].abs() > 1.0 && force[1].abs() > 1.0, "{force:?}");
+    third.run_with(1, &[]).expect(0).says("take over reactions");
+    let difference = relative_difference(&expected, &last(&third.results()));
+    assert!(difference < 1e-2, "{difference:e}");
+}
+
+#[test]
+fn sides_that_give_way_beside_a_contact_take_over_no_force_of_the_contact() {
+    for friction in ["", ", friction.coulomb.coefficient = 0.4"] {
+        let ground = |case: Case, sides: &str| {
+            case.set("support", &format!("[{{ on = ['left'], fix = ['x'] }}, {{ on = ['right'], {sides} }}]"))
+                .set("contact", &format!("[{{ on = ['bottom'], normal.unilateral = {{}}, obstacle.plane = {{ point = [0, 0], normal = [0, 1] }}{friction} }}]"))
+        };
+        let first = ground(settled(GROUND, "fix = ['x']"), "fix = ['x']").run_and_keep(1);
+        let second = ground(released(&first, "fix = ['x']", "implicit_euler"), "absorbing = true");
+        second.run_with(2, &[]).expect(0).says("take over reactions");
+        let way = moved(&first, &second);
+        assert!(way < 1e-7 * SETTLEMENT, "{friction}: {way:e} m");
+        // Without the contact the bottom is free.
+        let lost = released(&first, "fix = ['x']", "implicit_euler")
+            .set("support", "[{ on = ['left', 'right'], fix = 'all' }]");
+        lost.run_with(2, &[]).expect(0).says("out of balance");
+    }
+}
+
+#[test]
+fn a_column_at_rest_in_space_stays_at_rest_when_its_sides_give_way() {
+    let column = |sides: &str| {
+        Case::cube(3)
+            .without("contact")
+            .without("traction")
+            .without("material.viscoplasticity")
+            .set("mesh.order", "2")
+            .set(
+                "output.probe",
+                "[{ name = 'side', point = [1, 0.5, 0.5] }, { name = 'edge', point = [1, 1, 1] }]",
+            )
+            .set(
+                "support",
+                &format!("[{{ on = ['bottom'], fix = 'all' }}, {{ on = ['left', 'right'], {sides} }}]"),
+            )
+            .set("gravity", "{ acceleration = [0, 0, -9.0] }")
+            .set("checkpoint.every", "1000")
+    };
+    let first = column("fix = 'normal'")
+        .set("time", "{ end = 400.0, step = 10.0, scheme = 'implicit_euler' }")
+        .run_and_keep(2);
+    let second = column("stiffness = { normal = 200.0 }, absorbing = true")
+        .set("time", "{ end = 2.0, step = 0.1, scheme = 'bdf2' }")
+        .set("initial.from", &format!("{:?}", out(&first)));
+    second.run_with(1, &[]).expect(0).says("take over reactions");
+    let way = moved(&first, &second);
+    assert!(way < 1e-8 * 4e-3, "{way:e} m");
+}

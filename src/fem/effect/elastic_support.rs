@@ -1,11 +1,11 @@
 //! Supports that give way: springs and dashpots at the nodes of boundaries.
 
-use super::{ELASTIC, Energy, Evaluation, Form, NUMERICAL, Step, StressError, VISCOUS};
+use super::{ELASTIC, Energy, Evaluation, Form, History, NUMERICAL, Step, StressError, VISCOUS};
 use crate::{
     fem::space::{Held, Nodal, SurfacePoint},
     linear_algebra::{
         petsc::BlockRows,
-        tensor::{Vector, add_scaled, dot, norm},
+        tensor::{Vector, add_scaled, dot, larger, norm},
     },
     mesh::Mesh,
 };
@@ -47,7 +47,14 @@ pub struct ElasticSupport<const D: usize> {
     pub has_stiffness: bool,
     /// Whether there are dashpots on any rank.
     pub has_damping: bool,
+    /// The reactions of an earlier stage that it has taken over, constant forces in N with `D` components for each owned node; empty: none.
+    pub reactions: Vec<f64>,
+    /// Whether there are such reactions on any rank.
+    pub has_reactions: bool,
 }
+
+/// The history of nodes that holds [`ElasticSupport::reactions`].
+pub const SUPPORT_REACTION: &str = "support_reaction";
 
 impl Resistances {
     /// The product with a vector at a point with this normal.
@@ -155,6 +162,34 @@ impl<const D: usize> ElasticSupport<D> {
         }
     }
 
+    /// Visits the reactions that it has taken over, with the position of their support and their node. At nodes of several supports each
+    /// has a part of a component in proportion to its area across that axis.
+    pub fn reaction_forces(&self, mut visit: impl FnMut(usize, u32, Vector<D>)) {
+        if self.reactions.is_empty() {
+            return;
+        }
+        let mut areas = vec![[0.0; D]; self.reactions.len() / D];
+        // The least share keeps forces along a flat boundary.
+        let area =
+            |at: &ElasticPoint<D>| at.point.normal.map(|n| at.point.weight * larger(n.abs(), ROUNDING));
+        for at in &self.points {
+            let sum = &mut areas[at.point.node as usize];
+            *sum = add_scaled(sum, 1.0, &area(at));
+        }
+        for at in &self.points {
+            let (own, all) = (area(at), areas[at.point.node as usize]);
+            let reaction = at.point.value(&self.reactions);
+            visit(at.support, at.point.node, std::array::from_fn(|i| reaction[i] * own[i] / all[i]));
+        }
+    }
+
+    /// The reactions as a history of nodes.
+    pub fn reaction_history(&self) -> Option<History<'_>> {
+        let values = &self.reactions;
+        let (name, bytes) = (SUPPORT_REACTION, size_of_val(&values[..]));
+        self.has_reactions.then(|| History { name, width: D, points: 1, values: values.into(), bytes })
+    }
+
     /// Adds its energies after the commit.
     ///
     /// With the force `-S u_{n-1}` its work is `-k v_n . S u_{n-1} = -d(1/2 u . S u) + 1/2 k^2 v_n . S v_n`.
@@ -229,6 +264,7 @@ mod tests {
             points: vec![ElasticPoint { support: 0, point, stiffness, damping }],
             has_stiffness: true,
             has_damping: true,
+            ..ElasticSupport::default()
         }
     }
 

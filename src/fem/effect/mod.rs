@@ -54,7 +54,7 @@ pub use contact::{
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};
-pub use elastic_support::{ElasticPoint, ElasticSupport, Resistances};
+pub use elastic_support::{ElasticPoint, ElasticSupport, Resistances, SUPPORT_REACTION};
 pub use elasticity::{ELASTIC, Elasticity};
 pub use energy::{Energy, EnergyKind, NUMERICAL, Role};
 pub use history::{History, HistoryStore};

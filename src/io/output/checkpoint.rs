@@ -251,6 +251,8 @@ pub struct Transferred {
     pub dropped: Vec<String>,
     /// Histories and motions of obstacles of this job that the checkpoint does not have.
     pub at_rest: Vec<String>,
+    /// The keys of that run's job that affect the results, with their values.
+    pub physics: BTreeMap<String, String>,
 }
 
 /// Reads the last state of another run on the same mesh into `body` and `state` as a state at time 0, given the keys of this job that
@@ -312,8 +314,10 @@ pub fn transfer<const D: usize, const S: usize>(
         dropped.push("initial stress of materials without viscoplasticity".into());
     }
     let digest = session.agree(state_digest(path))?;
-    let mut found = Transferred { digest, step: header.step, time: header.time, dropped, at_rest };
+    let (step, time) = (header.step, header.time);
+    let mut found = Transferred { digest, step, time, dropped, at_rest, physics: BTreeMap::new() };
     transfer_motions(&header, physics, body, &mut found);
+    found.physics = header.physics;
     Ok(found)
 }
 

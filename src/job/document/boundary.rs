@@ -154,7 +154,8 @@ pub struct Initial {
     /// The last state of another run, from which this one starts at time 0: a checkpoint, or an output folder for its newest
     /// checkpoint. The mesh must be the same; loads, supports, contacts, laws and scheme may differ. Histories that this job does
     /// not have are dropped, those that only this job has start from their initial values; the log names both. Components held by
-    /// supports keep the saved displacement. Obstacles moved by forces continue their motion if the boundaries of the
+    /// supports keep the saved displacement; supports with `stiffness`, `damping` or `absorbing` take over the reactions of those that
+    /// they replace, as constant forces. Obstacles moved by forces continue their motion if the boundaries of the
     /// contact, its `where` and the direction of the motion are the same. A prescribed initial stress is not part of the state:
     /// repeat `stress`. Not together with `displacement` and `velocity`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

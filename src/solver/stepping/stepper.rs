@@ -122,7 +122,7 @@ impl Stepper {
             integrator: Integrator::new(scheme, state)?,
             stages: Stages::register()?,
             solver: StepSolver::new(session, body, state, settings, steps)?,
-            load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
+            load: if body.is_loaded() { Some(state.velocity.like()?) } else { None },
             load_is_current: false,
             powers: Energy::default(),
             right_hand_side: state.velocity.like()?,

@@ -1,0 +1,250 @@
+//! The reactions that elastic supports of a stage take over from supports of the stage before.
+
+use super::build::{given_resistances, part_of};
+use crate::{
+    error::{Error, Result},
+    fem::{
+        body::Body,
+        effect::Supports,
+        space::{SurfacePoint, surface_points},
+        state::State,
+    },
+    job::Support,
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{Vector, add_scaled, dot, norm},
+    },
+    parallel::session::Session,
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Released forces, as a share of the loads, above which a warning is given.
+const OUT_OF_BALANCE: f64 = 1e-3;
+
+/// What became of the forces of supports and contacts of the stage before, in N: sums of magnitudes over the nodes.
+pub(super) struct Handover {
+    /// Taken over.
+    taken: f64,
+    /// Of supports and contacts that nothing replaces.
+    released: f64,
+    /// Of all loads at the start.
+    loads: f64,
+}
+
+impl Handover {
+    /// The end of a line of the log.
+    pub(super) fn words(&self) -> String {
+        if self.taken == 0.0 {
+            return String::new();
+        }
+        format!("; supports take over reactions of {:.4e} N", self.taken)
+    }
+
+    /// A warning if the start state is out of balance.
+    pub(super) fn warning(&self) -> Option<String> {
+        let Self { released, loads, .. } = *self;
+        let share = released / loads;
+        let is_balanced = released == 0.0 || share <= OUT_OF_BALANCE;
+        let of_loads = if loads > 0.0 {
+            format!(", {:.1} % of the loads at its start", 100.0 * share)
+        } else {
+            String::new()
+        };
+        (!is_balanced).then(|| {
+            format!(
+                "initial.from: the start state is out of balance: the job has none of the supports or contacts that exerted nodal forces of \
+                 {released:.3e} N in total{of_loads}, and the body will move; keep them, replace supports by ones with `stiffness`, \
+                 `damping` or `absorbing`, which take over the reaction, or apply the forces as tractions"
+            )
+        })
+    }
+}
+
+/// Lets elastic supports take over the forces at the start state of what the job with the keys `earlier` had in their place: the
+/// reaction of what it held, the forces of its springs beyond those of the own ones, and reactions that it had taken over itself. `body`
+/// has the latter. Collective.
+pub(super) fn take_over<const D: usize, const S: usize>(
+    session: &Session,
+    earlier: &BTreeMap<String, String>,
+    body: &mut Body<D, S>,
+    state: &State,
+) -> Result<Handover> {
+    let carried = std::mem::take(&mut body.elastic_support.reactions);
+    body.elastic_support.has_reactions = false;
+    let [supports, contacts] =
+        ["support", "contact"].map(|table| session.agree(boundaries_of(earlier, table)));
+    let (supports, contacts) = (supports?, contacts?);
+    let before = Supports::new(session, &body.mesh, &supports, &state.velocity);
+    let before = session.agree(before)?.held;
+    let springs = session.agree(given_resistances(session, &supports, &body.mesh, &before))?;
+    let lost = lost_contact(session, &contacts, body)?;
+    let residual = residual(session, body, state)?;
+    let mut loads = session.agree(state.velocity.like())?;
+    session.agree(body.write_loads(0.0, &mut loads))?;
+    let (residual, loads) = (session.agree(residual.owned())?, session.agree(loads.owned())?);
+
+    let displacement = session.agree(state.displacement.local())?;
+    let mut change = vec![0.0; displacement.len()];
+    springs.add_start_forces(&displacement, &mut change);
+    change.iter_mut().for_each(|force| *force = -*force);
+    body.elastic_support.add_start_forces(&displacement, &mut change);
+
+    let gives_way: BTreeSet<u32> = body.elastic_support.points.iter().map(|at| at.point.node).collect();
+    let held = &body.held;
+    let mut reactions = vec![0.0; body.mesh.owned * D];
+    let (mut taken, mut released, mut is_changed) = (0.0, 0.0, false);
+    for (node, reaction) in reactions.chunks_exact_mut(D).enumerate() {
+        let at = |values: &[f64]| -> Vector<D> { std::array::from_fn(|i| values[node * D + i]) };
+        let free = held.free_part(node, &at(&residual));
+        let is_lost = lost.contains(&(node as u32));
+        let held_before =
+            if is_lost { free } else { add_scaled(&free, -1.0, &before.free_part(node, &free)) };
+        let mut force = held.free_part(node, &held_before).map(|x| -x);
+        if !is_lost {
+            let springs = before.free_part(node, &at(&change));
+            force = add_scaled(&force, -1.0, &held.free_part(node, &springs));
+        }
+        if !carried.is_empty() {
+            force = add_scaled(&force, 1.0, &held.free_part(node, &at(&carried)));
+        }
+        if gives_way.contains(&(node as u32)) {
+            is_changed |= is_lost || before.free_count(node) < held.free_count(node) || norm(&force) > 0.0;
+            reaction.copy_from_slice(&force);
+            taken += norm(&force);
+        } else {
+            released += norm(&force);
+        }
+    }
+    let size = loads.chunks_exact(D).map(|load| load.iter().map(|x| x * x).sum::<f64>().sqrt()).sum::<f64>();
+    let [taken, released, loads] = session.sum([taken, released, size]);
+    if session.total(usize::from(is_changed)) > 0 {
+        body.elastic_support.reactions = reactions;
+        body.elastic_support.has_reactions = true;
+    }
+    Ok(Handover { taken, released, loads })
+}
+
+/// The nodal forces at the start state on owned nodes, zero in directions that are free in a balance without motion. Collective.
+fn residual<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<DistributedVector> {
+    let mut forces = session.agree(state.velocity.like())?;
+    let add = |forces: &mut DistributedVector| {
+        let mut values = forces.local_mut()?;
+        values.fill(0.0);
+        body.add_forces_at_rest(state, &mut values)?;
+        let rest = vec![0.0; values.len()];
+        for contact in body.contacts.iter().filter(|contact| contact.needs_ghosts()) {
+            contact.forces(&rest, |node, force| {
+                let sums = &mut values[node as usize * D..][..D];
+                sums.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+            });
+        }
+        Ok::<_, Error>(())
+    };
+    session.agree(add(&mut forces))?;
+    session.agree(forces.add_ghosts_to_owners())?;
+    let mut loads = session.agree(state.velocity.like())?;
+    session.agree(body.write_loads(0.0, &mut loads))?;
+    session.agree(forces.add_scaled(1.0, &loads))?;
+    let mut of_node: BTreeMap<u32, Vec<SurfacePoint<D>>> = BTreeMap::new();
+    for contact in body.contacts.iter().filter(|contact| !contact.needs_ghosts()) {
+        for point in session.agree(surface_points(session, &body.mesh, contact.facets()))? {
+            of_node.entry(point.node).or_default().push(body.held.whole(point));
+        }
+    }
+    let add_tractions = |forces: &mut DistributedVector| {
+        let Some(traction) = &state.contact_traction else { return Ok(()) };
+        let (traction, mut values) = (traction.owned()?, forces.owned_mut()?);
+        for points in of_node.values() {
+            for point in points {
+                // On an edge each face has the part of the sum along its normal.
+                let sum = point.value(&traction);
+                let along = dot(&sum, &point.normal);
+                let own = if points.len() == 1 { sum } else { point.normal.map(|n| n * along) };
+                point.add(-point.weight, &own, &mut values);
+            }
+        }
+        Ok::<_, Error>(())
+    };
+    session.agree(add_tractions(&mut forces))?;
+    Ok(forces)
+}
+
+/// The owned nodes of contacts of the stage before where this body has no contact. Collective.
+fn lost_contact<const D: usize, const S: usize>(
+    session: &Session,
+    contacts: &[Support],
+    body: &Body<D, S>,
+) -> Result<BTreeSet<u32>> {
+    let nodes_of = |facets: &[u32]| -> Result<BTreeSet<u32>> {
+        let points = session.agree(surface_points(session, &body.mesh, facets))?;
+        Ok(points.into_iter().map(|point: SurfacePoint<D>| point.node).collect())
+    };
+    let mut nodes = BTreeSet::new();
+    for contact in contacts {
+        let facets = part_of(session, &body.mesh, ("contact", &contact.on), contact.part.as_ref())?;
+        nodes.extend(nodes_of(&facets)?);
+    }
+    for contact in &body.contacts {
+        for node in nodes_of(contact.facets())? {
+            nodes.remove(&node);
+        }
+    }
+    Ok(nodes)
+}
+
+/// The boundaries of the tables of this name in a job with these keys, with what supports hold and their springs.
+fn boundaries_of(keys: &BTreeMap<String, String>, table: &str) -> Result<Vec<Support>> {
+    let has_table = |number: &usize| keys.contains_key(&format!("{table}.{number}.on"));
+    let read = |number: usize| {
+        let kept = ["on", "where", "fix", "stiffness.normal", "stiffness.tangential"];
+        let line = |key: &str| Some(format!("{key} = {}\n", keys.get(&format!("{table}.{number}.{key}"))?));
+        let text: String = kept.into_iter().filter_map(line).collect();
+        toml::from_str(&text).map_err(|error| {
+            Error::Refused(format!(
+                "initial.from: {table}.{number} of the job that wrote the state can't be read ({error}); write the state again with \
+                 this version"
+            ))
+        })
+    };
+    (0..).take_while(has_table).map(read).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{Fix, FixedDirections};
+
+    #[test]
+    fn supports_of_another_job_are_read_from_its_keys() {
+        let keys = [
+            ("support.0.on", r#"["left", "right"]"#),
+            ("support.0.fix", r#""normal""#),
+            ("support.0.displacement.0.table", r#""motion.csv""#),
+            ("support.1.on", r#"["top"]"#),
+            ("support.1.where", r#""x < 1""#),
+            ("support.1.stiffness.normal", "2e6"),
+            ("support.1.stiffness.tangential", "0.0"),
+            ("traction.0.on", r#"["bottom"]"#),
+        ];
+        let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+        let found = boundaries_of(&keys, "support").expect("supports");
+        assert_eq!(found.len(), 2);
+        assert_eq!(found[0].on, ["left", "right"]);
+        assert_eq!(found[0].fix, Some(Fix::Keyword(FixedDirections::Normal)));
+        assert!(found[1].part.is_some());
+        assert_eq!(found[1].stiffness.map(|s| [s.normal, s.tangential]), Some([2e6, 0.0]));
+        assert!(boundaries_of(&keys, "contact").expect("none").is_empty());
+    }
+
+    #[test]
+    fn released_forces_are_compared_with_the_loads() {
+        let of = |released, loads| Handover { taken: 0.0, released, loads }.warning();
+        assert!(of(0.0, 0.0).is_none() && of(1e-4, 1.0).is_none());
+        assert!(of(0.05, 1.0).is_some_and(|words| words.contains("5.0 % of the loads")));
+        assert!(of(1.0, 0.0).is_some() && of(f64::NAN, 1.0).is_some());
+    }
+}
