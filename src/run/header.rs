@@ -4,10 +4,9 @@ use super::{Summary, setup::Setup, step_line::Short, steps};
 use crate::{
     error::Result,
     io::output::{field_list::FIELDS, log::Log, output_field::Figures},
-    job::{Loaded, Method},
+    job::{Job, Loaded, Method},
     parallel::session::Session,
 };
-use std::path::Path;
 
 /// Versions, title, mesh, partition, effects, solver and output folder, one line each. Collective.
 pub(super) fn lines<const D: usize, const S: usize>(
@@ -68,7 +67,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &
 }
 
 /// Logs status, totals and times of a finished run.
-pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
+pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
     if let Some(error) = &summary.error {
         log.line(format!("error: {error}"));
     }
@@ -81,6 +80,12 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
         _ => format!("inclusion residual at most {:.1e}, ", summary.max_inclusion_residual),
     };
     log.line(format!("checks     {inclusion}energy imbalance at most {:.1e}", summary.max_energy_imbalance));
+    if summary.max_residual > job.solver.tolerance {
+        log.line(format!(
+            "residual   at most {:.1e} of the forces: rounding errors exceed the tolerance {:.0e}",
+            summary.max_residual, job.solver.tolerance
+        ));
+    }
     log.line(format!(
         "stress     von Mises at most {} Pa, at the end {} Pa",
         Short(summary.peaks.von_mises),
@@ -106,5 +111,5 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
         seconds.join(", "),
         summary.peak_memory_bytes as f64 / 1e6
     ));
-    log.line(format!("files      {}", folder.display()));
+    log.line(format!("files      {}", job.output_folder().display()));
 }

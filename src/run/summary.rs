@@ -74,6 +74,8 @@ pub struct Summary {
     pub of_fields: BTreeMap<&'static str, f64>,
     /// Largest scaled distance to a contact graph in any step.
     pub max_inclusion_residual: f64,
+    /// Largest residual of the equations of any step over its forces: at most `[solver] tolerance`, unless rounding errors are larger.
+    pub max_residual: f64,
     /// Largest imbalance of energy in any step over the energy turned over.
     pub max_energy_imbalance: f64,
     /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds; to be compared with

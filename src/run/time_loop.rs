@@ -363,7 +363,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             summary.range_warnings().for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
             self.session.on_first(|| {
-                header::closing(&mut self.log, &summary, self.job.output_folder());
+                header::closing(&mut self.log, &summary, self.job);
                 summary.write(self.job.output_folder())
             })
         });
@@ -419,6 +419,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             peaks: totals.peaks,
             of_fields,
             max_inclusion_residual: totals.max_inclusion_residual,
+            max_residual: totals.max_residual,
             max_energy_imbalance: totals.max_energy_imbalance,
             max_slip_pressure: totals.max_slip_pressure,
             guesses: (totals.guessed_steps > 0).then_some(Guesses {

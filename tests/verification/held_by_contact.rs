@@ -140,6 +140,52 @@ pub fn nearly_free(session: &Session) {
     }
 }
 
+/// A stiff block on soft springs under a pressure that varies along it: rounding errors of its internal forces exceed the tolerance by
+/// orders of magnitude, and it sinks in as a rigid body, at each point by the pressure over the stiffness.
+pub fn on_soft_springs(session: &Session) {
+    let mesh = rectangle([1.5, 0.25], [48, 4], Diagonal::Left, [1.0, 1.0]).expect("mesh");
+    let springs = [
+        "[[contact]]\non = [\"bottom\"]\nnormal.compliance = { stiffness = 2000 }\n",
+        "[[support]]\non = [\"bottom\"]\nstiffness = { normal = 2000 }\n",
+    ];
+    for (springs, preconditioner) in springs.into_iter().flat_map(|s| ["cholesky", "gamg"].map(|p| (s, p))) {
+        for (modulus, is_reached) in [(3e11, false), (3e5, true)] {
+            let what = format!("{springs}{preconditioner}, {modulus:e} Pa");
+            let text = format!(
+                "{}[material]\nhypothesis = \"plane_strain\"\n\
+                 elasticity = {{ youngs_modulus = {modulus:e}, poisson_ratio = 0.25 }}\n\
+                 [[support]]\non = [\"left\"]\nwhere = \"y < 1e-6\"\nfix = [\"x\"]\n\
+                 [[traction]]\non = [\"top\"]\npressure = \"8*(1 + 0.6*(x - 0.75))\"\n{springs}\
+                 [time]\nscheme = \"implicit_euler\"\nend = 1\nstep = 0.25\n\
+                 [solver]\npreconditioner = \"{preconditioner}\"\n",
+                any_mesh::<2>()
+            );
+            let mut run = simulation::<2, 4>(session, &text, &mesh);
+            while let Some(outcome) = run.advance(session).unwrap_or_else(|e| panic!("{what}: {e}")) {
+                assert!(is_reached || outcome.newton_iterations <= 20, "{what}: {outcome:?}");
+            }
+            assert_eq!(run.state.step, 4);
+            let displacement = run.state.displacement.owned().expect("values");
+            for (place, found) in run.body.mesh.nodes.iter().zip(displacement.chunks_exact(2)) {
+                // Springs at the nodes resist a rotation more than those along the boundary.
+                let rotation = 0.6 / (1.0 + 2.0 / (48.0 * 48.0));
+                let expected = -8.0 * (1.0 + rotation * (place[0] - 0.75)) / 2000.0;
+                // The softer block bends a little.
+                let enough = if is_reached { 1e-2 } else { 1e-6 };
+                let error = (found[1] / expected - 1.0).abs();
+                assert!(error < enough, "{what}: {} m at {place:?}, not {expected}", found[1]);
+            }
+            let residual = run.totals.max_residual;
+            assert!(residual <= if is_reached { 1e-6 } else { 1e-4 }, "{what}: residual {residual:e}");
+        }
+    }
+}
+
+#[test]
+fn a_stiff_block_sinks_into_soft_springs_as_far_as_rounding_errors_permit() {
+    run_on(&[1, 2], "soft_springs");
+}
+
 #[test]
 fn contact_and_friction_alone_hold_a_quasistatic_block_up_to_coulombs_limit() {
     run_on(&[1, 2, 3], "held_by_contact");

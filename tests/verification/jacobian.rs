@@ -15,7 +15,7 @@ use clarke::{
     linear_algebra::petsc::{Matrix, NonlinearProblem, ProjectedKsp},
     mesh::GlobalMesh,
     parallel::session::Session,
-    solver::stepping::{ContactEquations, Scratch, SolveCounts},
+    solver::stepping::{ContactEquations, Floor, Scratch, SolveCounts},
 };
 
 fn laws() -> Vec<NormalResponse> {
@@ -148,6 +148,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 cells: None,
                 contacts: &mut contacts,
                 right_hand_side: &load,
+                floor: Floor::default(),
                 scratch: &mut scratch,
                 linear_solver: &mut linear_solver,
                 session,

@@ -101,6 +101,7 @@ fn scenario() {
         "adhesion" => adhesion::all(&session),
         "one_cell" => one_cell::all(&session),
         "held_by_contact" => held_by_contact::blocks(&session),
+        "soft_springs" => held_by_contact::on_soft_springs(&session),
         "nearly_free" => held_by_contact::nearly_free(&session),
         "at_rest" => inclusion::at_rest(&session),
         "judged" => inclusion::judged(&session),

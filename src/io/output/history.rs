@@ -102,6 +102,8 @@ pub struct Totals {
     pub max_energy_imbalance: f64,
     /// Largest inclusion residual of any step.
     pub max_inclusion_residual: f64,
+    /// Largest residual of the equations of any step as a share of its forces.
+    pub max_residual: f64,
     /// Powers at the end of the last step.
     #[serde(with = "by_column")]
     pub powers: Energy,
@@ -166,6 +168,7 @@ impl Totals {
         self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
         self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
         self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
+        self.max_residual = larger(self.max_residual, outcome.residual);
         self.powers = outcome.powers;
         self.peaks.von_mises = larger(self.peaks.von_mises, outcome.peaks.von_mises);
         self.peaks.strain = larger(self.peaks.strain, outcome.peaks.strain);
@@ -184,6 +187,7 @@ impl Totals {
             self.turnover,
             self.max_energy_imbalance,
             self.max_inclusion_residual,
+            self.max_residual,
             self.peaks.von_mises,
             self.peaks.strain,
         ];

@@ -59,7 +59,8 @@ fn adaptive_tolerance() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
-    /// Norm of the residual at which Newton's method has converged, relative to the norm of the forces.
+    /// Norm of the residual at which Newton's method has converged, relative to the norm of the forces. Where rounding errors of the
+    /// forces are larger, a step ends there; `max_residual` in `summary.json` is what was reached.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
     /// Largest accepted distance of normal velocity and contact pressure to the graph of the contact law, each divided by its range

@@ -15,6 +15,11 @@ pub trait NonlinearProblem {
     /// Writes the residual at `x`. `x` has no ghost values of its own.
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()>;
 
+    /// Whether the last residual consists of rounding errors alone, so that its point counts as a solution; the same on all ranks.
+    fn is_exact(&self) -> bool {
+        false
+    }
+
     /// Sets `x` as the point of linearisation.
     fn linearise(&mut self, x: &DistributedVector) -> Result<()>;
 
@@ -170,13 +175,34 @@ impl Snes {
 }
 
 unsafe extern "C" fn residual(
-    _: sys::SNES,
+    snes: sys::SNES,
     x: sys::Vec,
     f: sys::Vec,
     context: *mut c_void,
 ) -> sys::PetscErrorCode {
+    let mut is_exact = false;
     // SAFETY: `solve` passed a pointer to its live context; PETSc's vectors live for the call.
-    unsafe { callback::write::<dyn NonlinearProblem>(context, x, f, |problem, x, f| problem.residual(x, f)) }
+    let code = unsafe {
+        callback::write::<dyn NonlinearProblem>(context, x, f, |problem, x, f| {
+            problem.residual(x, f)?;
+            is_exact = problem.is_exact();
+            Ok(())
+        })
+    };
+    if code != 0 || !is_exact {
+        return code;
+    }
+    let (same, unchanged) = (f64::from(sys::PETSC_DEFAULT), sys::PETSC_DEFAULT as sys::PetscInt);
+    let mut norm = 0.0;
+    // SAFETY: PETSc's live solver and vector; the other tolerances remain.
+    unsafe {
+        let code = sys::VecNorm(f, sys::NORM_2, &mut norm);
+        if code != 0 {
+            return code;
+        }
+        // PETSc's test asks for less than the tolerance.
+        sys::SNESSetTolerances(snes, norm * (1.0 + 1e-6), same, same, unchanged, unchanged)
+    }
 }
 
 unsafe extern "C" fn linearise(

@@ -27,8 +27,9 @@ const MEMBERS: [(&str, &str, &str); 10] = [
 ];
 
 /// Those after the figures of fields.
-const MORE_MEMBERS: [(&str, &str, &str); 13] = [
+const MORE_MEMBERS: [(&str, &str, &str); 14] = [
     ("max_inclusion_residual", "largest inclusion residual", ""),
+    ("max_residual", "largest residual of the equations, as a share of the forces", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
     ("max_slip_pressure", "largest contact pressure with weakening friction", "Pa"),
     ("effects", "effects simulated", ""),

@@ -163,7 +163,7 @@ const OF_RESULTANTS: [&str; 10] = [
 const OF_PROFILES: [&str; 4] = ["normal_displacement", "normal_velocity", "contact_pressure", "gap"];
 
 /// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 18] = [
+const OF_SUMMARY: [&str; 19] = [
     "ranks",
     "dimension",
     "cells",
@@ -179,6 +179,7 @@ const OF_SUMMARY: [&str; 18] = [
     "max_von_mises",
     "max_strain",
     "max_inclusion_residual",
+    "max_residual",
     "max_energy_imbalance",
     "max_slip_pressure",
     "peak_memory_bytes",

@@ -16,7 +16,7 @@ mod flowing;
 use super::{
     StepOutcome,
     condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
-    equations::StepMatrix,
+    equations::{Floor, StepMatrix},
     flow_corrections::FlowCorrections,
     frames::Frames,
     linear_solver::SolverSettings,
@@ -305,7 +305,10 @@ impl Condensed {
             factored.condensed.multiply(before, product)?;
             right_hand_side.add_scaled(1.0, product)?;
             let tolerance = CONTACT_SHARE * system.tolerance;
-            let contact = System { matrix: &factored.condensed, right_hand_side, tolerance, converged };
+            let matrix = &factored.condensed;
+            // Below the floor, a factor in double precision takes its place.
+            let floor = Floor::default();
+            let contact = System { matrix, right_hand_side, tolerance, floor, converged };
             let outcome = newton.solve(problem, contact, velocity)?;
             sum = StepOutcome {
                 newton_iterations: sum.newton_iterations + outcome.newton_iterations,
@@ -332,7 +335,7 @@ impl Condensed {
             let norm = correction.norm()?;
             if norm <= system.tolerance {
                 trial.update_ghosts()?;
-                return Ok(sum);
+                return Ok(StepOutcome { residual: norm, ..sum });
             }
             if norm.is_nan() || norm > LARGEST_REDUCTION * last {
                 break;

@@ -41,6 +41,30 @@ impl StepMatrix for Matrix {
     }
 }
 
+/// The residual that rounding errors of the forces leave at a solution.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Floor {
+    /// The rounding errors of `K v` in N for each m/s of the norm of `v`.
+    pub slope: f64,
+    /// The largest residual norm in N that counts as rounding errors, whatever the velocity.
+    pub largest: f64,
+}
+
+impl Floor {
+    /// The floor in N at velocities of this norm in m/s.
+    pub fn at(self, speed: f64) -> f64 {
+        if speed.is_finite() { (self.slope * speed).min(self.largest) } else { 0.0 }
+    }
+
+    /// Whether a residual norm may consist of rounding errors at velocities of this norm.
+    pub fn is_reached(self, residual: f64, speed: f64) -> bool {
+        residual <= self.at(speed)
+    }
+}
+
+/// The residual decreased to less than this share of the last one unless it stagnates.
+const STAGNATION: f64 = 0.5;
+
 /// Forces of the cells in addition to `K v`, at velocities without ghost values.
 pub trait CellForces {
     /// Adds the forces at a velocity.
@@ -69,6 +93,8 @@ pub struct ContactEquations<'a, const D: usize> {
     pub cells: Option<&'a mut dyn CellForces>,
     /// `b` in N.
     pub right_hand_side: &'a DistributedVector,
+    /// Newton's method ends where the residual stagnates below this floor.
+    pub floor: Floor,
     /// Work vectors of the evaluation.
     pub scratch: &'a mut Scratch,
     /// Solves with the Jacobian; its constant matrix is `K`.
@@ -88,6 +114,10 @@ pub struct ContactEquations<'a, const D: usize> {
 pub struct Scratch {
     /// The velocities of the last residual.
     pub velocity: DistributedVector,
+    /// The norms of the last residual and of that before the last linearisation, in N; NaN if there is none.
+    residuals: [f64; 2],
+    /// Whether the last residual stagnates below the floor.
+    pub is_at_floor: bool,
     open: DistributedVector,
     /// The change of the velocities to equilibrium, where steps are solved in this way.
     correction: Option<DistributedVector>,
@@ -101,10 +131,19 @@ impl Scratch {
         let ghosts = contacts.iter().any(Contact::needs_ghosts);
         Ok(Self {
             velocity: like.like()?,
+            residuals: [f64::NAN; 2],
+            is_at_floor: false,
             open: like.like()?,
             correction: None,
             ghosted: if ghosts { Some([like.like()?, like.like()?]) } else { None },
         })
+    }
+}
+
+impl Scratch {
+    /// Forgets the residuals of the last equations.
+    pub(super) fn restart(&mut self) {
+        (self.residuals, self.is_at_floor) = ([f64::NAN; 2], false);
     }
 }
 
@@ -218,6 +257,11 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         }
         self.write_residual(residual)?;
         if !self.equilibrated {
+            let last = residual.norm()?;
+            let stagnates = last >= STAGNATION * self.scratch.residuals[1];
+            self.scratch.residuals[0] = last;
+            self.scratch.is_at_floor =
+                stagnates && self.floor.is_reached(last, self.scratch.velocity.norm()?);
             return Ok(());
         }
         let Scratch { velocity, open, correction, .. } = &mut *self.scratch;
@@ -237,14 +281,20 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         self.write_residual(residual)
     }
 
+    fn is_exact(&self) -> bool {
+        self.scratch.is_at_floor
+    }
+
     fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
-        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        let velocity = &mut self.scratch.velocity;
         velocity.copy_from(x)?;
         {
             let (x, mut velocity) = (x.owned()?, velocity.owned_mut()?);
             self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x, &mut velocity));
             set_walls(self.contacts);
         }
+        self.scratch.residuals[1] = self.scratch.residuals[0];
+        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
         if let Some(cells) = &mut self.cells {
             cells.linearise(velocity)?;
         }
@@ -428,6 +478,21 @@ impl<const D: usize> ProjectedOperator for InteriorOperator<'_, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_residuals_of_the_size_of_rounding_errors_are_at_the_floor() {
+        let floor = Floor { slope: 1e-4, largest: 2e-3 };
+        assert!(floor.is_reached(0.9e-4, 1.0) && !floor.is_reached(1.1e-4, 1.0));
+        assert!(!floor.is_reached(1e-30, 0.0), "at rest nothing is rounded");
+        assert!(
+            floor.is_reached(1.9e-3, 1e9) && !floor.is_reached(2.1e-3, 1e9),
+            "a wrong solution that is large"
+        );
+        for wrong in [f64::NAN, f64::INFINITY] {
+            assert!(!floor.is_reached(1e-9, wrong) && !floor.is_reached(wrong, 1.0));
+        }
+        assert!(!Floor::default().is_reached(1e-300, 1.0));
+    }
 
     #[test]
     fn a_set_of_branches_that_recurs_after_others_has_a_period() {

@@ -39,7 +39,7 @@ mod substructuring;
 
 pub use adaptive::{Adaptive, StepLevel};
 pub use cost::Cost;
-pub use equations::{CellForces, ContactEquations, Scratch, SolveCounts};
+pub use equations::{CellForces, ContactEquations, Floor, Scratch, SolveCounts};
 pub use integrator::evaluation;
 pub use linear_solver::{FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize};
 pub use outcome::StepOutcome;

@@ -5,7 +5,7 @@ use super::{
     bounded::Bounded,
     contacts::restore_pressures,
     descent::{DIRECTIONS_PER_ITERATION, Descent},
-    equations::{CellForces, ContactEquations, Scratch, SolveCounts, cycle_message},
+    equations::{CellForces, ContactEquations, Floor, Scratch, SolveCounts, cycle_message},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
@@ -253,6 +253,9 @@ impl Newton {
                 .iter()
                 .any(|c| c.law.depends_on_displacement() || c.friction().is_some());
         self.counts.sets.clear();
+        self.scratch.restart();
+        let may_end_at_floor = matches!(search, Search::FullSteps | Search::Backtracking);
+        let floor = if may_end_at_floor { system.floor } else { Floor::default() };
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = match (&mut self.flow, problem.flow_start) {
             (Some(flow), Some(start)) => Some(flow.of(cells, start)),
@@ -263,6 +266,7 @@ impl Newton {
             cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
             contacts,
             right_hand_side: system.right_hand_side,
+            floor,
             scratch: &mut self.scratch,
             linear_solver: &mut self.linear_solver,
             session,
@@ -285,11 +289,12 @@ impl Newton {
             solved.map(|outcome| (!outcome.converged()).then(|| outcome.description()))
         };
         self.counts = equations.counts;
+        let at_floor = self.scratch.is_at_floor && matches!(&solved, Ok(None));
         let iterations = self.counts.sets.len();
         let not_converged = !matches!(&solved, Ok(None));
         // All ranks take the same branch, on whichever rank the failure occurred.
         let [not_converged] = session.largest([f64::from(u8::from(not_converged))]);
-        let failure = if not_converged == 0.0 {
+        let mut failure = if not_converged == 0.0 {
             None
         } else {
             match session.agree(solved) {
@@ -303,6 +308,17 @@ impl Newton {
         } else {
             let mut velocity = trial.owned_mut()?;
             problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+        }
+        if may_end_at_floor && (at_floor || failure.is_some()) {
+            let speed = trial.norm()?;
+            if at_floor || floor.is_reached(self.snes.residual().norm()?, speed) {
+                failure = None;
+                // The accuracy of pressures is limited by the same errors.
+                let forces = floor.at(speed) / self.settings.inclusion_tolerance
+                    * ((problem.body.mesh.total_nodes * D) as f64).sqrt();
+                let contacts = &mut problem.body.contacts;
+                contacts.iter_mut().for_each(|c| c.reference.forces = c.reference.forces.max(forces));
+            }
         }
         Ok(Attempt { iterations, failure })
     }
@@ -341,6 +357,7 @@ impl Newton {
         write_branches(body, trial, &mut self.branches_after)?;
         let changes = self.branches_before.iter().zip(&self.branches_after).filter(|(a, b)| a != b).count();
         let inclusion = self.inclusion_residual(session, body, trial)?;
+        let residual = self.last_residual().norm()?;
         if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
             let reason = format!("velocity and pressure deviate from the contact graph by {inclusion:.1e}");
             return Err(problem.failed(&reason, INCLUSION_REMEDY));
@@ -358,6 +375,7 @@ impl Newton {
             points: PointCount::from_array(session.sum(points)),
             indefinite_solves: self.counts.indefinite,
             inclusion_residual: inclusion,
+            residual,
             fell: self.has_descended && self.counts.unstable > 0,
             solutions: 0,
             solutions_differ: false,
@@ -368,6 +386,15 @@ impl Newton {
         })
     }
 
+    /// The residual at the end of the last solve, in N.
+    fn last_residual(&self) -> &DistributedVector {
+        match (&self.bounded, &self.descent) {
+            (Some(bounded), _) => bounded.residual(),
+            (None, Some(descent)) if self.has_descended => &descent.residual,
+            _ => self.snes.residual(),
+        }
+    }
+
     /// The largest of all contacts over all ranks. Collective.
     fn inclusion_residual<const D: usize, const S: usize>(
         &self,
@@ -375,12 +402,7 @@ impl Newton {
         body: &Body<D, S>,
         velocity: &DistributedVector,
     ) -> Result<f64> {
-        let residual = match (&self.bounded, &self.descent) {
-            (Some(bounded), _) => bounded.residual(),
-            (None, Some(descent)) if self.has_descended => &descent.residual,
-            _ => self.snes.residual(),
-        };
-        let (velocity, residual) = (velocity.local()?, residual.owned()?);
+        let (velocity, residual) = (velocity.local()?, self.last_residual().owned()?);
         let mut largest = 0.0;
         for contact in &body.contacts {
             let range = session.largest(contact.range(&velocity));

@@ -20,6 +20,8 @@ pub struct StepOutcome {
     pub indefinite_solves: usize,
     /// Largest scaled distance to the contact graphs.
     pub inclusion_residual: f64,
+    /// Norm of the forces that the solution leaves unbalanced, as a share of the size of all forces; in N until the step is complete.
+    pub residual: f64,
     /// Whether the solution lies beyond unstable states, into which laws that soften lead.
     pub fell: bool,
     /// Number of different solutions found, if a search was requested; otherwise 0.

@@ -1,6 +1,9 @@
 //! A step to be solved: its data.
 
-use super::{equations::StepMatrix, flow::FlowStart};
+use super::{
+    equations::{Floor, StepMatrix},
+    flow::FlowStart,
+};
 use crate::{
     error::{Error, Result},
     fem::{body::Body, effect::Step, state::State},
@@ -36,6 +39,8 @@ pub(super) struct System<'a> {
     pub right_hand_side: &'a DistributedVector,
     /// The residual norm in N at which the equations count as solved.
     pub tolerance: f64,
+    /// The residual that rounding errors leave.
+    pub floor: Floor,
     /// The velocity of the converged state.
     pub converged: &'a DistributedVector,
 }

@@ -3,6 +3,7 @@
 use super::{
     StepOutcome,
     contacts::restore_pressures,
+    equations::Floor,
     factor_cache::{Cached, FactorCache, Krylov},
     force_scale::size_of,
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, ProblemSize, SolverSettings},
@@ -32,6 +33,19 @@ const LEAST_FORCE: f64 = 1e-150;
 /// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
 /// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
 const ROUNDING_SHARE: f64 = 0.1;
+/// Share of the forces of a step above which no residual counts as rounding errors.
+const LARGEST_FLOOR: f64 = 1e-4;
+
+/// How accurately a step is solved, in N.
+#[derive(Debug, Clone, Copy)]
+struct Accuracy {
+    /// The residual norm at which it counts as solved.
+    tolerance: f64,
+    /// The size of the forces.
+    size: f64,
+    /// The forces to which its residual is compared: not below those at which rounding errors matter to pressures.
+    reference: f64,
+}
 
 /// The matrix for steps of one length, and its solver.
 pub(super) struct StepSolver {
@@ -313,7 +327,8 @@ impl StepSolver {
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
         let (session, state, forces) = (problem.session, problem.state, problem.forces);
-        let mut tolerance = self.tolerance(problem, trial)?;
+        let Accuracy { mut tolerance, size, reference } = self.accuracy(problem, trial)?;
+        let floor = Floor { slope: f64::EPSILON * self.matrix_norm, largest: LARGEST_FLOOR * size };
         let (mut is_relaxed, mut is_pressed_on) = (false, false);
         loop {
             let is_single = self.active_precision()? == Some(Precision::Single);
@@ -322,9 +337,10 @@ impl StepSolver {
                     Error::Internal("a step was solved before its matrix was assembled".into())
                 })?;
             let matrix = &CountedMatrix { matrix, products: &self.products };
-            let system = System { matrix, right_hand_side: forces, tolerance, converged: &state.velocity };
+            let (right_hand_side, converged) = (forces, &state.velocity);
+            let system = System { matrix, right_hand_side, tolerance, floor, converged };
             let solved = match &mut self.solver {
-                Solver::Linear(ksp) => solve_linear(ksp, problem, tolerance, trial),
+                Solver::Linear(ksp) => solve_linear(ksp, problem, system, trial),
                 Solver::Newton(newton) => newton.solve(problem, system, trial),
                 Solver::Condensed(condensed) if is_single => condensed.refine(problem, system, trial),
                 Solver::Condensed(condensed) => {
@@ -334,7 +350,11 @@ impl StepSolver {
             };
             let failure = match session.agree(solved) {
                 Err(failure) if failure.is_failure() => failure,
-                solved => return solved.map_err(|error| self.springs.explain(error)),
+                Ok(solved) => {
+                    let residual = if reference > 0.0 { solved.residual / reference } else { 0.0 };
+                    return Ok(StepOutcome { residual, ..solved });
+                }
+                Err(error) => return Err(self.springs.explain(error)),
             };
             if is_single {
                 session.agree(self.refactor_in_double(problem, trial))?;
@@ -369,13 +389,13 @@ impl StepSolver {
         self.settings.tolerance
     }
 
-    /// The residual norm in N at which a step counts as solved; refuses forces that are not finite. Sets the reference forces of
-    /// the contacts. Collective.
-    fn tolerance<const D: usize, const S: usize>(
+    /// How accurately a step is to be solved; refuses forces that are not finite. Sets the reference forces of the contacts.
+    /// Collective.
+    fn accuracy<const D: usize, const S: usize>(
         &self,
         problem: &mut StepProblem<'_, D, S>,
         start: &DistributedVector,
-    ) -> Result<f64> {
+    ) -> Result<Accuracy> {
         let norm = problem.forces.norm()?;
         if !norm.is_finite() {
             let remedy = "check loads and initial values; use smaller steps";
@@ -397,10 +417,10 @@ impl StepSolver {
         let size = if size > 0.0 { size.max(LEAST_FORCE / accuracy) } else { 0.0 };
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
         body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
-        Ok((self.settings.tolerance * size_of(norm, *scale))
-            .max(LEAST_FORCE)
-            .max(ROUNDING_SHARE * *rounding)
-            .max(product))
+        let size = size_of(norm, *scale);
+        let tolerance =
+            (self.settings.tolerance * size).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product);
+        Ok(Accuracy { tolerance, size, reference: size.max(rounding.max(product) / accuracy) })
     }
 
     /// The precision of the factor in use, if steps are condensed to the contact.
@@ -433,15 +453,21 @@ impl StepSolver {
 fn solve_linear<const D: usize, const S: usize>(
     ksp: &mut Ksp,
     problem: &StepProblem<'_, D, S>,
-    tolerance: f64,
+    system: System<'_>,
     trial: &mut DistributedVector,
 ) -> Result<StepOutcome> {
-    ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
+    ksp.set_tolerances(0.0, system.tolerance, LINEAR_ITERATIONS)?;
     let outcome = problem.session.agree(ksp.solve(problem.forces, trial))?;
+    let mut residual = outcome.residual;
     if !outcome.converged() {
-        return Err(problem.failed(outcome.description(), REMEDY));
+        let mut left = trial.like()?;
+        system.write_residual(trial, &mut left)?;
+        residual = left.norm()?;
+        if !system.floor.is_reached(residual, trial.norm()?) {
+            return Err(problem.failed(outcome.description(), REMEDY));
+        }
     }
-    Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
+    Ok(StepOutcome { linear_iterations: outcome.iterations, residual, ..StepOutcome::default() })
 }
 
 /// The rows of the matrix on this rank. PETSc's integers can count them. Collective.

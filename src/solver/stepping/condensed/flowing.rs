@@ -82,7 +82,7 @@ impl Condensed {
             let factored = factored_mut(&mut elimination.factored)?;
             factored.write_rest(right_hand_side)?;
             let matrix = &factored.condensed;
-            let contact = System { matrix, right_hand_side, tolerance: of_contact, converged };
+            let contact = System { matrix, right_hand_side, tolerance: of_contact, converged, ..system };
             match problem.session.agree(newton.solve(problem, contact, velocity)) {
                 Ok(outcome) => *sum = add_work(std::mem::take(sum), outcome),
                 Err(failure) if failure.is_failure() => {
@@ -97,6 +97,7 @@ impl Condensed {
             flowing.evaluate(problem, trial)?;
             let left = flowing.residual()?;
             if left <= of_flow {
+                sum.residual = sum.residual.hypot(left);
                 return Ok(Corrected::Solved);
             }
             if left.is_nan() || left > SLOW * last {
