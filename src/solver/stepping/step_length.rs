@@ -86,8 +86,13 @@ impl Landings {
             visit(step);
             let whole = ((self.next(step.time).time - step.time) / self.length - 2.0).floor();
             let repeats = step.length == self.length && step.previous_length == last && whole >= 1.0;
-            let passed = if repeats && last == self.length { whole * self.length } else { 0.0 };
-            (time, last) = (snapped_to_multiple(step.time + passed, self.length), step.length);
+            // The end of a step is exact: rounded, it might never be that of the run.
+            time = if repeats && last == self.length {
+                snapped_to_multiple(step.time + whole * self.length, self.length)
+            } else {
+                step.time
+            };
+            last = step.length;
         }
     }
 

@@ -110,6 +110,10 @@ mod tests {
         close(StepRange::fixed(Scheme::ImplicitEuler, &landings(vec![0.13], 0.2)).steps, [0.03, 0.1]);
         close(StepRange::fixed(Scheme::ImplicitEuler, &landings(Vec::new(), 0.04)).steps, [0.04; 2]);
         close(StepRange::fixed(Scheme::ImplicitEuler, &landings(Vec::new(), 100.01)).steps, [0.01, 0.1]);
+        // Ends that are multiples of the step but for rounding are reached.
+        for end in [f64::next_up(0.3), f64::next_down(0.3), 3.0 * 0.1, f64::next_up(7.0)] {
+            close(StepRange::fixed(Scheme::ImplicitEuler, &landings(Vec::new(), end)).steps, [0.1; 2]);
+        }
         // Steps have their full length again after 7.25 s: the last one takes 0.06 s.
         close(StepRange::fixed(Scheme::ImplicitEuler, &landings(vec![7.25], 100.01)).steps, [0.05, 0.1]);
         // After 0.1 s the step of 0.05 s has w = 1/2 and k' = 0.0375 s; that of 0.1 s after it w = 2 and k' = 0.06 s.
