@@ -10,7 +10,7 @@
 //!
 //! HDF5 writes changed metadata once its amount exceeds a threshold, also amid a collective transfer of numbers. There, HDF5 1.10
 //! and 1.12 write it with an MPI type that is not set, and fail with `MPI_ERR_TYPE`. The threshold is therefore as high as HDF5
-//! allows, above what a file changes between two flushes (see [`METADATA_BYTES`]).
+//! allows, above what a file changes between two flushes (see `METADATA_BYTES`).
 //!
 //! After a failed write, for instance on a full disk, a file is abandoned and never closed: on closing, HDF5 would write its
 //! remaining data,
