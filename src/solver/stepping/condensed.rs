@@ -11,18 +11,12 @@
 //! r_c`, and the contact system is `S (v + d) + C(v + d) = L_c y_c + r_c + S v`. The remaining error `-E d` is measured and
 //! corrected in the same way.
 
-mod flowing;
-
 use super::{
-    StepOutcome,
     condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
     equations::{Floor, StepMatrix},
-    flow_corrections::FlowCorrections,
     frames::Frames,
-    linear_solver::SolverSettings,
-    newton::Newton,
-    problem::{StepProblem, System},
-    resistance::{resistances, resistances_of_body},
+    problem::System,
+    solver::{Assembled, LinearSolver, Reduced},
     springs::RowsWithSprings,
     substructuring::{Factors, Substructures},
 };
@@ -35,62 +29,60 @@ use crate::{
     linear_algebra::petsc::{DistributedVector, Matrix, Precision, ProjectedKsp},
     parallel::session::Session,
 };
+use std::{cell::RefCell, rc::Rc};
 
-/// Number of corrections after which single precision has failed.
-const MAX_CORRECTIONS: usize = 12;
-/// A correction that reduces the residual by less than this factor counts as divergence.
-const LARGEST_REDUCTION: f64 = 0.5;
 /// Share of the tolerance to which the contact system is solved. Later corrections start so close to their solution that Newton's
 /// method would otherwise stop just below the tolerance, with velocity and pressure at that distance from their graph.
-const CONTACT_SHARE: f64 = 0.1;
+pub(super) const CONTACT_SHARE: f64 = 0.1;
 
-/// A solver for steps with a factor of their matrix.
-pub(super) struct Condensed {
-    newton: Newton,
+/// A factor of the matrix, and the system of the motions on which laws act.
+pub(super) struct Condensed<const D: usize> {
+    unknowns: Rc<Unknowns<D>>,
+    krylov: ProjectedKsp,
     elimination: Elimination,
-    /// The precision of factors: double after single precision has failed.
-    pub precision: Precision,
-    nodes: ContactNodes,
-    /// The range of this rank in the unknowns of all ranks.
-    own: std::ops::Range<usize>,
     /// Vectors of contact nodes: right-hand side, velocity, and velocity of the converged state.
     right_hand_side: DistributedVector,
     velocity: DistributedVector,
     converged: DistributedVector,
-    /// Data for corrections, if factors are in single precision.
+    /// Data for corrections, if the factor is in single precision.
     refinement: Option<Refinement>,
-    /// Data for cells that flow, if there are any.
-    flowing: Option<Box<FlowCorrections>>,
 }
 
-/// A factored matrix.
-pub(super) struct Factored {
+/// The unknowns of the contact, which the solvers for all matrices of a run have in common.
+struct Unknowns<const D: usize> {
+    nodes: ContactNodes<D>,
+    /// The range of this rank in the unknowns of all ranks.
+    own: std::ops::Range<usize>,
+    frames: Rc<Frames>,
+    /// With the order of elimination, once it is known.
+    substructures: RefCell<Substructures>,
+    /// Unknowns of this rank with those eliminated.
+    owned: usize,
+}
+
+/// A factored matrix. It alone knows whether the substitutions of its factors include the contact unknowns.
+struct Factored {
     factors: Factors,
     condensed: CondensedMatrix,
-    /// The parameters of each contact's graphs.
-    scales: Vec<[f64; 2]>,
 }
 
-/// The factor in use, and its vector of the unknowns of this rank.
+/// The factor, and its vector of the unknowns of this rank.
 struct Elimination {
     factored: Option<Factored>,
-    frames: Frames,
-    substructures: Substructures,
+    frames: Rc<Frames>,
     values: Vec<f64>,
     /// Half solves since the count of traffic was restarted.
     half_solves: u64,
 }
 
 /// The contact nodes of this rank, in the order of vectors of contact nodes, and the motions on which laws act.
-struct ContactNodes {
+struct ContactNodes<const D: usize> {
     nodes: Vec<usize>,
     motions: Vec<Motion>,
 }
 
 /// Vectors of all nodes, and of contact nodes.
 struct Refinement {
-    /// The velocity from which the step was started.
-    start: DistributedVector,
     residual: DistributedVector,
     correction: DistributedVector,
     /// The velocity of contact nodes before a correction.
@@ -102,7 +94,6 @@ struct Refinement {
 impl Refinement {
     fn new(nodes: &DistributedVector, contact: &DistributedVector) -> Result<Self> {
         Ok(Self {
-            start: nodes.like()?,
             residual: nodes.like()?,
             correction: nodes.like()?,
             before: contact.like()?,
@@ -112,242 +103,216 @@ impl Refinement {
     }
 }
 
-impl Condensed {
-    /// A solver for the contacts of a body, which numbers their unknowns; the matrix is set by [`Condensed::prepare`]. `velocities` has
-    /// the layout of those of the body. Collective.
-    pub(super) fn new<const D: usize, const S: usize>(
-        session: &Session,
-        body: &mut Body<D, S>,
-        velocities: &DistributedVector,
-        settings: &SolverSettings,
-        precision: Precision,
-    ) -> Result<Self> {
+impl<const D: usize> Condensed<D> {
+    /// A solver for the contacts of a body, whose unknowns it numbers. Collective.
+    pub(super) fn new<const S: usize>(session: &Session, body: &mut Body<D, S>) -> Result<Self> {
         let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.held);
         let nodes = ContactNodes::new(&contact);
         body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| nodes.number(node)));
-        let like = DistributedVector::ghosted(D, contact.len(), &[])?;
-        let mut linear_solver = ProjectedKsp::new("", &like, D)?;
-        linear_solver.linear_solver().set_method("cg")?;
-        linear_solver.precondition_by_operator()?;
-        let newton = Newton::new(&like, &body.contacts, linear_solver, settings)?;
-        let frames = Frames::new(session, &body.mesh, &contact)?;
+        let frames = Rc::new(Frames::new(session, &body.mesh, &contact)?);
         let start = session.share_start(nodes.motions.len());
-        let flowing =
-            if body.flows() { Some(Box::new(FlowCorrections::new(velocities, settings)?)) } else { None };
-        Ok(Self {
-            newton,
-            elimination: Elimination {
-                factored: None,
-                substructures: Substructures::new(session, &body.mesh, &frames)?,
-                frames,
-                values: vec![0.0; body.mesh.owned * D],
-                half_solves: 0,
-            },
-            precision,
+        Self::of(Rc::new(Unknowns {
             own: start..start + nodes.motions.len(),
             nodes,
-            right_hand_side: like.like()?,
-            velocity: like.like()?,
-            converged: like.like()?,
-            refinement: None,
-            flowing,
-        })
+            substructures: RefCell::new(Substructures::new(session, &body.mesh, &frames)?),
+            frames,
+            owned: body.mesh.owned * D,
+        }))
     }
 
-    /// Factors the matrix with these rows on this rank, in the order of elimination in use, and chooses the parameters of contact
-    /// graphs; returns whether this succeeded. Stiffness of springs in the rows is subtracted from products with the condensed
-    /// matrix. With springs the condensed matrix has too little resistance to rigid motions to choose the parameters; then `matrix`
-    /// of the whole body determines them, whose vectors have the layout of `like`. Collective.
-    pub(super) fn prepare<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        rows: RowsWithSprings,
-        matrix: &Matrix,
-        like: &DistributedVector,
-    ) -> Result<bool> {
-        let RowsWithSprings { mut rows, springs } = rows;
-        let Elimination { factored, frames, substructures, .. } = &mut self.elimination;
+    fn of(unknowns: Rc<Unknowns<D>>) -> Result<Self> {
+        let like = DistributedVector::ghosted(D, unknowns.nodes.nodes.len(), &[])?;
+        let mut krylov = ProjectedKsp::new("", &like, D)?;
+        krylov.linear_solver().set_method("cg")?;
+        krylov.precondition_by_operator()?;
+        let frames = unknowns.frames.clone();
+        Ok(Self {
+            unknowns,
+            krylov,
+            elimination: Elimination { factored: None, frames, values: Vec::new(), half_solves: 0 },
+            right_hand_side: like.like()?,
+            velocity: like.like()?,
+            converged: like,
+            refinement: None,
+        })
+    }
+}
+
+impl<const D: usize> LinearSolver for Condensed<D> {
+    fn another(&self, _like: &DistributedVector) -> Result<Box<dyn LinearSolver>> {
+        Ok(Box::new(Self::of(self.unknowns.clone())?))
+    }
+
+    /// Stiffness of springs in the rows is subtracted from products with the condensed matrix.
+    fn prepare(&mut self, session: &Session, assembled: Assembled<'_>) -> Result<bool> {
+        let RowsWithSprings { mut rows, springs } = assembled.rows;
+        let Unknowns { nodes, own, frames, substructures, owned } = &*self.unknowns;
         frames.rotate_matrix(&mut rows);
-        *factored = None;
-        let Some(mut factors) = Factors::new(session.world(), substructures, &rows, self.precision)? else {
-            return Ok(false);
-        };
-        self.precision = factors.precision();
+        (self.elimination.factored, self.refinement) = (None, None);
+        let factors =
+            Factors::new(session.world(), &mut substructures.borrow_mut(), &rows, assembled.precision)?;
+        let Some(mut factors) = factors else { return Ok(false) };
         drop(rows);
-        let Frames { unknowns, groups, .. } = frames;
-        let has_springs = springs.is_some();
         let condensed = CondensedMatrix {
             lower: factors.take_last_factor(),
-            positions: factors.positions(unknowns),
-            nodes: groups.clone(),
-            own: self.own.clone(),
-            motions: self.nodes.motions.clone(),
+            positions: factors.positions(&frames.unknowns),
+            nodes: frames.groups.clone(),
+            own: own.clone(),
+            motions: nodes.motions.clone(),
             springs: springs.unwrap_or_default(),
             subspace: Subspace::whole(&self.velocity)?,
-            workspace: Workspace::new(session, &self.nodes.motions, unknowns.len())?,
+            workspace: Workspace::new(session, &nodes.motions, frames.unknowns.len())?,
         };
-        let scales = if has_springs {
-            resistances_of_body(session, &body.contacts, like, matrix)?
-        } else {
-            let (mut motion, mut product) = (self.velocity.like()?, self.velocity.like()?);
-            resistances(session, &body.contacts, like, |nodal| {
-                self.nodes.restrict::<D>(nodal, &mut motion)?;
-                condensed.multiply(&motion, &mut product)?;
-                motion.dot(&product)
-            })?
-        };
-        self.newton.scales.clone_from(&scales);
-        self.elimination.factored = Some(Factored { factors, condensed, scales });
+        if factors.precision() == Precision::Single {
+            assembled.matrix.multiply_often()?;
+        }
+        self.elimination.values.resize(*owned, 0.0);
+        self.elimination.factored = Some(Factored { factors, condensed });
         Ok(true)
     }
 
-    /// The precision of the factor in use.
-    pub(super) fn active_precision(&mut self) -> Result<Precision> {
-        Ok(factored_mut(&mut self.elimination.factored)?.factors.precision())
+    fn krylov(&mut self) -> &mut ProjectedKsp {
+        &mut self.krylov
     }
 
-    /// Swaps the factored matrix with another.
-    pub(super) fn swap_factored(&mut self, other: &mut Option<Factored>) {
-        std::mem::swap(&mut self.elimination.factored, other);
-        if let Some(factored) = &self.elimination.factored {
-            self.newton.scales.clone_from(&factored.scales);
+    fn unknowns<'a>(&'a self, _velocities: &'a DistributedVector) -> &'a DistributedVector {
+        &self.velocity
+    }
+
+    fn number(&self, node: usize) -> usize {
+        self.unknowns.nodes.number(node)
+    }
+
+    fn precision(&self) -> Option<Precision> {
+        Some(self.elimination.factored.as_ref().map_or(Precision::Double, |f| f.factors.precision()))
+    }
+
+    /// With springs the condensed matrix has too little resistance to rigid motions.
+    fn power(&mut self, matrix: &Matrix, motion: &DistributedVector) -> Result<f64> {
+        let Self { unknowns, elimination, right_hand_side, velocity, .. } = self;
+        let condensed = &factored_mut(&mut elimination.factored)?.condensed;
+        if !condensed.springs.is_empty() {
+            return StepMatrix::power(matrix, motion);
         }
+        unknowns.nodes.restrict(motion, velocity)?;
+        condensed.multiply(velocity, right_hand_side)?;
+        velocity.dot(right_hand_side)
     }
 
-    /// `x = K^-1 b`. Collective.
-    pub(super) fn solve_linear(
-        &mut self,
-        right_hand_side: &DistributedVector,
-        solution: &mut DistributedVector,
-    ) -> Result<()> {
-        self.elimination.forward(right_hand_side)?;
+    fn start(&mut self, system: System<'_>, trial: &DistributedVector) -> Result<()> {
+        self.unknowns.nodes.restrict(system.converged, &mut self.converged)?;
+        self.unknowns.nodes.restrict(trial, &mut self.velocity)?;
+        if self.precision() == Some(Precision::Double) {
+            return Ok(());
+        }
+        let refinement = match &mut self.refinement {
+            Some(refinement) => refinement,
+            none => none.insert(Refinement::new(trial, &self.velocity)?),
+        };
+        system.write_residual(trial, &mut refinement.residual)
+    }
+
+    fn condense<'a>(
+        &'a mut self,
+        system: System<'a>,
+        trial: &'a mut DistributedVector,
+    ) -> Result<Reduced<'a>> {
+        let Self { unknowns, krylov, elimination, right_hand_side, velocity, converged, refinement } = self;
+        let Some(Refinement { residual, before, change, product, .. }) = refinement else {
+            elimination.forward(system.right_hand_side)?;
+            let factored = factored_mut(&mut elimination.factored)?;
+            factored.write_rest(right_hand_side)?;
+            let matrix = &factored.condensed;
+            let system = System { matrix, right_hand_side, converged, ..system };
+            return Ok(Reduced { system, krylov, velocity });
+        };
+        unknowns.nodes.extract_forces(residual, change)?;
+        elimination.forward(residual)?;
+        unknowns.nodes.restrict(trial, velocity)?;
+        before.copy_from(velocity)?;
+        let factored = factored_mut(&mut elimination.factored)?;
+        factored.write_rest(right_hand_side)?;
+        right_hand_side.add_scaled(1.0, change)?;
+        let matrix = &factored.condensed;
+        matrix.multiply(before, product)?;
+        right_hand_side.add_scaled(1.0, product)?;
+        let tolerance = CONTACT_SHARE * system.tolerance;
+        // Below the floor, a factor in double precision takes its place.
+        let floor = Floor::default();
+        let system = System { matrix, right_hand_side, tolerance, floor, converged, ..system };
+        Ok(Reduced { system, krylov, velocity })
+    }
+
+    fn expand(&mut self, system: System<'_>, trial: &mut DistributedVector) -> Result<Option<f64>> {
+        let Self { unknowns, elimination, right_hand_side, velocity, refinement, .. } = self;
+        let factored = factored_mut(&mut elimination.factored)?;
+        let Some(Refinement { residual, correction, before, change, product }) = refinement else {
+            factored.set_contact(velocity)?;
+            elimination.backward(trial)?;
+            unknowns.nodes.prescribe(velocity, trial)?;
+            return Ok(None);
+        };
+        right_hand_side.add_scaled(-1.0, product)?;
+        change.copy_from(velocity)?;
+        change.add_scaled(-1.0, before)?;
+        factored.condensed.multiply(change, product)?;
+        factored.set_contact(change)?;
+        elimination.backward(correction)?;
+        trial.add_scaled(1.0, correction)?;
+        unknowns.nodes.prescribe(velocity, trial)?;
+        // The residual `b - K v - C(v)`, with the forces `C(v)` of the last Newton iteration.
+        system.write_residual(trial, residual)?;
+        change.copy_from(right_hand_side)?;
+        change.add_scaled(-1.0, product)?;
+        correction.copy_from(residual)?;
+        unknowns.nodes.subtract(change, correction)?;
+        correction.norm().map(Some)
+    }
+
+    fn solve(&mut self, forces: &DistributedVector, solution: &mut DistributedVector) -> Result<()> {
+        self.elimination.forward(forces)?;
         factored_mut(&mut self.elimination.factored)?.solve_contact();
         self.elimination.backward(solution)
     }
 
-    /// Whether cells flow at the end of a step.
-    pub(super) fn flows(&self) -> bool {
-        self.flowing.is_some()
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        let Self { elimination, right_hand_side, velocity, .. } = self;
+        elimination.forward(r)?;
+        let factored = factored_mut(&mut elimination.factored)?;
+        if factored.condensed.is_on_subspace() {
+            factored.write_rest(right_hand_side)?;
+            factored.condensed.precondition(right_hand_side, velocity)?;
+            factored.set_contact(velocity)?;
+        } else {
+            factored.solve_contact();
+        }
+        elimination.backward(z)
     }
 
-    /// Restarts the count of traffic.
-    pub(super) fn restart_traffic(&mut self) {
+    fn set_subspace(
+        &mut self,
+        project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
+        work: &mut DistributedVector,
+    ) -> Result<bool> {
+        let nodes = &self.unknowns.nodes;
+        factored_mut(&mut self.elimination.factored)?.condensed.set_subspace(&mut |column| {
+            nodes.extend(column, work)?;
+            project(work)?;
+            nodes.restrict(work, column)
+        })
+    }
+
+    fn restart_traffic(&mut self) {
         self.elimination.half_solves = 0;
         self.elimination.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
     }
 
-    /// Least number of bytes that this rank has read since then: the factor for each half solve, its last block for each product;
-    /// `None` where cells flow, which is not counted.
-    pub(super) fn traffic(&self) -> Option<u64> {
+    /// The factor for each half solve, its last block for each product.
+    fn traffic(&mut self, _ranks: usize, _product: u64) -> Result<Option<u64>> {
         let Elimination { factored, half_solves, .. } = &self.elimination;
         let bytes =
             |factored: &Factored| half_solves * factored.factors.bytes() + factored.condensed.traffic();
-        self.flowing.is_none().then(|| factored.as_ref().map_or(0, bytes))
-    }
-
-    /// Solves a step from the velocity in `trial` with a factor in double precision, and writes the new velocity there. `factor_is_own`
-    /// states whether the factor is that of the matrix of the step; this is always so without flow. Collective.
-    pub(super) fn solve<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        system: System<'_>,
-        trial: &mut DistributedVector,
-        factor_is_own: bool,
-    ) -> Result<StepOutcome> {
-        if let Some(mut flowing) = self.flowing.take() {
-            let outcome = self.solve_flowing(&mut flowing, problem, system, (trial, factor_is_own));
-            self.flowing = Some(flowing);
-            return outcome;
-        }
-        let Self { newton, elimination, nodes, right_hand_side, velocity, converged, .. } = self;
-        elimination.forward(system.right_hand_side)?;
-        nodes.restrict::<D>(system.converged, converged)?;
-        nodes.restrict::<D>(trial, velocity)?;
-        let factored = factored_mut(&mut elimination.factored)?;
-        factored.write_rest(right_hand_side)?;
-        let contact = System { matrix: &factored.condensed, right_hand_side, converged, ..system };
-        let outcome = newton.solve(problem, contact, velocity)?;
-        factored.set_contact(velocity)?;
-        elimination.backward(trial)?;
-        nodes.prescribe::<D>(velocity, trial)?;
-        trial.update_ghosts()?;
-        Ok(outcome)
-    }
-
-    /// The same with a factor in single precision, by corrections. If these do not converge, it fails, and
-    /// [`Condensed::restore_start`] resets `trial`. Collective.
-    pub(super) fn refine<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        system: System<'_>,
-        trial: &mut DistributedVector,
-    ) -> Result<StepOutcome> {
-        let Self { newton, elimination, nodes, right_hand_side, velocity, converged, .. } = self;
-        let refinement = match &mut self.refinement {
-            Some(refinement) => refinement,
-            none => none.insert(Refinement::new(trial, velocity)?),
-        };
-        let Refinement { start, residual, correction, before, change, product } = refinement;
-        start.copy_from(trial)?;
-        nodes.restrict::<D>(system.converged, converged)?;
-        system.write_residual(trial, residual)?;
-        let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
-        for _ in 0..MAX_CORRECTIONS {
-            // The contact system.
-            nodes.extract_forces::<D>(residual, change)?;
-            elimination.forward(residual)?;
-            nodes.restrict::<D>(trial, velocity)?;
-            before.copy_from(velocity)?;
-            let factored = factored_mut(&mut elimination.factored)?;
-            factored.write_rest(right_hand_side)?;
-            right_hand_side.add_scaled(1.0, change)?;
-            factored.condensed.multiply(before, product)?;
-            right_hand_side.add_scaled(1.0, product)?;
-            let tolerance = CONTACT_SHARE * system.tolerance;
-            let matrix = &factored.condensed;
-            // Below the floor, a factor in double precision takes its place.
-            let floor = Floor::default();
-            let contact = System { matrix, right_hand_side, tolerance, floor, converged };
-            let outcome = newton.solve(problem, contact, velocity)?;
-            sum = StepOutcome {
-                newton_iterations: sum.newton_iterations + outcome.newton_iterations,
-                linear_iterations: sum.linear_iterations + outcome.linear_iterations,
-                indefinite_solves: sum.indefinite_solves + outcome.indefinite_solves,
-                fell: sum.fell || outcome.fell,
-                ..outcome
-            };
-            // All velocities.
-            right_hand_side.add_scaled(-1.0, product)?;
-            change.copy_from(velocity)?;
-            change.add_scaled(-1.0, before)?;
-            factored.condensed.multiply(change, product)?;
-            factored.set_contact(change)?;
-            elimination.backward(correction)?;
-            trial.add_scaled(1.0, correction)?;
-            nodes.prescribe::<D>(velocity, trial)?;
-            // The residual `b - K v - C(v)`, with the forces `C(v)` of the last Newton iteration.
-            system.write_residual(trial, residual)?;
-            change.copy_from(right_hand_side)?;
-            change.add_scaled(-1.0, product)?;
-            correction.copy_from(residual)?;
-            nodes.subtract::<D>(change, correction)?;
-            let norm = correction.norm()?;
-            if norm <= system.tolerance {
-                trial.update_ghosts()?;
-                return Ok(StepOutcome { residual: norm, ..sum });
-            }
-            if norm.is_nan() || norm > LARGEST_REDUCTION * last {
-                break;
-            }
-            last = norm;
-        }
-        Err(Error::Failed("corrections with a factor in single precision do not converge".into()))
-    }
-
-    /// Resets `trial` to the start value of the last step with a factor in single precision.
-    pub(super) fn restore_start(&self, trial: &mut DistributedVector) -> Result<()> {
-        self.refinement.as_ref().map_or(Ok(()), |refinement| trial.copy_from(&refinement.start))
+        Ok(Some(factored.as_ref().map_or(0, bytes)))
     }
 }
 
@@ -406,8 +371,8 @@ impl Elimination {
     }
 }
 
-impl ContactNodes {
-    fn new<const D: usize>(contact: &[ContactNode<D>]) -> Self {
+impl<const D: usize> ContactNodes<D> {
+    fn new(contact: &[ContactNode<D>]) -> Self {
         let motions = contact.iter().enumerate().flat_map(|(number, contact)| {
             let motion = move |direction: &[f64; D]| Motion { at: number * D, direction: direction.to_vec() };
             contact.frame[..contact.active].iter().map(motion)
@@ -421,7 +386,7 @@ impl ContactNodes {
     }
 
     /// Sets the values of contact nodes, and all others to zero.
-    fn extend<const D: usize>(&self, from: &DistributedVector, to: &mut DistributedVector) -> Result<()> {
+    fn extend(&self, from: &DistributedVector, to: &mut DistributedVector) -> Result<()> {
         let (from, mut to) = (from.owned()?, to.owned_mut()?);
         to.fill(0.0);
         let pairs = from.chunks_exact(D).zip(&self.nodes);
@@ -430,7 +395,7 @@ impl ContactNodes {
     }
 
     /// Copies the values of contact nodes.
-    fn restrict<const D: usize>(&self, from: &DistributedVector, to: &mut DistributedVector) -> Result<()> {
+    fn restrict(&self, from: &DistributedVector, to: &mut DistributedVector) -> Result<()> {
         let (from, mut to) = (from.owned()?, to.owned_mut()?);
         let pairs = to.chunks_exact_mut(D).zip(&self.nodes);
         pairs.for_each(|(to, &node)| to.copy_from_slice(&from[node * D..][..D]));
@@ -438,11 +403,7 @@ impl ContactNodes {
     }
 
     /// Subtracts values of contact nodes.
-    fn subtract<const D: usize>(
-        &self,
-        values: &DistributedVector,
-        from: &mut DistributedVector,
-    ) -> Result<()> {
+    fn subtract(&self, values: &DistributedVector, from: &mut DistributedVector) -> Result<()> {
         let (values, mut from) = (values.owned()?, from.owned_mut()?);
         for (&node, value) in self.nodes.iter().zip(values.chunks_exact(D)) {
             from[node * D..][..D].iter_mut().zip(value).for_each(|(from, value)| *from -= value);
@@ -452,11 +413,7 @@ impl ContactNodes {
 
     /// Sets the velocities along the motions on which laws act to those of contact nodes: the solve for all velocities
     /// returns them with rounding errors.
-    fn prescribe<const D: usize>(
-        &self,
-        velocity: &DistributedVector,
-        trial: &mut DistributedVector,
-    ) -> Result<()> {
+    fn prescribe(&self, velocity: &DistributedVector, trial: &mut DistributedVector) -> Result<()> {
         let (velocity, mut trial) = (velocity.owned()?, trial.owned_mut()?);
         for motion in &self.motions {
             let velocity = &velocity[motion.at..][..D];
@@ -468,11 +425,7 @@ impl ContactNodes {
     }
 
     /// Moves the forces along the motions on which laws act from a residual of all nodes into a vector of contact nodes.
-    fn extract_forces<const D: usize>(
-        &self,
-        residual: &mut DistributedVector,
-        forces: &mut DistributedVector,
-    ) -> Result<()> {
+    fn extract_forces(&self, residual: &mut DistributedVector, forces: &mut DistributedVector) -> Result<()> {
         let (mut residual, mut forces) = (residual.owned_mut()?, forces.owned_mut()?);
         forces.fill(0.0);
         for motion in &self.motions {

@@ -14,6 +14,13 @@ pub trait StepMatrix {
     /// `y = K x`. Collective.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
 
+    /// `x . K x`. Collective.
+    fn power(&self, x: &DistributedVector) -> Result<f64> {
+        let mut product = x.like()?;
+        self.multiply(x, &mut product)?;
+        x.dot(&product)
+    }
+
     /// Approximates `z = K^-1 r` on the subspace last set, for matrices for which PETSc creates no preconditioner. Collective.
     fn precondition(&self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
         Err(Error::Internal("a matrix for which PETSc creates the preconditioner has none of its own".into()))

@@ -3,79 +3,27 @@
 //! Step lengths are powers of two times the first one. The preconditioner of such a length is used for all nearby lengths: two
 //! matrices `M / k + A + k E` whose lengths have the ratio `r` are spectrally equivalent with factors from `1 / r` to `r`.
 
-use super::{
-    condensed::Factored,
-    linear_solver::Preconditioner,
-    newton::Newton,
-    solver::{Solver, linear, projected},
-};
-use crate::{
-    error::Result,
-    linear_algebra::petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp},
-    mesh::Mesh,
-    parallel::session::Session,
-};
-use std::mem::swap;
+use super::{linear_solver::Preconditioner, solver::LinearSolver};
+use crate::linear_algebra::petsc::Matrix;
 
 /// Largest number of stored matrices, including the one in use.
 const MAX_MATRICES: usize = 8;
 /// Bytes that they may occupy on a rank.
 const MAX_BYTES: f64 = 512e6;
 
-/// A matrix with its preconditioner.
-pub(super) struct Cached {
+/// A matrix with its linear solver.
+pub(super) struct Prepared {
     /// Length in s of the steps to which the matrix belongs.
     pub length: f64,
-    /// The matrix.
     pub matrix: Matrix,
-    /// The solver for it.
-    pub krylov: Krylov,
-}
-
-/// A linear solver and its preconditioner; all of a run have the same kind.
-pub(super) enum Krylov {
-    /// For linear steps.
-    Linear(Ksp),
-    /// For Newton's method, with the parameters of the contact graphs.
-    Newton(Box<ProjectedKsp>, Vec<[f64; 2]>),
-    /// For Newton's method on the contact alone.
-    Condensed(Box<Option<Factored>>),
-}
-
-impl Krylov {
-    /// A solver like the one in use, not set up.
-    pub(super) fn new_like<const D: usize>(
-        active: &Solver,
-        session: &Session,
-        chosen: Preconditioner,
-        mesh: &Mesh<D>,
-        like: &DistributedVector,
-    ) -> Result<Self> {
-        Ok(match active {
-            Solver::Linear(_) => Self::Linear(linear(session, chosen, mesh)?),
-            Solver::Condensed(_) => Self::Condensed(Box::default()),
-            Solver::Newton(_) => Self::Newton(Box::new(projected(session, chosen, mesh, like)?), Vec::new()),
-        })
-    }
-
-    /// Swaps the contents with the solver in use.
-    pub(super) fn swap_with(&mut self, active: &mut Solver) {
-        match (self, active) {
-            (Self::Linear(own), Solver::Linear(active)) => swap(own, active),
-            (Self::Newton(own, own_scales), Solver::Newton(newton)) => {
-                let Newton { linear_solver, scales, .. } = &mut **newton;
-                swap(&mut **own, linear_solver);
-                swap(own_scales, scales);
-            }
-            (Self::Condensed(own), Solver::Condensed(active)) => active.swap_factored(own),
-            _ => {}
-        }
-    }
+    pub solver: Box<dyn LinearSolver>,
+    /// The parameters of each contact's graphs.
+    pub scales: Vec<[f64; 2]>,
 }
 
 /// Matrices with their preconditioners that are not in use, the most recently used at the end.
 pub(super) struct FactorCache {
-    entries: Vec<Cached>,
+    entries: Vec<Prepared>,
     capacity: usize,
 }
 
@@ -86,14 +34,14 @@ impl FactorCache {
     }
 
     /// Stores an entry; returns the least recently used one if there are too many.
-    pub(super) fn insert(&mut self, cached: Cached) -> Option<Cached> {
-        self.entries.push(cached);
+    pub(super) fn insert(&mut self, prepared: Prepared) -> Option<Prepared> {
+        self.entries.push(prepared);
         (self.entries.len() > self.capacity).then(|| self.entries.remove(0))
     }
 
     /// Removes and returns the entry of this length.
-    pub(super) fn remove(&mut self, length: f64) -> Option<Cached> {
-        let at = self.entries.iter().position(|cached| cached.length == length)?;
+    pub(super) fn remove(&mut self, length: f64) -> Option<Prepared> {
+        let at = self.entries.iter().position(|prepared| prepared.length == length)?;
         Some(self.entries.remove(at))
     }
 }

@@ -4,8 +4,6 @@ use super::substructuring::SharedFactor;
 use crate::{
     error::Result,
     linear_algebra::petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, Precision, require, set_default_option},
-    mesh::Mesh,
-    parallel::session::Session,
 };
 
 pub(super) use crate::job::Solver as SolverSettings;
@@ -103,18 +101,19 @@ impl Preconditioner {
     /// Ranks share a factor, whose results repeat each bit, unless their interface is too large for it: MUMPS sums in the order in
     /// which messages arrive, so that results of two runs differ in the last bits. The faster triple product for the coarse matrices
     /// of GAMG also sums in the order of arrival, as soon as a rank has two neighbours, and is not used then.
-    pub(super) fn configure<const D: usize>(
+    ///
+    /// `factor` is the one that ranks share, if their interface allows it.
+    pub(super) fn configure(
         self,
-        session: &Session,
-        mesh: &Mesh<D>,
+        [order, ranks]: [usize; 2],
+        factor: Option<&SharedFactor>,
         ksp: &mut Ksp,
     ) -> Result<()> {
-        let ranks = session.ranks();
         ksp.set_method("cg")?;
         match self {
             Self::Auto | Self::Cholesky => {
-                if let Some(shared) = SharedFactor::new(session, mesh)? {
-                    return ksp.precondition_by(Box::new(shared));
+                if let Some(factor) = factor {
+                    return ksp.precondition_by(Box::new(factor.unfactored()));
                 }
                 require(
                     HAS_MUMPS,
@@ -129,7 +128,7 @@ impl Preconditioner {
                     set_default_option("matptap_via", "allatonce")?;
                 }
                 set_smoother("")?;
-                if mesh.order() == 1 {
+                if order == 1 {
                     ksp.set_preconditioner("gamg", None)?;
                     return set_aggregation("");
                 }

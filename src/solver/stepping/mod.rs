@@ -6,6 +6,7 @@ mod bounded;
 mod condensed;
 mod condensed_matrix;
 mod contacts;
+mod corrections;
 mod descent;
 mod cost;
 mod time_dependent_data;
@@ -36,6 +37,7 @@ mod step_solver;
 mod stepper;
 mod support_motion;
 mod substructuring;
+mod whole;
 
 pub use adaptive::{Adaptive, StepLevel};
 pub use cost::Cost;

@@ -10,6 +10,7 @@ use super::{
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
     problem::{REMEDY, SOFTENING_REMEDY, StepProblem, System},
+    solver::Reduced,
 };
 use crate::{
     error::{Error, Result},
@@ -24,21 +25,16 @@ use crate::{
     parallel::session::Session,
 };
 
-/// Newton's method: PETSc's solvers, work vectors and the parameters of the contact graphs.
+/// Newton's method: PETSc's solvers and work vectors.
 pub(super) struct Newton {
     snes: Snes,
     settings: SolverSettings,
     /// PETSc's solver for variational inequalities, if it is selected.
     pub bounded: Option<Bounded>,
-    pub linear_solver: ProjectedKsp,
     scratch: Scratch,
     /// Branches of all contact points at the start of the step and at its end.
     branches_before: Vec<u8>,
     branches_after: Vec<u8>,
-    /// The parameters of each contact's graphs for the matrix in use, along the normal and of friction: equal to the resistance of
-    /// the body to motions of its surface alone, and along the normal at least twice the steepest descent. With smaller parameters
-    /// the residual is so steep where points change their branch that line searches fail.
-    pub scales: Vec<[f64; 2]>,
     /// The steepest decrease of each contact's friction with the sliding speed, at the pressures of the last attempt.
     steepest_decreases: Vec<f64>,
     /// The minimisation of energies, once it was needed.
@@ -87,7 +83,6 @@ impl Newton {
     pub(super) fn new<const D: usize>(
         like: &DistributedVector,
         contacts: &[Contact<D>],
-        linear_solver: ProjectedKsp,
         settings: &SolverSettings,
     ) -> Result<Self> {
         let mut snes = Snes::new("", like, D)?;
@@ -96,11 +91,9 @@ impl Newton {
             snes,
             settings: settings.clone(),
             bounded: None,
-            linear_solver,
             scratch: Scratch::new(like, contacts)?,
             branches_before: Vec::new(),
             branches_after: Vec::new(),
-            scales: Vec::new(),
             steepest_decreases: Vec::new(),
             descent: None,
             has_descended: false,
@@ -112,13 +105,13 @@ impl Newton {
         })
     }
 
-    /// Solves a step from the velocity in `trial`, and writes the new one there: tries one fallback after the other, then checks
-    /// that velocities and pressures lie on the contact graphs. Collective.
+    /// Solves equations from their start value: tries one fallback after the other, then checks that velocities and pressures lie on
+    /// the contact graphs. A fixed-point iteration solves with friction bounds at fixed pressures, and updates these until the solution
+    /// also solves the equations with its own pressures. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
-        system: System<'_>,
-        trial: &mut DistributedVector,
+        Reduced { system, krylov, velocity: trial }: Reduced<'_>,
     ) -> Result<StepOutcome> {
         self.counts.restart();
         if let Some(bounded) = &mut self.bounded {
@@ -126,8 +119,7 @@ impl Newton {
             let iterations = bounded.solve(problem, system, trial)?;
             return self.check_inclusion(problem, trial, iterations);
         }
-        let tolerance = LINEAR_SHARE * system.tolerance;
-        self.linear_solver.set_tolerances(LINEAR_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
+        krylov.set_tolerances(LINEAR_REDUCTION, LINEAR_SHARE * system.tolerance, LINEAR_ITERATIONS)?;
         self.start.copy_from(trial)?;
         write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
         let conditions = self.conditions(problem.body);
@@ -135,18 +127,33 @@ impl Newton {
         let mut next = fallbacks.next();
         // With these parameters, whatever those of the last step were: a restarted run does not know them.
         if let Some(first) = next {
-            self.set_graph_parameters(&mut problem.body.contacts, first);
+            self.set_graph_parameters(&mut problem.body.contacts, system.scales, first);
         }
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let (mut iterations, mut failure) = (0, String::new());
-        loop {
-            let Some(fallback) = next else {
-                return Err(explain_failure(problem, &failure, conditions.softens));
+        while let Some(fallback) = next {
+            self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
+            let has_fixed_bounds = fallback.iteration == FrictionIteration::FixedPoint;
+            let mut rounds = 0;
+            let failed = loop {
+                if has_fixed_bounds {
+                    problem.body.contacts.iter_mut().for_each(Contact::update_pressures);
+                }
+                let attempt = self.attempt(problem, system, krylov, fallback.search, trial)?;
+                // Where nothing was to be done, the solution for the last bounds also solves the equations with its own bounds.
+                if attempt.failure.is_some() || !has_fixed_bounds || (attempt.iterations == 0 && rounds > 0) {
+                    iterations += attempt.iterations;
+                    break attempt.failure;
+                }
+                iterations += attempt.iterations.max(1);
+                rounds += 1;
+                if rounds == MAX_FIXED_POINT_ITERATIONS {
+                    break Some(format!(
+                        "friction bounds still change after {rounds} fixed-point iterations"
+                    ));
+                }
             };
-            self.set_graph_parameters(&mut problem.body.contacts, fallback);
-            let attempt = self.attempt(problem, system, fallback, trial)?;
-            iterations += attempt.iterations;
-            if let Some(reason) = attempt.failure {
+            if let Some(reason) = failed {
                 (failure, next) = (reason, fallbacks.next());
                 trial.copy_from(&self.start)?;
                 restore_pressures(problem.body, problem.state)?;
@@ -160,6 +167,7 @@ impl Newton {
                 return self.check_inclusion(problem, trial, iterations);
             }
         }
+        Err(explain_failure(problem, &failure, conditions.softens))
     }
 
     fn conditions<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Conditions {
@@ -177,52 +185,26 @@ impl Newton {
     }
 
     /// Sets the parameters of all graphs, those of friction according to its descents.
-    fn set_graph_parameters<const D: usize>(&self, contacts: &mut [Contact<D>], fallback: Fallback) {
+    fn set_graph_parameters<const D: usize>(
+        &self,
+        contacts: &mut [Contact<D>],
+        scales: &[[f64; 2]],
+        fallback: Fallback,
+    ) {
         let follows = fallback.iteration == FrictionIteration::Newton;
-        for ((contact, scales), decrease) in
-            contacts.iter_mut().zip(&self.scales).zip(&self.steepest_decreases)
-        {
+        for ((contact, scales), decrease) in contacts.iter_mut().zip(scales).zip(&self.steepest_decreases) {
             let [normal, tangential] = scales.map(|scale| fallback.stiffness_factor * scale);
             contact.scale = normal.max(2.0 * contact.monotonicity_constant());
             contact.set_friction(tangential.max(decrease / INITIAL_DECREASE_RATIO), follows);
         }
     }
 
-    /// Tries a fallback once. A fixed-point iteration solves with friction bounds at fixed pressures, and updates these until
-    /// the solution also solves the equations with its own pressures. Collective.
+    /// Newton's method from the velocity in `trial`, where it writes the solution. Collective.
     fn attempt<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
-        fallback: Fallback,
-        trial: &mut DistributedVector,
-    ) -> Result<Attempt> {
-        if fallback.iteration == FrictionIteration::Newton {
-            return self.iterate(problem, system, fallback.search, trial);
-        }
-        let mut sum = 0;
-        for _ in 0..MAX_FIXED_POINT_ITERATIONS {
-            problem.body.contacts.iter_mut().for_each(Contact::update_pressures);
-            let Attempt { iterations, failure } = self.iterate(problem, system, fallback.search, trial)?;
-            if failure.is_some() {
-                return Ok(Attempt { iterations: sum + iterations, failure });
-            }
-            if iterations == 0 && sum > 0 {
-                // The solution for the last bounds also solves the equations with its own bounds.
-                return Ok(Attempt { iterations: sum, failure: None });
-            }
-            sum += iterations.max(1);
-        }
-        let failure =
-            format!("friction bounds still change after {MAX_FIXED_POINT_ITERATIONS} fixed-point iterations");
-        Ok(Attempt { iterations: sum, failure: Some(failure) })
-    }
-
-    /// Newton's method from the velocity in `trial`, where it writes the solution. Collective.
-    fn iterate<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        system: System<'_>,
+        krylov: &mut ProjectedKsp,
         search: Search,
         trial: &mut DistributedVector,
     ) -> Result<Attempt> {
@@ -230,7 +212,7 @@ impl Newton {
         self.has_descended = search == Search::Descent;
         if self.has_descended {
             let tolerance = LINEAR_SHARE * system.tolerance;
-            self.linear_solver.set_tolerances(DESCENT_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
+            krylov.set_tolerances(DESCENT_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
             let mut descent = match self.descent.take() {
                 Some(descent) => descent,
                 None => Descent::new(trial)?,
@@ -268,7 +250,7 @@ impl Newton {
             right_hand_side: system.right_hand_side,
             floor,
             scratch: &mut self.scratch,
-            linear_solver: &mut self.linear_solver,
+            linear_solver: krylov,
             session,
             stop_at_cycles: search == Search::FullSteps,
             equilibrated: search == Search::Equilibrated,

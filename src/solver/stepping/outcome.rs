@@ -38,6 +38,19 @@ pub struct StepOutcome {
     pub peaks: Peaks,
 }
 
+impl StepOutcome {
+    /// The outcome of a further solve, with the work of this one.
+    pub(super) fn followed_by(self, next: Self) -> Self {
+        Self {
+            newton_iterations: self.newton_iterations + next.newton_iterations,
+            linear_iterations: self.linear_iterations + next.linear_iterations,
+            indefinite_solves: self.indefinite_solves + next.indefinite_solves,
+            fell: self.fell || next.fell,
+            ..next
+        }
+    }
+}
+
 /// Sums and largest values over all ranks. Collective.
 pub(super) fn over_ranks(session: &Session, energy: Energy, peaks: Peaks) -> (Energy, Peaks) {
     let [von_mises, strain] = session.largest([peaks.von_mises, peaks.strain]);

@@ -43,6 +43,10 @@ pub(super) struct System<'a> {
     pub floor: Floor,
     /// The velocity of the converged state.
     pub converged: &'a DistributedVector,
+    /// The parameters of each contact's graphs, along the normal and of friction: equal to the resistance of the body to motions of
+    /// its surface alone, and along the normal at least twice the steepest descent. With smaller parameters the residual is so steep
+    /// where points change their branch that line searches fail.
+    pub scales: &'a [[f64; 2]],
 }
 
 impl<const D: usize, const S: usize> StepProblem<'_, D, S> {

@@ -35,20 +35,6 @@ pub(super) fn resistances<const D: usize>(
     contacts.iter().map(&mut resistance).collect()
 }
 
-/// The same for the matrix of the whole body. Collective.
-pub(super) fn resistances_of_body<const D: usize>(
-    session: &Session,
-    contacts: &[Contact<D>],
-    like: &DistributedVector,
-    matrix: &dyn StepMatrix,
-) -> Result<Vec<[f64; 2]>> {
-    let mut product = like.like()?;
-    resistances(session, contacts, like, |motion| {
-        matrix.multiply(motion, &mut product)?;
-        motion.dot(&product)
-    })
-}
-
 /// Sets the reference values of the contacts from the matrix of the whole body, for any method of solving steps. Collective.
 pub(super) fn set_reference_values<const D: usize>(
     session: &Session,
@@ -59,7 +45,7 @@ pub(super) fn set_reference_values<const D: usize>(
     if contacts.is_empty() {
         return Ok(());
     }
-    let all = resistances_of_body(session, contacts, like, matrix)?;
+    let all = resistances(session, contacts, like, |motion| matrix.power(motion))?;
     for (contact, resistance) in contacts.iter_mut().zip(all) {
         contact.reference.resistance = resistance;
         [contact.reference.area] = session.sum([contact.area()]);

@@ -1,110 +1,106 @@
-//! The solver for the steps of a body.
+//! Linear solvers of steps.
 
-use super::{
-    bounded::{self, Bounded},
-    condensed::Condensed,
-    flow::Flow,
-    linear_solver::{Method, Preconditioner, ProblemSize, SolverSettings},
-    newton::Newton,
-};
+use super::{equations::StepMatrix, problem::System, springs::RowsWithSprings};
 use crate::{
-    error::{Error, Result},
-    fem::body::Body,
-    linear_algebra::petsc::{DistributedVector, Ksp, ProjectedKsp, has_option},
-    mesh::Mesh,
+    error::Result,
+    linear_algebra::petsc::{DistributedVector, Interpolation, Matrix, Precision, ProjectedKsp},
     parallel::session::Session,
 };
 
-/// The solver of linear or of nonlinear steps; only the required one exists.
-pub(super) enum Solver {
-    /// Steps without contact and flow.
-    Linear(Ksp),
-    /// Newton's method on the whole body.
-    Newton(Box<Newton>),
-    /// Newton's method on the contact unknowns alone.
-    Condensed(Box<Condensed>),
+/// The matrix of steps of one length, and the data from which it is factored or preconditioned.
+pub(super) struct Assembled<'a> {
+    pub matrix: &'a mut Matrix,
+    pub rows: RowsWithSprings,
+    /// The wanted precision of a factor.
+    pub precision: Precision,
+    /// Coordinates in m of the nodes of this rank, for multigrid.
+    pub coordinates: &'a [f64],
+    /// The linear fields among quadratic ones, for multigrid.
+    pub coarse: Option<Interpolation>,
 }
 
-impl Solver {
-    /// The solver for the steps of a body of this problem size, with the preconditioner of the settings. Vectors have the layout
-    /// of `like`. Collective.
-    pub(super) fn new<const D: usize, const S: usize>(
-        session: &Session,
-        body: &mut Body<D, S>,
-        like: &DistributedVector,
-        settings: &SolverSettings,
-        problem: ProblemSize,
-    ) -> Result<Self> {
-        if body.contacts.is_empty() && !body.flows() {
-            return Ok(Self::Linear(linear(session, settings.preconditioner, &body.mesh)?));
-        }
-        if can_condense(settings, problem)? {
-            let precision = problem.factor_precision();
-            return Ok(Self::Condensed(Box::new(Condensed::new(session, body, like, settings, precision)?)));
-        }
-        Self::whole(session, body, like, settings)
+/// Equations that Newton's method solves: those of the whole body, or those left for the motions on which laws act.
+pub(super) struct Reduced<'a> {
+    pub system: System<'a>,
+    /// The solver of linear systems with the matrix and the slopes of laws.
+    pub krylov: &'a mut ProjectedKsp,
+    /// The start value, and the solution.
+    pub velocity: &'a mut DistributedVector,
+}
+
+/// A solver of linear equations with the matrix `K` of steps of one length. Newton's method finds the velocities along the motions on
+/// which laws act; the linear solver condenses the equations to these unknowns, if it can, and expands their solution to the body.
+pub(super) trait LinearSolver {
+    /// Another solver of the same body that is not prepared. `like` has the layout of velocities of the body.
+    fn another(&self, like: &DistributedVector) -> Result<Box<dyn LinearSolver>>;
+
+    /// Factors or preconditions the matrix; returns whether this solver can solve these equations. Collective.
+    fn prepare(&mut self, session: &Session, assembled: Assembled<'_>) -> Result<bool>;
+
+    /// The solver of the linear systems of Newton's method.
+    fn krylov(&mut self) -> &mut ProjectedKsp;
+
+    /// A vector with the layout of the unknowns of Newton's method, given one with that of the velocities of the body.
+    fn unknowns<'a>(&'a self, velocities: &'a DistributedVector) -> &'a DistributedVector {
+        velocities
     }
 
-    /// Newton's method on the whole body, for velocities with the layout of `like`. Collective.
-    pub(super) fn whole<const D: usize, const S: usize>(
-        session: &Session,
-        body: &mut Body<D, S>,
-        like: &DistributedVector,
-        settings: &SolverSettings,
-    ) -> Result<Self> {
-        body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| node));
-        let linear_solver = projected(session, settings.preconditioner, &body.mesh, like)?;
-        let mut newton = Newton::new(like, &body.contacts, linear_solver, settings)?;
-        if body.flows() {
-            newton.flow = Some(Flow::new(like)?);
-        }
-        if settings.method == Method::Vinewtonrsls {
-            session.agree(bounded::refuse_oblique_normals(body))?;
-            if body.flows() {
-                return Err(Error::Refused(
-                    "[solver] method = \"vinewtonrsls\" does not support viscoplastic flow, damage, adhesion or contact memory at the end of a step; use method = \"newton\" or \
-                     [time] scheme = \"lagged_euler\""
-                        .into(),
-                ));
-            }
-            newton.bounded = Some(Bounded::new(like, settings)?);
-        }
-        Ok(Self::Newton(Box::new(newton)))
+    /// The position of a contact node in vectors of these unknowns.
+    fn number(&self, node: usize) -> usize {
+        node
     }
-}
 
-/// Whether all unknowns except the motions of contact nodes are eliminated.
-fn can_condense(settings: &SolverSettings, problem: ProblemSize) -> Result<bool> {
-    Ok(settings.preconditioner == Preconditioner::Cholesky
-        && settings.method == Method::Newton
-        && problem.is_condensed()
-        && !has_option("pc_type")?
-        && !has_option("ksp_type")?)
-}
+    /// The precision of the factor, if equations are condensed.
+    fn precision(&self) -> Option<Precision> {
+        None
+    }
 
-/// A solver of linear steps on a mesh. Collective.
-pub(super) fn linear<const D: usize>(
-    session: &Session,
-    chosen: Preconditioner,
-    mesh: &Mesh<D>,
-) -> Result<Ksp> {
-    let mut ksp = Ksp::new("")?;
-    chosen.configure(session, mesh, &mut ksp)?;
-    ksp.start_from_solution()?;
-    ksp.apply_options()?;
-    Ok(ksp)
-}
+    /// `x . K x` in W of a motion `x` of contact nodes; if equations are condensed, with all other velocities in equilibrium with it.
+    /// Collective.
+    fn power(&mut self, matrix: &Matrix, motion: &DistributedVector) -> Result<f64> {
+        StepMatrix::power(matrix, motion)
+    }
 
-/// A solver for Newton's method on a mesh, for vectors with the layout of `like`. Collective.
-pub(super) fn projected<const D: usize>(
-    session: &Session,
-    chosen: Preconditioner,
-    mesh: &Mesh<D>,
-    like: &DistributedVector,
-) -> Result<ProjectedKsp> {
-    let mut solver = ProjectedKsp::new("", like, D)?;
-    chosen.configure(session, mesh, solver.linear_solver())?;
-    solver.linear_solver().apply_options()?;
-    solver.set_refresh_threshold(chosen.refresh_threshold(D));
-    Ok(solver)
+    /// Starts a step from this velocity. Collective.
+    fn start(&mut self, _system: System<'_>, _trial: &DistributedVector) -> Result<()> {
+        Ok(())
+    }
+
+    /// The equations that Newton's method is to solve, for the velocity in `trial` or for a correction of it. Collective.
+    fn condense<'a>(
+        &'a mut self,
+        system: System<'a>,
+        trial: &'a mut DistributedVector,
+    ) -> Result<Reduced<'a>>;
+
+    /// Writes the velocity of the body that belongs to their solution; returns the residual norm in N that is left of all equations
+    /// if corrections must reduce it. Collective.
+    fn expand(&mut self, _system: System<'_>, _trial: &mut DistributedVector) -> Result<Option<f64>> {
+        Ok(None)
+    }
+
+    /// Approximates `K x = b`, without contact. Collective.
+    fn solve(&mut self, forces: &DistributedVector, solution: &mut DistributedVector) -> Result<()>;
+
+    /// The same on the subspace last set. Collective.
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.solve(r, z)
+    }
+
+    /// Sets this subspace, given the projection on it and a work vector of the body; returns whether anything was rebuilt for it.
+    /// Collective.
+    fn set_subspace(
+        &mut self,
+        _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
+        _work: &mut DistributedVector,
+    ) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// Restarts the count of traffic.
+    fn restart_traffic(&mut self);
+
+    /// Least number of bytes that this rank has read since then, given those of a product with the matrix, without the products that
+    /// were made for Newton's method; `None` for preconditioners of unknown size.
+    fn traffic(&mut self, ranks: usize, product: u64) -> Result<Option<u64>>;
 }

@@ -2,21 +2,28 @@
 
 use super::{
     StepOutcome,
+    bounded::{self, Bounded},
+    condensed::Condensed,
     contacts::restore_pressures,
+    corrections::correct,
     equations::Floor,
-    factor_cache::{Cached, FactorCache, Krylov},
+    factor_cache::{FactorCache, Prepared},
+    flow::Flow,
+    flow_corrections::{Corrected, FlowCorrections},
     force_scale::size_of,
-    linear_solver::{LINEAR_ITERATIONS, Preconditioner, ProblemSize, SolverSettings},
+    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, ProblemSize, SolverSettings},
+    newton::Newton,
     problem::{REMEDY, StepProblem, System},
-    resistance::{resistances_of_body, set_reference_values},
-    solver::Solver,
+    resistance::{resistances, set_reference_values},
+    solver::{Assembled, LinearSolver},
     springs::{RowsWithSprings, Springs},
     step_clock::CountedMatrix,
+    whole::Whole,
 };
 use crate::{
     error::{Error, Result},
     fem::{body::Body, effect::Contact, space::linear_subspace, state::State},
-    linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision},
+    linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision, has_option},
     parallel::{agreement::Agreed, session::Session},
 };
 use std::cell::Cell;
@@ -52,19 +59,26 @@ pub(super) struct StepSolver {
     settings: SolverSettings,
     /// The reason for the choice of the preconditioner.
     reason: String,
+    /// A solver of the kind in use without a matrix, from which those with one are made.
+    kind: Box<dyn LinearSolver>,
+    /// Newton's method, unless steps are linear.
+    newton: Option<Box<Newton>>,
+    /// Corrections of condensed steps, if cells flow.
+    flowing: Option<Box<FlowCorrections>>,
+    /// The precision of the next factors: double after single precision has failed.
+    precision: Precision,
     /// The matrix to which the preconditioner in use belongs.
-    cached: Option<(f64, Matrix)>,
+    active: Option<Prepared>,
     /// The matrix of the step, if its length is not that of the preconditioner.
-    step_matrix: Option<(f64, Matrix)>,
+    step_matrix: Option<Matrix>,
     /// The lengths for which matrix and preconditioner are prepared.
     prepared: Option<Lengths>,
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
-    solver: Solver,
+    /// The velocity from which a step with a factor in single precision was started.
+    start: Option<DistributedVector>,
     /// Products with the matrix since the count of traffic was restarted, without those of PETSc's Krylov solver for linear steps.
     products: Cell<u64>,
-    /// Whether a set-up failed: the linear solver in use must be replaced.
-    set_up_failed: bool,
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
     /// Springs that keep the factors of bodies supported by contact alone regular.
@@ -83,17 +97,26 @@ impl StepSolver {
         let problem = ProblemSize::of(session, body, steps, settings.factor_precision)?;
         let (preconditioner, reason) = settings.preconditioner.resolve(problem);
         let settings = SolverSettings { preconditioner, ..settings.clone() };
-        let solver = Solver::new(session, body, &state.velocity, &settings, problem)?;
+        let like = &state.velocity;
+        let kind: Box<dyn LinearSolver> = if can_condense(&settings, problem)? {
+            Box::new(Condensed::new(session, body)?)
+        } else {
+            Box::new(Whole::new(session, body, like, &settings)?)
+        };
+        let (newton, flowing) = nonlinear(session, body, &*kind, like, &settings)?;
         Ok(Self {
             settings,
             reason,
-            cached: None,
+            kind,
+            newton,
+            flowing,
+            precision: problem.factor_precision(),
+            active: None,
             step_matrix: None,
             prepared: None,
             matrix_norm: 0.0,
-            solver,
+            start: None,
             products: Cell::new(0),
-            set_up_failed: false,
             cache: None,
             springs: Springs::default(),
         })
@@ -101,7 +124,7 @@ impl StepSolver {
 
     /// Whether steps are solved by Newton's method.
     pub(super) fn is_nonlinear(&self) -> bool {
-        !matches!(self.solver, Solver::Linear(_))
+        self.newton.is_some()
     }
 
     /// The preconditioner in use, and the reason for it.
@@ -111,17 +134,12 @@ impl StepSolver {
 
     /// The precision of factors, if steps are condensed to the contact.
     pub(super) fn factor_precision(&self) -> Option<Precision> {
-        match &self.solver {
-            Solver::Condensed(condensed) => Some(condensed.precision),
-            _ => None,
-        }
+        self.kind.precision().map(|_| self.precision)
     }
 
     /// Lets the next factors of condensed steps be in double precision.
     pub(super) fn use_double_precision(&mut self) {
-        if let Solver::Condensed(condensed) = &mut self.solver {
-            condensed.precision = Precision::Double;
-        }
+        self.precision = Precision::Double;
     }
 
     /// Whether the matrices belong to these lengths.
@@ -139,138 +157,102 @@ impl StepSolver {
         like: &DistributedVector,
     ) -> Result<bool> {
         (self.prepared, self.step_matrix) = (None, None);
-        let length = self.cached_length(lengths);
+        // A condensed matrix is valid only for its own length, but where cells flow its factor preconditions Newton's method for nearby
+        // lengths.
+        let is_exact = self.kind.precision().is_some() && self.flowing.is_none();
+        let length = if is_exact { lengths.matrix } else { lengths.cached };
         let mut is_new = false;
-        if self.cached.as_ref().is_none_or(|(known, _)| *known != length) {
+        if self.active.as_ref().is_none_or(|active| active.length != length) {
             let cached = self.cache.as_mut().and_then(|cache| cache.remove(length));
+            self.store_active::<D>(session, body.mesh.total_nodes * D)?;
             is_new = cached.is_none();
-            let (matrix, krylov) = cached.map(|Cached { matrix, krylov, .. }| (matrix, krylov)).unzip();
-            self.activate_solver(session, body, krylov, like)?;
-            let matrix = match matrix {
-                Some(matrix) => matrix,
-                None => {
-                    self.set_up_failed = true;
-                    self.set_up(session, body, length, like)?
-                }
+            self.active = match cached {
+                None => Some(self.set_up(session, body, length, like)?),
+                cached => cached,
             };
-            self.set_up_failed = false;
-            self.cached = Some((length, matrix));
         }
         if lengths.matrix != length {
             let rows = matrix_rows(session, body, lengths.matrix)?;
-            self.step_matrix = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
+            self.step_matrix = Some(session.agree(Matrix::symmetric(D, &rows))?);
         }
         self.matrix_norm = self.matrix()?.norm()?;
         set_reference_values(session, &mut body.contacts, like, self.matrix()?)?;
-        if let (Solver::Linear(ksp), Some((_, cached))) = (&mut self.solver, &self.cached) {
-            ksp.set_matrices(self.step_matrix.as_ref().map_or(cached, |(_, matrix)| matrix), cached)?;
+        if let (None, Some(Prepared { matrix, solver, .. })) = (&self.newton, &mut self.active) {
+            let ksp = solver.krylov().linear_solver();
+            ksp.set_matrices(self.step_matrix.as_ref().unwrap_or(matrix), matrix)?;
         }
         self.prepared = Some(lengths);
         Ok(is_new)
     }
 
-    /// The length whose preconditioner is set up: a condensed matrix is valid only for its own length, but where cells flow its factor
-    /// preconditions Newton's method for nearby lengths.
-    fn cached_length(&self, lengths: Lengths) -> f64 {
-        match &self.solver {
-            Solver::Condensed(condensed) if !condensed.flows() => lengths.matrix,
-            _ => lengths.cached,
-        }
-    }
-
-    /// Activates another linear solver: `next`, or a new one that is not set up. The matrix in use, if there is one, is stored in
-    /// the cache with its preconditioner; the objects of a failed set-up are dropped. Collective.
-    fn activate_solver<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        next: Option<Krylov>,
-        like: &DistributedVector,
-    ) -> Result<()> {
-        let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
-        let mut krylov = match next {
-            Some(krylov) => krylov,
-            None if self.cached.is_none() && !self.set_up_failed => return Ok(()),
-            None => Krylov::new_like(&self.solver, session, chosen, &body.mesh, like)?,
-        };
-        krylov.swap_with(&mut self.solver);
-        let Some((length, matrix)) = self.cached.take() else { return Ok(()) };
+    /// Stores the matrix in use with its preconditioner in the cache, for a body with this number of unknowns. Collective.
+    fn store_active<const D: usize>(&mut self, session: &Session, unknowns: usize) -> Result<()> {
+        let Some(active) = self.active.take() else { return Ok(()) };
         let cache = match &mut self.cache {
             Some(cache) => cache,
             none => {
-                let bytes = 12.0 * matrix.stored_entries()?;
+                let bytes = 12.0 * active.matrix.stored_entries()?;
+                let chosen = self.settings.preconditioner;
                 let capacity = chosen.cache_capacity(D, unknowns, session.ranks(), bytes);
                 none.insert(FactorCache::new(capacity - 1))
             }
         };
-        cache.insert(Cached { length, matrix, krylov });
+        cache.insert(active);
         Ok(())
     }
 
-    /// Assembles the matrix of steps of this length in s and sets up the preconditioner of the linear solver in use with it.
-    /// Collective.
+    /// Assembles the matrix of steps of this length in s and sets up a linear solver with it. Collective.
     fn set_up<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         length: f64,
         like: &DistributedVector,
-    ) -> Result<Matrix> {
+    ) -> Result<Prepared> {
         let rows = matrix_rows(session, body, length)?;
-        let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
-        let mut rows_with_springs = self.springs.add(session, body, rows)?;
-        if let Solver::Condensed(condensed) = &mut self.solver {
-            if condensed.prepare(session, body, rows_with_springs, &matrix, like)? {
-                if condensed.active_precision()? == Precision::Single {
-                    matrix.multiply_often()?;
-                }
-                return Ok(matrix);
-            }
-            self.solver = Solver::whole(session, body, like, &self.settings)?;
-            rows_with_springs = self.springs.rows(session, body, length)?;
+        let matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        let rows = self.springs.add(session, body, rows)?;
+        let mut prepared = Prepared { length, matrix, solver: self.kind.another(like)?, scales: Vec::new() };
+        if !self.complete(session, body, &mut prepared, rows, like)? {
+            self.kind = Box::new(Whole::new(session, body, like, &self.settings)?);
+            (self.newton, self.flowing) = nonlinear(session, body, &*self.kind, like, &self.settings)?;
+            prepared.solver = self.kind.another(like)?;
+            let rows = self.springs.rows(session, body, length)?;
+            self.complete(session, body, &mut prepared, rows, like)?;
         }
-        let RowsWithSprings { rows, springs } = rows_with_springs;
-        // The matrix for the preconditioner, if it differs from the matrix of the step.
-        let mut with_springs = None;
-        if springs.is_some() {
-            with_springs = Some(session.agree(Matrix::symmetric(D, &rows))?);
-        }
-        drop(rows);
-        if self.settings.preconditioner == Preconditioner::Gamg {
-            let ksp = match &mut self.solver {
-                Solver::Linear(ksp) => Some(ksp),
-                Solver::Newton(newton) => Some(newton.linear_solver.linear_solver()),
-                Solver::Condensed(_) => None,
-            };
-            if let Some(ksp) = ksp.filter(|_| body.mesh.order() == 2) {
-                let interpolation = session.agree(linear_subspace(session, &body.mesh, &body.held))?;
-                ksp.set_coarse_space(D, interpolation)?;
-            }
-            let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
-            with_springs.as_mut().unwrap_or(&mut matrix).attach_rigid_motions(D, coordinates)?;
-        }
-        if self.settings.preconditioner != Preconditioner::Cholesky {
-            matrix.multiply_often()?;
-        }
-        match &mut self.solver {
-            Solver::Linear(ksp) => {
-                ksp.set_matrices(&matrix, &matrix)?;
-                session.agree(ksp.set_up())?;
-            }
-            Solver::Newton(newton) => {
-                let constant = with_springs.as_ref().unwrap_or(&matrix);
-                session.agree(newton.linear_solver.set_constant(constant))?;
-                newton.scales = resistances_of_body(session, &body.contacts, like, &matrix)?;
-            }
-            Solver::Condensed(_) => {}
-        }
-        Ok(matrix)
+        Ok(prepared)
     }
 
-    /// The matrix in use.
+    /// Prepares a linear solver, and chooses the parameters of the graphs of contacts; returns whether it can solve the equations.
+    /// Collective.
+    fn complete<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        Prepared { matrix, solver, scales, .. }: &mut Prepared,
+        rows: RowsWithSprings,
+        like: &DistributedVector,
+    ) -> Result<bool> {
+        let has_coarse = self.settings.preconditioner == Preconditioner::Gamg && body.mesh.order() == 2;
+        let coarse = if has_coarse {
+            Some(session.agree(linear_subspace(session, &body.mesh, &body.held))?)
+        } else {
+            None
+        };
+        let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
+        let assembled = Assembled { matrix, rows, precision: self.precision, coordinates, coarse };
+        if !solver.prepare(session, assembled)? {
+            return Ok(false);
+        }
+        self.precision = solver.precision().unwrap_or(self.precision);
+        *scales = resistances(session, &body.contacts, like, |motion| solver.power(matrix, motion))?;
+        Ok(true)
+    }
+
+    /// The matrix of the step.
     fn matrix(&self) -> Result<&Matrix> {
-        let unprepared = || Error::Internal("a matrix was requested before it was assembled".into());
-        self.step_matrix.as_ref().or(self.cached.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
+        let of_length = self.active.as_ref().map(|active| &active.matrix);
+        self.step_matrix.as_ref().or(of_length).ok_or_else(unassembled)
     }
 
     /// `y = K x`. Collective.
@@ -281,41 +263,24 @@ impl StepSolver {
     /// Restarts the count of traffic.
     pub(super) fn restart_traffic(&mut self) {
         self.products.set(0);
-        match &mut self.solver {
-            Solver::Condensed(condensed) => condensed.restart_traffic(),
-            Solver::Linear(ksp) => ksp.restart_applications(),
-            Solver::Newton(newton) => newton.linear_solver.restart_applications(),
-        }
+        self.active.iter_mut().for_each(|active| active.solver.restart_traffic());
     }
 
     /// Least number of bytes moved on this rank since then; `None` where they are not counted: cells that flow, PETSc's solver
     /// for variational inequalities, preconditioners of unknown size.
     pub(super) fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
         let product = self.matrix()?.bytes_of_a_product()?;
-        let products = self.products.get() * product;
-        match &mut self.solver {
-            Solver::Condensed(condensed) => Ok(condensed.traffic().map(|bytes| products + bytes)),
-            Solver::Newton(newton) if newton.flow.is_some() || newton.bounded.is_some() => Ok(None),
-            Solver::Newton(newton) => {
-                let applications = newton.linear_solver.applications();
-                let applied = newton.linear_solver.linear_solver().bytes_applied(ranks)?;
-                Ok(applied.map(|bytes| products + applications * bytes))
-            }
-            Solver::Linear(ksp) => {
-                // PETSc multiplies the same number of times: for the first residual, and in each iteration.
-                let (applications, applied) = (ksp.applications(), ksp.bytes_applied(ranks)?);
-                Ok(applied.map(|bytes| applications * (product + bytes)))
-            }
+        let Some(Prepared { solver, .. }) = &mut self.active else { return Ok(None) };
+        let is_uncounted = |newton: &Newton| newton.flow.is_some() || newton.bounded.is_some();
+        if self.flowing.is_some() || self.newton.as_deref().is_some_and(is_uncounted) {
+            return Ok(None);
         }
+        Ok(solver.traffic(ranks, product)?.map(|bytes| bytes + self.products.get() * product))
     }
 
     /// Applies the preconditioner. Collective.
     pub(super) fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        match &mut self.solver {
-            Solver::Condensed(condensed) => condensed.solve_linear(r, z),
-            Solver::Linear(ksp) => ksp.precondition(r, z),
-            Solver::Newton(newton) => newton.linear_solver.linear_solver().precondition(r, z),
-        }
+        self.active.as_mut().ok_or_else(unassembled)?.solver.solve(r, z)
     }
 
     /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails, it is repeated with a factor in
@@ -331,21 +296,31 @@ impl StepSolver {
         let floor = Floor { slope: f64::EPSILON * self.matrix_norm, largest: LARGEST_FLOOR * size };
         let (mut is_relaxed, mut is_pressed_on) = (false, false);
         loop {
-            let is_single = self.active_precision()? == Some(Precision::Single);
-            let (_, matrix) =
-                self.step_matrix.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
-                    Error::Internal("a step was solved before its matrix was assembled".into())
-                })?;
-            let matrix = &CountedMatrix { matrix, products: &self.products };
+            let Self { active, step_matrix, newton, flowing, start, products, .. } = &mut *self;
+            let Prepared { matrix, solver, scales, .. } = active.as_mut().ok_or_else(unassembled)?;
+            let (solver, is_own) = (&mut **solver, step_matrix.is_none());
+            let is_single = solver.precision() == Some(Precision::Single);
+            if is_single {
+                keep(trial, start)?;
+            }
+            let matrix = &CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products };
             let (right_hand_side, converged) = (forces, &state.velocity);
-            let system = System { matrix, right_hand_side, tolerance, floor, converged };
-            let solved = match &mut self.solver {
-                Solver::Linear(ksp) => solve_linear(ksp, problem, system, trial),
-                Solver::Newton(newton) => newton.solve(problem, system, trial),
-                Solver::Condensed(condensed) if is_single => condensed.refine(problem, system, trial),
-                Solver::Condensed(condensed) => {
-                    let is_own = self.step_matrix.is_none();
-                    condensed.solve(problem, system, trial, is_own)
+            let system = System { matrix, right_hand_side, tolerance, floor, converged, scales };
+            let solved = match (newton, flowing) {
+                (None, _) => solve_linear(solver.krylov().linear_solver(), problem, system, trial),
+                (Some(newton), None) => correct(newton, solver, problem, system, trial),
+                (Some(newton), Some(flowing)) => {
+                    let corrected = match is_own {
+                        true => flowing.correct(newton, solver, problem, system, trial),
+                        false => Ok(Corrected::Unfinished(StepOutcome::default())),
+                    };
+                    match corrected {
+                        Ok(Corrected::Solved(outcome)) => Ok(outcome),
+                        Ok(Corrected::Unfinished(work)) => flowing
+                            .solve_whole(solver, problem, system, trial)
+                            .map(|outcome| work.followed_by(outcome)),
+                        Err(error) => Err(error),
+                    }
                 }
             };
             let failure = match session.agree(solved) {
@@ -423,30 +398,78 @@ impl StepSolver {
         Ok(Accuracy { tolerance, size, reference: size.max(rounding.max(product) / accuracy) })
     }
 
-    /// The precision of the factor in use, if steps are condensed to the contact.
-    fn active_precision(&mut self) -> Result<Option<Precision>> {
-        match &mut self.solver {
-            Solver::Condensed(condensed) => condensed.active_precision().map(Some),
-            _ => Ok(None),
-        }
-    }
-
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
     fn refactor_in_double<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
     ) -> Result<()> {
-        let (length, matrix) =
-            self.step_matrix.as_ref().or(self.cached.as_ref()).map_or((0.0, None), |(l, m)| (*l, Some(m)));
-        let (Solver::Condensed(condensed), Some(matrix)) = (&mut self.solver, matrix) else { return Ok(()) };
-        condensed.restore_start(trial)?;
+        let Some(mut prepared) = self.active.take() else { return Err(unassembled()) };
+        if let Some(start) = &self.start {
+            trial.copy_from(start)?;
+        }
         restore_pressures(problem.body, problem.state)?;
-        condensed.precision = Precision::Double;
-        let rows = self.springs.rows(problem.session, problem.body, length)?;
-        condensed.prepare(problem.session, problem.body, rows, matrix, problem.forces)?;
+        self.precision = Precision::Double;
+        let (session, body, like) = (problem.session, &*problem.body, problem.forces);
+        let rows = self.springs.rows(session, body, prepared.length)?;
+        self.complete(session, body, &mut prepared, rows, like)?;
+        self.active = Some(prepared);
         Ok(())
     }
+}
+
+fn unassembled() -> Error {
+    Error::Internal("a matrix was requested before it was assembled".into())
+}
+
+/// Copies a vector to another, which it creates if there is none.
+fn keep(from: &DistributedVector, to: &mut Option<DistributedVector>) -> Result<()> {
+    match to {
+        Some(to) => to.copy_from(from),
+        none => none.insert(from.like()?).copy_from(from),
+    }
+}
+
+/// Whether all unknowns except the motions of contact nodes are eliminated.
+fn can_condense(settings: &SolverSettings, problem: ProblemSize) -> Result<bool> {
+    Ok(settings.preconditioner == Preconditioner::Cholesky
+        && settings.method == Method::Newton
+        && problem.is_condensed()
+        && !has_option("pc_type")?
+        && !has_option("ksp_type")?)
+}
+
+/// Newton's method for a body with this kind of linear solver, and corrections of condensed steps in which cells flow; nothing if its steps
+/// are linear. Vectors have the layout of `like`. Collective.
+fn nonlinear<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    solver: &dyn LinearSolver,
+    like: &DistributedVector,
+    settings: &SolverSettings,
+) -> Result<(Option<Box<Newton>>, Option<Box<FlowCorrections>>)> {
+    if body.contacts.is_empty() && !body.flows() {
+        return Ok((None, None));
+    }
+    let mut newton = Box::new(Newton::new(solver.unknowns(like), &body.contacts, settings)?);
+    if settings.method == Method::Vinewtonrsls {
+        session.agree(bounded::refuse_oblique_normals(body))?;
+        if body.flows() {
+            return Err(Error::Refused(
+                "[solver] method = \"vinewtonrsls\" does not support viscoplastic flow, damage, adhesion or contact memory at the end of a step; use method = \"newton\" or \
+                 [time] scheme = \"lagged_euler\""
+                    .into(),
+            ));
+        }
+        newton.bounded = Some(Bounded::new(like, settings)?);
+    }
+    let mut flowing = None;
+    if body.flows() && solver.precision().is_some() {
+        flowing = Some(Box::new(FlowCorrections::new(like, settings)?));
+    } else if body.flows() {
+        newton.flow = Some(Flow::new(like)?);
+    }
+    Ok((Some(newton), flowing))
 }
 
 /// Solves a step without contact and flow. Collective.

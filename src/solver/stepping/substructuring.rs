@@ -35,7 +35,7 @@ const NONE: u32 = u32::MAX;
 pub(super) const MAX_INTERFACE_UNKNOWNS: usize = 12_000;
 
 /// The unknowns of interface and contact, numbered over all ranks: first those of the interface, then those of the contact.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Substructures {
     dimension: usize,
     /// Nodes owned here.
@@ -516,6 +516,11 @@ impl SharedFactor {
     pub(super) fn new<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Result<Option<Self>> {
         let substructures = Substructures::new(session, mesh, &Frames::new::<D>(session, mesh, &[])?)?;
         Ok((substructures.total <= MAX_INTERFACE_UNKNOWNS).then_some(Self { substructures, factors: None }))
+    }
+
+    /// Another one for matrices on the same nodes.
+    pub(super) fn unfactored(&self) -> Self {
+        Self { substructures: self.substructures.clone(), factors: None }
     }
 }
 

@@ -1,0 +1,135 @@
+//! Linear solves with the velocities of the whole body as unknowns, by CG with any preconditioner.
+
+use super::{
+    linear_solver::{Preconditioner, SolverSettings},
+    problem::System,
+    solver::{Assembled, LinearSolver, Reduced},
+    springs::RowsWithSprings,
+    substructuring::SharedFactor,
+};
+use crate::{
+    error::Result,
+    fem::body::Body,
+    linear_algebra::petsc::{DistributedVector, Matrix, ProjectedKsp},
+    parallel::session::Session,
+};
+use std::rc::Rc;
+
+/// CG and its preconditioner.
+pub(super) struct Whole {
+    kind: Rc<Kind>,
+    krylov: ProjectedKsp,
+}
+
+/// What the solvers for all matrices of a run have in common.
+struct Kind {
+    preconditioner: Preconditioner,
+    dimension: usize,
+    order: usize,
+    ranks: usize,
+    /// Whether steps are linear, with neither contact nor flow.
+    is_linear: bool,
+    /// A factor that ranks share, not yet computed, if it is the preconditioner.
+    factor: Option<SharedFactor>,
+}
+
+impl Whole {
+    /// A solver for a body, for velocities with the layout of `like`. Collective.
+    pub(super) fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &mut Body<D, S>,
+        like: &DistributedVector,
+        settings: &SolverSettings,
+    ) -> Result<Self> {
+        body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| node));
+        let preconditioner = settings.preconditioner;
+        let factor = match preconditioner {
+            Preconditioner::Auto | Preconditioner::Cholesky => SharedFactor::new(session, &body.mesh)?,
+            _ => None,
+        };
+        let kind = Kind {
+            preconditioner,
+            dimension: D,
+            order: body.mesh.order(),
+            ranks: session.ranks(),
+            is_linear: body.contacts.is_empty() && !body.flows(),
+            factor,
+        };
+        Self::of(Rc::new(kind), like)
+    }
+
+    fn of(kind: Rc<Kind>, like: &DistributedVector) -> Result<Self> {
+        let Kind { preconditioner, dimension, order, ranks, is_linear, ref factor } = *kind;
+        let mut krylov = ProjectedKsp::new("", like, dimension)?;
+        let ksp = krylov.linear_solver();
+        preconditioner.configure([order, ranks], factor.as_ref(), ksp)?;
+        if is_linear {
+            ksp.start_from_solution()?;
+        }
+        ksp.apply_options()?;
+        krylov.set_refresh_threshold(preconditioner.refresh_threshold(dimension));
+        Ok(Self { kind, krylov })
+    }
+}
+
+impl LinearSolver for Whole {
+    fn another(&self, like: &DistributedVector) -> Result<Box<dyn LinearSolver>> {
+        Ok(Box::new(Self::of(self.kind.clone(), like)?))
+    }
+
+    fn prepare(&mut self, session: &Session, assembled: Assembled<'_>) -> Result<bool> {
+        let Kind { preconditioner, dimension, is_linear, .. } = *self.kind;
+        let Assembled { matrix, rows: RowsWithSprings { rows, springs }, .. } = assembled;
+        // The matrix for the preconditioner, if it differs from the matrix of the step.
+        let mut with_springs = None;
+        if springs.is_some() {
+            with_springs = Some(session.agree(Matrix::symmetric(dimension, &rows))?);
+        }
+        drop(rows);
+        if preconditioner == Preconditioner::Gamg {
+            if let Some(interpolation) = assembled.coarse {
+                self.krylov.linear_solver().set_coarse_space(dimension, interpolation)?;
+            }
+            let matrix = with_springs.as_mut().unwrap_or(matrix);
+            matrix.attach_rigid_motions(dimension, assembled.coordinates)?;
+        }
+        if preconditioner != Preconditioner::Cholesky {
+            matrix.multiply_often()?;
+        }
+        if is_linear {
+            let ksp = self.krylov.linear_solver();
+            ksp.set_matrices(matrix, matrix)?;
+            session.agree(ksp.set_up())?;
+        } else {
+            session.agree(self.krylov.set_constant(with_springs.as_ref().unwrap_or(matrix)))?;
+        }
+        Ok(true)
+    }
+
+    fn krylov(&mut self) -> &mut ProjectedKsp {
+        &mut self.krylov
+    }
+
+    fn condense<'a>(
+        &'a mut self,
+        system: System<'a>,
+        trial: &'a mut DistributedVector,
+    ) -> Result<Reduced<'a>> {
+        Ok(Reduced { system, krylov: &mut self.krylov, velocity: trial })
+    }
+
+    fn solve(&mut self, forces: &DistributedVector, solution: &mut DistributedVector) -> Result<()> {
+        self.krylov.linear_solver().precondition(forces, solution)
+    }
+
+    fn restart_traffic(&mut self) {
+        self.krylov.restart_applications();
+    }
+
+    /// CG for a linear step multiplies as many times as it preconditions: for the first residual, and in each iteration.
+    fn traffic(&mut self, ranks: usize, product: u64) -> Result<Option<u64>> {
+        let products = if self.kind.is_linear { product } else { 0 };
+        let applied = self.krylov.linear_solver().bytes_applied(ranks)?;
+        Ok(applied.map(|bytes| self.krylov.applications() * (products + bytes)))
+    }
+}
