@@ -244,6 +244,21 @@ mod tests {
     }
 
     #[test]
+    fn values_far_below_the_largest_of_their_field_are_zero() {
+        let wear = History { name: "wear".into(), place: Place::Node, values: vec![3e-9, -2e-9, f64::NAN] };
+        let mut snapshot = Snapshot {
+            fields: [("displacement", vec![1e-9, -3e-9, 1.0])].into(),
+            histories: vec![wear],
+            ..Snapshot::default()
+        };
+        let largest = [("displacement", 2.0), ("wear", 1e-3)].map(|(name, most)| (name.to_owned(), most));
+        snapshot.clear_below(1e-9, &largest.into());
+        assert_eq!(snapshot.fields["displacement"], [0.0, -3e-9, 1.0]);
+        let wear = &snapshot.histories[0].values;
+        assert!(wear[..2] == [3e-9, -2e-9] && wear[2].is_nan(), "{wear:?}");
+    }
+
+    #[test]
     fn a_cell_with_a_node_that_is_not_there_is_no_mesh() {
         let mesh =
             Snapshot { nodes: vec![[0.0; 3]; 3], cells: vec![0, 1, 2], corners: 3, ..Snapshot::default() };
