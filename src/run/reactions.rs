@@ -140,8 +140,9 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     let change = of_form(Form::Elasticity, &|at| length * velocity[at])?;
     let mass = of_form(Form::Mass, &|at| velocity[at])?;
     // The size of the forces of the cells, which cancel where the body is not strained.
-    let cells =
-        of_form(Form::Elasticity, &|at| displacement[at].abs() * if at / D % 2 == 0 { 1.0 } else { -1.0 })?;
+    let cells = of_form(Form::Elasticity, &|at| {
+        displacement[at].abs() * if (at / D).is_multiple_of(2) { 1.0 } else { -1.0 }
+    })?;
     let mut loads = session.agree(state.velocity.like())?;
     session.agree(body.write_loads(0.0, &mut loads))?;
     let whole = |_: usize, force: &Vector<D>| *force;
