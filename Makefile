@@ -29,7 +29,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-effects bench-space verification lint deny msrv book gallery deb install clean
+.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-effects bench-estimates bench-space verification lint deny msrv book gallery deb install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -48,6 +48,7 @@ help:
 	@echo 'make book      docs/ as a book in target/book, with its links and formulas checked'
 	@echo 'make gallery   run the jobs with pictures in README.md, and write the pictures'
 	@echo 'make bench-effects  what effects cost (docs/speed.md); ARGS=--write puts the table into it'
+	@echo 'make bench-estimates  estimated and measured times of all jobs (docs/speed.md); ARGS=--write puts the table into it'
 	@echo 'make bench-space  errors in space against seconds and memory (docs/space.md); ARGS=--write puts the tables into it'
 	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
@@ -127,6 +128,10 @@ bench-accuracy: deps
 # What effects cost, a few minutes.
 bench-effects: deps
 	cargo bench --locked --bench effects -- $(ARGS)
+
+# The estimates of solver check against the time of the runs of all jobs, some minutes; ARGS=--write puts the table into docs/speed.md.
+bench-estimates: deps
+	cargo bench --locked --bench estimates -- $(ARGS)
 
 # Errors in space against seconds and memory, by order of the cells.
 bench-space: deps

@@ -515,8 +515,8 @@ fn stages(stages: Vec<Loaded>) -> Result<Vec<Loaded>> {
 }
 
 fn check(job: &Path, overrides: &[String], (json, is_trusted): (bool, bool)) -> Result<Exit> {
-    on_all_ranks(job, overrides, |session, loaded, _| {
-        let report = run::check(session, loaded.trusted(is_trusted))?;
+    on_all_ranks(job, overrides, |session, loaded, clock| {
+        let report = run::check(session, loaded.trusted(is_trusted), Some(clock.began))?;
         if session.is_first() {
             print(&if json { report.json()? } else { report.text() });
         }

@@ -116,7 +116,7 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
     let mesh = folder.path().join("mesh.msh");
     let check = |job: &str| -> Result<(), Error> {
         let loaded = Job::from_text(job, "job.toml", folder.path(), &[])?;
-        run::check(&session, loaded)?.json().map(drop)
+        run::check(&session, loaded, None)?.json().map(drop)
     };
     let write = |text: &str| std::fs::write(&mesh, text).expect("written");
     write(SQUARE);

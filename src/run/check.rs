@@ -2,13 +2,14 @@
 
 use super::{
     Inventory,
-    estimate::Estimate,
+    estimate::MemoryEstimate,
     folder::refuse_unwritable,
     header,
     obstacles::{self, ContactGaps},
     setup::{Setup, setup},
     steps,
     summary::PartitionQuality,
+    trial::{self, TimeEstimate},
 };
 use crate::{
     error::{Error, Result},
@@ -21,6 +22,17 @@ use crate::{
     solver::{certificate::Certificates, stepping::ProblemSize},
 };
 use serde::Serialize;
+use std::time::Instant;
+
+/// The estimated cost of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Estimate {
+    /// Bytes by part, over all ranks.
+    memory_bytes: MemoryEstimate,
+    /// Absent if no step was tried, or one failed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seconds: Option<TimeEstimate>,
+}
 
 /// What `solver check` reports about a job.
 ///
@@ -58,18 +70,28 @@ pub struct Report {
     header: Vec<String>,
 }
 
-/// Sets the problem up as a run does, and reports on it. Collective.
+/// Sets the problem up as a run does, and reports on it; tries steps if the start of the program is given. Collective.
 pub(super) fn check<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     mesh: Mesh<D>,
+    began: Option<Instant>,
 ) -> Result<Report, Agreed> {
     let quality = mesh.quality_summary(session);
     let folder = loaded.job.output_folder();
     session.on_first(|| refuse_unwritable(folder))?;
     let ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     session.agree(check_loads(&loaded.job, &ready.body, &ready.state))?;
-    session.agree(report(session, loaded, &ready, quality))
+    let mut report = session.agree(report(session, loaded, &ready, quality))?;
+    if let Some(began) = began {
+        match trial::estimate(session, &loaded.job, ready, began)? {
+            Ok(seconds) => report.estimate.seconds = Some(seconds),
+            Err(error) => {
+                report.warnings.push(format!("a step that was tried fails, as it will in a run: {error}"))
+            }
+        }
+    }
+    Ok(report)
 }
 
 /// Evaluates the loads at the first and the last step. A value that is not finite is refused here: it would end the run.
@@ -119,7 +141,10 @@ fn report<const D: usize, const S: usize>(
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
         cell_quality: quality,
         extent: extent(session, mesh),
-        estimate: Estimate::new(session, body, &inventory, preconditioner, problem),
+        estimate: Estimate {
+            memory_bytes: MemoryEstimate::new(session, body, &inventory, preconditioner, problem),
+            seconds: None,
+        },
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
         motion: match body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
@@ -247,15 +272,18 @@ impl Report {
             size(memory.total),
             parts.join(", ")
         ));
-        let seconds = &self.estimate.seconds;
-        let newton =
-            if self.newton { "; steps with many Newton iterations take many times as long" } else { "" };
-        lines.push(format!(
-            "time       about {} for setup, {} per step, {} in total without output; a rough estimate from one core of a common server, divided by the number of ranks{newton}",
-            duration(seconds.set_up),
-            duration(seconds.step),
-            duration(seconds.run)
-        ));
+        if let Some(seconds) = &self.estimate.seconds {
+            let tried = match seconds.tried_steps {
+                1 => "1 step was tried".into(),
+                tried => format!("{tried} steps were tried"),
+            };
+            lines.push(format!(
+                "time       {} for setup, {} per step, {} in total without output, on this machine as it is now: {tried}",
+                duration(seconds.set_up),
+                between(seconds.step),
+                between(seconds.run)
+            ));
+        }
         lines.push("the job can be run; nothing was written".into());
         lines
     }
@@ -278,6 +306,12 @@ fn duration(seconds: f64) -> String {
         1e-3.. => format!("{} ms", rounded(seconds * 1e3)),
         _ => format!("{} µs", rounded(seconds * 1e6)),
     }
+}
+
+/// A range of times.
+fn between([least, most]: [f64; 2]) -> String {
+    let [least, most] = [least, most].map(duration);
+    if least == most { least } else { format!("{least} to {most}") }
 }
 
 /// Two digits: estimates are no more accurate.
@@ -303,5 +337,6 @@ mod tests {
     fn sizes_and_times_have_readable_units() {
         assert_eq!([size(900), size(2_340_000), size(55_000_000)], ["0.9 kB", "2.3 MB", "55 MB"]);
         assert_eq!([duration(2.5e-4), duration(0.012), duration(9000.0)], ["250 µs", "12 ms", "2.5 h"]);
+        assert_eq!([between([0.012, 3.0]), between([2.0, 2.01])], ["12 ms to 3.0 s", "2.0 s"]);
     }
 }

@@ -1,27 +1,13 @@
-//! Estimates of the memory and time of a run.
-//!
-//! The memory of arrays is counted, that of the preconditioner is modelled. Times are computed from constants
-//! that were measured on one core of a common server, at 10^4 to 10^5 unknowns; they are divided by the number of ranks
-//! that share the work.
-//! Expect a factor of two either way, and more where ranks share memory bandwidth.
+//! Estimates of the memory of a run: that of arrays is counted, that of the preconditioner is modelled. Expect a factor of two either
+//! way.
 
 use super::Inventory;
 use crate::{
     fem::body::Body,
-    linear_algebra::simd::LANES,
     parallel::session::Session,
     solver::stepping::{Preconditioner, ProblemSize},
 };
 use serde::Serialize;
-
-/// The estimated cost of a run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Estimate {
-    /// Bytes by part, over all ranks.
-    pub memory_bytes: MemoryEstimate,
-    /// Seconds.
-    pub seconds: TimeEstimate,
-}
 
 /// Bytes by part, over all ranks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,26 +30,11 @@ pub(super) struct MemoryEstimate {
     pub whole_mesh_at_start: u64,
 }
 
-/// Seconds, without output.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct TimeEstimate {
-    /// Assembly and preconditioner.
-    pub set_up: f64,
-    /// One step.
-    pub step: f64,
-    /// Set-up and all steps.
-    pub run: f64,
-}
-
 /// Bytes of a process without a mesh.
 const PROGRAM: f64 = 55e6;
 /// Vectors of the state, the scheme, Newton's and the Krylov method.
 const VECTORS: f64 = 16.0;
-/// Seconds of stress, history, forces and energies per point of cells and step, in the plane and in space. Batches that are not full
-/// take as long as full ones.
-const POINT: [f64; 2] = [30e-9, 50e-9];
-
-impl Estimate {
+impl MemoryEstimate {
     /// For a body under this preconditioner. Collective.
     pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
@@ -78,31 +49,23 @@ impl Estimate {
             (mesh.bytes() + body.geometry.bytes()) as f64,
             mesh.facets.len() as f64,
             ((mesh.nodes.len() * D) as f64) * 8.0 * VECTORS,
-            (body.geometry.runs.len() * LANES * body.geometry.points()) as f64,
         ];
-        let [mesh_bytes, facets, vectors, points] = session.sum(own);
+        let [mesh_bytes, facets, vectors] = session.sum(own);
         let matrix = matrix_bytes(D, mesh.order(), nodes, cells, facets);
-        let cost = problem.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
-        let ranks = session.ranks() as f64;
-        let program = PROGRAM * ranks;
-        let step = points * POINT[usize::from(D == 3)] / ranks + cost.step;
-        let set_up = cost.set_up;
-        let preconditioner = cost.memory;
+        let program = PROGRAM * session.ranks() as f64;
+        let preconditioner = problem.cost(preconditioner).memory;
         let whole = nodes * 8.0 * D as f64 + cells * (20.0 * (D + 1) as f64) + facets * (4 * D + 8) as f64;
         let total = program + mesh_bytes + matrix + history + vectors + preconditioner;
         Self {
-            memory_bytes: MemoryEstimate {
-                program: program as u64,
-                mesh: mesh_bytes as u64,
-                matrix: matrix as u64,
-                history: history as u64,
-                vectors: vectors as u64,
-                preconditioner: preconditioner as u64,
-                total: total as u64,
-                whole_mesh_at_start: if mesh.handed_out { whole as u64 } else { 0 },
-            },
-            seconds: TimeEstimate { set_up, step, run: set_up + step * problem.steps as f64 },
+            program: program as u64,
+            mesh: mesh_bytes as u64,
+            matrix: matrix as u64,
+            history: history as u64,
+            vectors: vectors as u64,
+            preconditioner: preconditioner as u64,
+            total: total as u64,
+            whole_mesh_at_start: if mesh.handed_out { whole as u64 } else { 0 },
         }
     }
 }

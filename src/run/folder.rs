@@ -75,10 +75,17 @@ pub(super) fn starts(stages: &[&Job], start: &Start) -> Result<Vec<Option<Start>
         has_begun |= found.is_some();
         found.iter().try_for_each(|start| refuse_own_start_state(job, start))?;
         if found == Some(Start::Anew) {
-            let remedy = if are_continued {
-                "its start state has changed or will change; to discard the run, start all stages again with --force"
-            } else {
-                "continue the stages with --restart, or discard their results and start again with --force"
+            let remedy = match () {
+                () if !are_continued => {
+                    "continue the stages with --restart, or discard their results and start again with --force"
+                }
+                () if !has_known_start(job)? => {
+                    "it does not tell from which state it started, as runs of earlier versions do not; if that state is unchanged, \
+                     continue this stage alone with --restart; to discard the run, start all stages again with --force"
+                }
+                () => {
+                    "its start state has changed or will change; to discard the run, start all stages again with --force"
+                }
             };
             refuse_foreign(job, &Start::Anew)?;
             refuse_unfinished(job.output_folder(), remedy)?;
@@ -103,6 +110,12 @@ fn continuation(job: &Job) -> Result<Option<Start>> {
     let newest = list(folder)?.into_iter().next();
     let goes_on = newest.is_some_and(|(_, file)| start_state_of(&file) == start_state);
     Ok(Some(if goes_on { Start::Newest } else { Start::Anew }))
+}
+
+/// Whether the newest checkpoint in the folder of a stage tells from which state the stage started.
+fn has_known_start(job: &Job) -> Result<bool> {
+    let newest = list(job.output_folder())?.into_iter().next();
+    Ok(newest.is_some_and(|(_, file)| start_state_of(&file).is_some()))
 }
 
 /// Whether the results in a folder are those of this job, wherever its files are.

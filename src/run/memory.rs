@@ -1,7 +1,7 @@
 //! The memory that is there, and the refusal of a run that needs more, before it is taken: the system would end such a run without
 //! a word.
 
-use super::estimate::Estimate;
+use super::estimate::MemoryEstimate;
 use crate::{
     error::{Error, Result},
     parallel::{agreement::Agreed, session::Session},
@@ -25,8 +25,7 @@ pub(super) fn require_for_cells(session: &Session, dimension: usize, cells: usiz
 }
 
 /// Refuses a run whose matrix and preconditioner cannot fit in the memory, before they are computed. Collective.
-pub(super) fn require_for_run(session: &Session, estimate: &Estimate) -> Result<(), Agreed> {
-    let parts = &estimate.memory_bytes;
+pub(super) fn require_for_run(session: &Session, parts: &MemoryEstimate) -> Result<(), Agreed> {
     let bytes = parts.matrix + parts.vectors + parts.preconditioner;
     let words = format!(
         "the run needs about {} more: matrix {}, vectors {}, preconditioner {}",

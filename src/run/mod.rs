@@ -24,6 +24,7 @@ mod step_line;
 mod steps;
 mod summary;
 mod time_loop;
+mod trial;
 
 pub use build::normal_law;
 pub use check::Report;
@@ -99,8 +100,9 @@ pub fn run_stages(
     Ok(Exit::Done)
 }
 
-/// Sets a job up as a run does and reports on it, without steps and without files. Collective.
-pub fn check(session: &Session, loaded: Loaded) -> Result<Report, Agreed> {
+/// Sets a job up as a run does and reports on it, without files. Tries steps to estimate the time of the run if the start of the
+/// program is given. Collective.
+pub fn check(session: &Session, loaded: Loaded, began: Option<Instant>) -> Result<Report, Agreed> {
     session.agree(loaded.refuse_untrusted())?;
-    on_the_mesh!(session, loaded, check::check)
+    on_the_mesh!(session, loaded, check::check, began)
 }

@@ -5,21 +5,25 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::Supports,
+        effect::{ELASTIC, Form, Step, Supports},
         space::{SurfacePoint, surface_points},
         state::State,
     },
     job::Support,
     linear_algebra::{
         petsc::DistributedVector,
-        tensor::{Vector, add_scaled, dot, norm},
+        tensor::{Vector, add_scaled, dot, larger, norm},
     },
     parallel::session::Session,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Released forces, as a share of the loads, above which a warning is given.
+/// Unbalanced or released forces, as a share of all forces or of the loads, above which a warning is given.
 const OUT_OF_BALANCE: f64 = 1e-3;
+/// Errors of forces as a share of those of the cells that cancel.
+const ROUNDING: f64 = 1e-9;
+/// Inertia of a moving body over the share of its velocity in that of a free oscillation.
+const MOVING: f64 = 3.0;
 
 /// What became of the forces of supports and contacts of the stage before, in N: sums of magnitudes over the nodes.
 pub(super) struct Handover {
@@ -58,6 +62,110 @@ impl Handover {
             )
         })
     }
+}
+
+/// The forces of a start state, in N: sums of magnitudes over the nodes.
+struct Balance {
+    /// What internal forces, loads, contacts and supports leave over.
+    open: f64,
+    /// The largest of the sums of loads, reactions of supports and contact forces.
+    forces: f64,
+    /// What remains open in a body in motion, its inertia and the change of its internal forces in a step, and by rounding.
+    moving: f64,
+}
+
+impl Balance {
+    /// A warning if the state is out of balance and does not move accordingly.
+    fn warning(&self, has_inertia: bool) -> Option<String> {
+        let Self { open, forces, moving } = *self;
+        let is_balanced = open <= OUT_OF_BALANCE * forces + moving;
+        let of_forces = if forces > 0.0 {
+            format!(", {:.1} % of the forces", 100.0 * open / forces)
+        } else {
+            String::new()
+        };
+        let happens = if has_inertia { "it starts to oscillate" } else { "it jumps in the first step" };
+        (!is_balanced).then(|| {
+            format!(
+                "initial.from: the start state is out of balance: internal forces, loads and reactions leave over nodal forces of \
+                 {open:.3e} N in total{of_forces}, so that the body does not remain as it was: {happens}; if that is not intended, start with \
+                 the loads, supports and materials of the job that wrote the state and change loads gradually (`t` in their expressions), or \
+                 let that job come to rest"
+            )
+        })
+    }
+}
+
+/// The warning about a start state that is out of balance with the loads, supports, contacts and materials of its new body. `length` is
+/// that of a step in s. Collective.
+pub(super) fn imbalance<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    state: &State,
+    length: f64,
+) -> Result<Option<String>> {
+    let sum = |field: &DistributedVector, part: &dyn Fn(usize, &Vector<D>) -> Vector<D>| -> Result<f64> {
+        let values = field.owned()?;
+        let (nodes, _) = values.as_chunks::<D>();
+        Ok(nodes.iter().enumerate().map(|(node, force)| norm(&part(node, force))).sum())
+    };
+    let of_form = |form: Form, of: &dyn Fn(usize) -> f64| -> Result<DistributedVector> {
+        let mut forces = session.agree(state.velocity.like())?;
+        let add = |forces: &mut DistributedVector| {
+            let mut values = forces.local_mut()?;
+            values.fill(0.0);
+            if body.has_form(form) {
+                let field: Vec<f64> = (0..values.len()).map(of).collect();
+                body.add_form(form, &field, &mut values);
+            }
+            Ok::<_, Error>(())
+        };
+        session.agree(add(&mut forces))?;
+        session.agree(forces.add_ghosts_to_owners())?;
+        Ok(forces)
+    };
+    let local = |field: &DistributedVector| Ok::<_, Error>(field.local()?.to_vec());
+    let velocity = session.agree(local(&state.velocity))?;
+    let displacement = session.agree(local(&state.displacement))?;
+    let mut open = residual(session, body, state)?;
+    session.agree(open.add_scaled(-1.0, &of_form(Form::Viscosity, &|at| velocity[at])?))?;
+    if body.elastic_support.has_reactions {
+        let add = |open: &mut DistributedVector| {
+            let mut values = open.owned_mut()?;
+            values.iter_mut().zip(&body.elastic_support.reactions).for_each(|(sum, force)| *sum += force);
+            Ok::<_, Error>(())
+        };
+        session.agree(add(&mut open))?;
+    }
+    let change = of_form(Form::Elasticity, &|at| length * velocity[at])?;
+    let mass = of_form(Form::Mass, &|at| velocity[at])?;
+    // The size of the forces of the cells, which cancel where the body is not strained.
+    let cells = of_form(Form::Elasticity, &|at| {
+        displacement[at].abs() * if (at / D).is_multiple_of(2) { 1.0 } else { -1.0 }
+    })?;
+    let mut loads = session.agree(state.velocity.like())?;
+    session.agree(body.write_loads(0.0, &mut loads))?;
+    let whole = |_: usize, force: &Vector<D>| *force;
+    let free = |node: usize, force: &Vector<D>| body.held.free_part(node, force);
+    let held = |node: usize, force: &Vector<D>| add_scaled(force, -1.0, &body.held.free_part(node, force));
+    let sums =
+        [sum(&open, &free), sum(&loads, &whole), sum(&open, &held), sum(&change, &free), sum(&cells, &whole)];
+    let sums = sums.into_iter().collect::<Result<Vec<f64>>>();
+    // Twice the kinetic energy, and the stored energy.
+    let energies = || -> Result<[f64; 2]> {
+        let mass = mass.owned()?;
+        let kinetic = mass.iter().zip(velocity.iter()).map(|(m, v)| m * v).sum();
+        let rest = Step { time: state.time, ..Step::default() };
+        Ok([kinetic, body.energy(state, rest)?.0[ELASTIC]])
+    };
+    let (sums, [kinetic, stored]) = (session.agree(sums)?, session.agree(energies())?);
+    let [open, loads, reactions, change, cells, kinetic, stored] =
+        session.sum([sums[0], sums[1], sums[2], sums[3], sums[4], kinetic, stored]);
+    let forces = larger(larger(loads, reactions), open);
+    // Of a body that oscillates, inertia is a share of the forces as its velocity is of the largest one.
+    let share = if kinetic > 0.0 { (kinetic / (kinetic + stored)).sqrt() } else { 0.0 };
+    let moving = change + MOVING * share * forces + ROUNDING * cells;
+    Ok(Balance { open, forces, moving }.warning(body.has_form(Form::Mass)))
 }
 
 /// Lets elastic supports take over the forces at the start state of what the job with the keys `earlier` had in their place: the

@@ -1,6 +1,9 @@
 //! The checkpoint that a restarted run continues from.
 
-use super::{Start, reactions::take_over};
+use super::{
+    Start,
+    reactions::{imbalance, take_over},
+};
 use crate::{
     error::{Error, Exit, Result},
     fem::{body::Body, effect::SUPPORT_REACTION, state::State},
@@ -133,7 +136,11 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         }
     }
     words += &handover.words();
-    Ok(Some(StartState { digest: found.digest, words, warning: handover.warning() }))
+    let warning = match handover.warning() {
+        None => imbalance(session, body, state, loaded.job.time.step)?,
+        released => released,
+    };
+    Ok(Some(StartState { digest: found.digest, words, warning }))
 }
 
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.

@@ -150,7 +150,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         {
             self.refuse_overflow()?;
             self.cover_steps()?;
-            self.refuse_uncertified(&outcome)?;
+            refuse_uncertified(&self.certificates, &outcome, self.simulation.state.time)?;
             let Simulation { state, landings, adaptive, .. } = &self.simulation;
             self.outputs.after_step(self.session, &self.simulation, &outcome)?;
             let has_steps_left = state.time < self.job.time.end;
@@ -213,22 +213,6 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             )));
         }
         Ok(())
-    }
-
-    /// Fails if the search has found several solutions of a step that has one according to the certificates: one of them is wrong.
-    fn refuse_uncertified(&self, outcome: &StepOutcome) -> Result<()> {
-        let known = &self.certificates;
-        let Some(theta) = known.theta_step.filter(|_| known.covers_steps && known.steps_are_unique()) else {
-            return Ok(());
-        };
-        if !outcome.solutions_differ {
-            return Ok(());
-        }
-        Err(Error::Internal(format!(
-            "the search found {} solutions of the step to t = {:.6e} s, which has one because theta of a step is {theta:.4}: this is a \
-             fault of the program, and neither the certificate nor the solutions can be relied on; please report it with the job",
-            outcome.solutions, self.simulation.state.time
-        )))
     }
 
     /// Fails if energies, stresses or residuals are not finite.
@@ -437,10 +421,52 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     }
 }
 
+/// Fails if the search has found several solutions of the step to a time in s that has one according to the certificates: one of them is
+/// wrong.
+fn refuse_uncertified(known: &Certificates, outcome: &StepOutcome, time: f64) -> Result<()> {
+    let Some(theta) = known.theta_step.filter(|_| known.covers_steps && known.steps_are_unique()) else {
+        return Ok(());
+    };
+    if !outcome.solutions_differ {
+        return Ok(());
+    }
+    Err(Error::Internal(format!(
+        "the search found {} solutions of the step to t = {time:.6e} s, which has one because theta of a step is {theta:.4}: this is a \
+         fault of the program, and neither the certificate nor the solutions can be relied on; please report it with the job",
+        outcome.solutions
+    )))
+}
+
 /// What is requested after a step.
 struct Request {
     /// Whether a checkpoint is due.
     save: bool,
     /// Why the run has to stop, if it has to.
     stop: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No job is known in which certificates and solutions contradict each other: the certificate is made up.
+    #[test]
+    fn several_solutions_of_a_step_that_is_certified_to_have_one_are_a_fault_of_the_program() {
+        let certified = Certificates { theta_step: Some(0.5), covers_steps: true, ..Certificates::default() };
+        let found = StepOutcome { solutions: 3, solutions_differ: true, ..StepOutcome::default() };
+        let fault = refuse_uncertified(&certified, &found, 0.25).expect_err("a contradiction");
+        let words = fault.to_string();
+        assert_eq!(Exit::from(fault) as u8, 4);
+        assert!(words.contains("found 3 solutions of the step to t = 2.500000e-1 s"), "{words}");
+        assert!(words.contains("theta of a step is 0.5000") && words.contains("please report"), "{words}");
+        let passes =
+            |known: Certificates, found: StepOutcome| refuse_uncertified(&known, &found, 0.25).is_ok();
+        assert!(
+            passes(certified.clone(), StepOutcome { solutions_differ: false, ..found }),
+            "within rounding"
+        );
+        assert!(passes(Certificates { theta_step: Some(1.0), ..certified.clone() }, found), "not unique");
+        assert!(passes(Certificates { covers_steps: false, ..certified.clone() }, found), "not covered");
+        assert!(passes(Certificates { theta_step: None, ..certified }, found), "no certificate");
+    }
 }

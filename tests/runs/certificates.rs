@@ -376,6 +376,44 @@ fn a_restart_with_steps_outside_of_the_certified_range_renews_the_certificate() 
 }
 
 #[test]
+fn adaptive_steps_that_leave_the_certified_range_renew_the_certificate() {
+    // The load has a kink at 0.3995 s, where a step ends, and the next one ends at 0.4 s as requested: it is shorter than any that was
+    // certified, and theta grows as steps shrink.
+    let adaptive = |highest: f64, fall: f64| {
+        layer("implicit_euler", 0.08, 0.8)
+            .set("time.land_on", "[0.4]")
+            .set("time.adaptive", "{ tolerance = 0.5, smallest_step = 0.04, largest_step = 0.16 }")
+            .set("traction", "[{ on = ['bottom'], value = [0, '-(0.2*t + 0.1*max(t - 0.3995, 0))'] }]")
+            .set(
+                "contact.0.normal.graph.points",
+                &format!("[[0.0, 0.0], [1e-3, {highest}], [2e-3, {}]]", highest - fall),
+            )
+    };
+    let theta = |fall: f64, length: f64| fall / 1e-3 / (900.0 * length);
+    let warns = "are outside of the range of its certificates, which are computed anew";
+    for ranks in [1, 2] {
+        let case = adaptive(0.08, 2e-4);
+        let certified = certificate(&check(&case, ranks), "theta_step");
+        close(certified / theta(2e-4, 0.02), 1.0, 1e-5, "half of the smallest step");
+        let results = case.run(ranks);
+        let log = launch::unwrapped(&results.text("run.log"));
+        assert!(log.contains(warns), "{log}");
+        let shortest = results.table("history.csv").numbers("dt").into_iter().fold(f64::INFINITY, f64::min);
+        close(shortest, 5e-4, 1e-9, "the step after the kink");
+        let renewed = results.summary()["certificates"]["theta_step"].as_f64().expect("theta");
+        close(renewed / theta(2e-4, 5e-4), 1.0, 1e-5, "theta of the short step");
+        assert!(renewed < 0.5 && certified < 0.02, "{renewed} {certified}");
+        // Where the new certificate does not hold, the run ends, unless the job accepts it.
+        let steep = adaptive(0.08, 2e-3);
+        let failed = steep.run_with(ranks, &["--force"]).expect(1);
+        failed.says("a step may have several solutions: theta is 4.4").says("accept = [\"uniqueness\"]");
+        let accepted = steep.set("solver.accept", "['uniqueness']");
+        let theta = accepted.run(ranks).summary()["certificates"]["theta_step"].as_f64().expect("theta");
+        assert!(theta > 4.0 && theta < 5.0, "{theta}");
+    }
+}
+
+#[test]
 fn a_search_finds_one_solution_of_a_body_at_rest() {
     for ranks in [1, 2] {
         let case = layer("implicit_euler", 0.08, 0.16).without("traction");

@@ -208,6 +208,31 @@ fn stages_that_were_stopped_go_on_with_the_first_one_that_is_not_complete() {
     assert_eq!(straight, tables.map(|name| second.results().text(name)));
 }
 
+/// As an earlier version left it: its checkpoint does not tell from which state the run started.
+#[test]
+fn an_unfinished_stage_of_an_earlier_version_is_continued_alone() {
+    let first = first("lagged_euler").run_and_keep(1);
+    let second = second("lagged_euler", &out(&first)).set("checkpoint.every", "4").without("initial");
+    second.run_with(1, &["--set", "time.end=0.25"]).expect(0);
+    let [job, summary] = ["job.toml", "summary.json"].map(|name| second.results().path(name));
+    let edit = |path: &std::path::Path, change: &dyn Fn(String) -> String| {
+        let text = std::fs::read_to_string(path).expect("text");
+        let changed = change(text.clone());
+        assert!(changed != text);
+        std::fs::write(path, changed).expect("written");
+    };
+    edit(&job, &|text| format!("{text}\n[initial]\nfrom = {:?}\n", out(&first)));
+    edit(&summary, &|text| text.replace("\"completed\"", "\"stopped\""));
+    let second = second.set("initial.from", &format!("{:?}", out(&first)));
+    let [one, two] = [&first, &second].map(|case| case.written().display().to_string());
+    launch::run(2, &["run", &one, &two, "--restart"])
+        .expect(2)
+        .says("does not tell from which state it started")
+        .says("continue this stage alone with --restart");
+    launch::run(2, &["run", &two, "--restart"]).expect(0).says("continuing from").says("checkpoint-4.h5");
+    assert_eq!(second.results().number("time"), 0.5);
+}
+
 #[test]
 fn copied_stages_go_on_whatever_the_times_of_their_files() {
     let first = first("lagged_euler");
@@ -319,6 +344,55 @@ fn force_of_sides(case: &Case) -> Vec<f64> {
 }
 
 const SETTLEMENT: f64 = 6e-4;
+
+/// Whether a run warned of forces out of balance.
+fn is_out_of_balance(case: &Case) -> bool {
+    launch::unwrapped(&case.results().text("run.log")).contains("start state is out of balance")
+}
+
+#[test]
+fn a_start_state_out_of_balance_is_named_with_its_forces_and_one_in_motion_is_not() {
+    let held = "fix = ['x']";
+    let first = settled(GROUND, held).run_and_keep(2);
+    for ranks in [1, 3] {
+        for scheme in ["implicit_euler", "bdf2", "lagged_euler"] {
+            let stage = released(&first, held, scheme)
+                .set("time", &format!("{{ end = 2e-3, step = 1e-3, scheme = '{scheme}' }}"));
+            stage.run_with(ranks, &["--force"]).expect(0);
+            assert!(!is_out_of_balance(&stage), "{scheme}: the same supports and loads");
+            // Half of the weight of 180 kN is new, except for what the nodes of the bottom bear, an eighth of it.
+            let heavier = stage.set("gravity", "{ acceleration = [0, -13.5] }");
+            let said = heavier.run_with(ranks, &["--force"]).expect(0);
+            said.says("leave over nodal forces of 7.875e4 N in total")
+                .says("it starts to oscillate")
+                .says("change loads gradually");
+            assert!(is_out_of_balance(&heavier));
+            // A softer material bears less at the same strain.
+            let softer = heavier
+                .set("gravity", "{ acceleration = [0, -9.0] }")
+                .set("material.elasticity.youngs_modulus", "4.5e7");
+            softer.run_with(ranks, &["--force"]).expect(0);
+            assert!(is_out_of_balance(&softer), "{scheme}");
+        }
+    }
+    // Stages in motion, and one without mass.
+    for scheme in ["lagged_euler", "implicit_euler", "bdf2"] {
+        let begun = self::first(scheme).run_and_keep(1);
+        let moving = second(scheme, &out(&begun));
+        moving.run_with(2, &[]).expect(0);
+        assert!(!is_out_of_balance(&moving), "{scheme}: in motion");
+    }
+    let massless = |case: Case| case.without("material.density").without("gravity");
+    let load = |value: f64| format!("[{{ value = [0.0, {value}] }}]");
+    let bent = massless(settled(GROUND, held)).set("body_force", &load(-1.8e4)).run_and_keep(1);
+    let next = massless(released(&bent, held, "implicit_euler")).set("body_force", &load(-1.8e4));
+    next.run_with(1, &["--force"]).expect(0);
+    assert!(!is_out_of_balance(&next));
+    next.set("body_force", &load(-2e4))
+        .run_with(1, &["--force"])
+        .expect(0)
+        .says("it jumps in the first step");
+}
 
 #[test]
 fn ground_at_rest_stays_at_rest_when_its_sides_give_way() {

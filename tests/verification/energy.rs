@@ -385,3 +385,26 @@ pub fn random_jobs(session: &Session) {
 fn energy_balances_and_contact_lies_on_its_graph_in_every_step_of_random_jobs() {
     run_on(&[1, 2], "energy");
 }
+
+/// A block without mass that its support carries along, without strain: all of its energies are rounding errors.
+pub fn carried(session: &Session) {
+    let elastic = "elasticity = { youngs_modulus = 100.0, poisson_ratio = 0.3 }";
+    let viscous = "viscosity = { volumetric = 1.0, shear = 2.0 }";
+    for (material, scheme) in [(elastic, "implicit_euler"), (elastic, "bdf2"), (viscous, "lagged_euler")] {
+        let job = format!(
+            "{}[material]\nhypothesis = \"plane_strain\"\n{material}\n\
+             [time]\nend = 0.1\nstep = 0.01\nscheme = \"{scheme}\"\n\
+             [[support]]\non = [\"left\"]\nfix = \"all\"\ndisplacement = [\"0.3*sin(20*t)\", \"0.1*t\"]\n",
+            any_mesh::<2>()
+        );
+        let mut run = simulation::<2, 4>(session, &job, &crossed([4, 3]));
+        while run.advance(session).expect("a step").is_some() {}
+        let (worst, turnover) = (run.totals.max_energy_imbalance, run.totals.turnover);
+        assert!(worst < 1e-9 && turnover < 1e-13, "{scheme}: {worst:e} of {turnover:e} J/m");
+    }
+}
+
+#[test]
+fn a_body_that_is_carried_along_has_balanced_energies() {
+    run_on(&[1, 2, 3], "carried_energy");
+}

@@ -88,6 +88,7 @@ fn scenario() {
         "profiles" => profiles::all(&session, &folder),
         "patch" => patch::uniform_fields(&session),
         "energy" => energy::random_jobs(&session),
+        "carried_energy" => energy::carried(&session),
         "resultants" => resultants::all(&session),
         "ledger_orders" => ledgers::orders(&session),
         "bounces" => ledgers::bounces(&session),

@@ -62,6 +62,36 @@ impl Snapshot {
         Ok(snapshot)
     }
 
+    /// The largest magnitude of each field and history of the file at these times, by their numbers.
+    pub fn largest(path: &Path, steps: &[usize]) -> Result<BTreeMap<String, f64>> {
+        let mut largest: BTreeMap<String, f64> = BTreeMap::new();
+        for step in steps {
+            let snapshot = Self::read_at(path, Some(*step))?;
+            for (name, values) in snapshot.all_values() {
+                let most = largest.entry(name.to_owned()).or_default();
+                let finite = values.iter().filter(|value| value.is_finite());
+                *most = finite.fold(*most, |most, value| f64::max(most, value.abs()));
+            }
+        }
+        Ok(largest)
+    }
+
+    /// The names and the values of all fields and histories.
+    fn all_values(&self) -> impl Iterator<Item = (&str, &[f64])> {
+        let fields = self.fields.iter().map(|(name, values)| (*name, values.as_slice()));
+        fields.chain(self.histories.iter().map(|history| (history.name.as_str(), history.values.as_slice())))
+    }
+
+    /// Replaces values below this share of these largest ones of their fields by zero.
+    pub fn clear_below(&mut self, share: f64, largest: &BTreeMap<String, f64>) {
+        let fields = self.fields.iter_mut().map(|(name, values)| (*name, values));
+        let histories = self.histories.iter_mut().map(|history| (history.name.as_str(), &mut history.values));
+        for (name, values) in fields.chain(histories) {
+            let least = share * largest.get(name).copied().unwrap_or(0.0);
+            values.iter_mut().filter(|value| value.abs() <= least).for_each(|value| *value = 0.0);
+        }
+    }
+
     /// 2 or 3.
     pub fn dimension(&self) -> usize {
         self.corners - 1
@@ -211,6 +241,21 @@ mod tests {
     fn quadratic_cells_are_divided_into_equal_parts_of_positive_volume() {
         assert!(volumes::<2, 3>(&TRIANGLES).iter().all(|v| (v - 0.125).abs() < 1e-16));
         assert!(volumes::<3, 4>(&TETRAHEDRA).iter().all(|v| (v - 1.0 / 48.0).abs() < 1e-16));
+    }
+
+    #[test]
+    fn values_far_below_the_largest_of_their_field_are_zero() {
+        let wear = History { name: "wear".into(), place: Place::Node, values: vec![3e-9, -2e-9, f64::NAN] };
+        let mut snapshot = Snapshot {
+            fields: [("displacement", vec![1e-9, -3e-9, 1.0])].into(),
+            histories: vec![wear],
+            ..Snapshot::default()
+        };
+        let largest = [("displacement", 2.0), ("wear", 1e-3)].map(|(name, most)| (name.to_owned(), most));
+        snapshot.clear_below(1e-9, &largest.into());
+        assert_eq!(snapshot.fields["displacement"], [0.0, -3e-9, 1.0]);
+        let wear = &snapshot.histories[0].values;
+        assert!(wear[..2] == [3e-9, -2e-9] && wear[2].is_nan(), "{wear:?}");
     }
 
     #[test]

@@ -21,6 +21,9 @@ const FINE: i32 = 4;
 const ENOUGH: usize = 3000;
 /// Values whose relative difference is below this share are constant.
 const STEADY: f64 = 0.02;
+/// Room between the values and the ends of an axis, as a share of their range: plotters cuts off what is beyond the axes, and so the
+/// marker of a point at their ends would be.
+const ROOM: f64 = 0.03;
 /// Number of markers along a line that distinguish it from others without colour.
 const MARKS: usize = 9;
 
@@ -209,13 +212,14 @@ impl Chart {
         area.fill(&WHITE).map_err(words)?;
         let top = self.draw_legend(area, &y)?;
         let (_, below) = area.split_vertically(top);
-        let room = 0.02 * (x.high - x.low);
+        let room = |scale: &Scale| ROOM * (scale.high - scale.low);
+        let [across, up] = [&x, &y].map(|scale| Marked { scale: scale.clone(), room: room(scale) });
         let mut chart = ChartBuilder::on(&below)
             .margin_right(18 * FINE)
             .margin_top(8 * FINE)
             .x_label_area_size(48 * FINE)
             .y_label_area_size(76 * FINE)
-            .build_cartesian_2d(Marked { scale: x.clone(), room }, Marked { scale: y.clone(), room: 0.0 })
+            .build_cartesian_2d(across, up)
             .map_err(words)?;
         let plane = chart.plotting_area().clone();
         self.draw_bands(&plane, &x, &y)?;
@@ -270,7 +274,8 @@ impl Chart {
     fn draw_bands(&self, plane: &Area<Axes>, x: &Scale, y: &Scale) -> std::result::Result<(), String> {
         for band in &self.bands {
             let (Some(from), Some(to)) = (x.place(band.span[0]), x.place(band.span[1])) else { continue };
-            let area = Rectangle::new([(from, y.low), (to, y.high)], rgb(band.colour).filled());
+            let room = ROOM * (y.high - y.low);
+            let area = Rectangle::new([(from, y.low - room), (to, y.high + room)], rgb(band.colour).filled());
             plane.draw(&area).map_err(words)?;
             let width = plane.map_coordinate(&(to, y.high)).0 - plane.map_coordinate(&(from, y.high)).0;
             if f64::from(width) > f64::from(FINE) * text_width(&band.label) {
@@ -287,7 +292,7 @@ impl Chart {
     fn draw_levels(&self, plane: &Area<Axes>, x: &Scale, y: &Scale) -> std::result::Result<(), String> {
         for (level, name) in &self.levels {
             let Some(height) = y.place(*level) else { continue };
-            let room = 0.02 * (x.high - x.low);
+            let room = ROOM * (x.high - x.low);
             let stroke = vec![(x.low - room, height), (x.high + room, height)];
             plane.draw(&PathElement::new(stroke, rgb([0x55; 3]).stroke_width(FINE as u32))).map_err(words)?;
             let place = (x.low, height);
@@ -401,4 +406,34 @@ fn letters() -> TextStyle<'static> {
 
 fn words(error: impl std::fmt::Display) -> String {
     error.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markers_of_points_at_the_ends_of_the_axes_are_whole() {
+        for (place, [width, height]) in [(1, [8, 8]), (3, [12, 12])] {
+            for logarithmic in [false, true] {
+                let points = vec![[0.0, 1.0], [0.0, 10.0], [1.0, 1.0], [1.0, 10.0]];
+                let series = Series::new(place, "", Look::Dots, points);
+                let chart = Chart::new(Axis::time(), Axis::new("size", ""), vec![series]);
+                let svg = Chart { logarithmic, ..chart }.svg().expect("drawn");
+                let markers: Vec<&str> =
+                    svg.split("<polygon").skip(1).filter_map(|tag| tag.split("points=\"").nth(1)).collect();
+                assert_eq!(markers.len(), 4, "{svg}");
+                for marker in markers {
+                    let numbers = marker.split('"').next().unwrap_or_default().split([' ', ',']);
+                    let numbers: Vec<i32> = numbers.filter_map(|word| word.parse().ok()).collect();
+                    let size = |axis: usize| {
+                        let along = || numbers.iter().skip(axis).step_by(2);
+                        along().max().zip(along().min()).map(|(most, least)| most - least)
+                    };
+                    let expected = [width, height].map(|size| Some(FINE * size));
+                    assert_eq!([size(0), size(1)], expected, "{place} {logarithmic}: {marker}");
+                }
+            }
+        }
+    }
 }

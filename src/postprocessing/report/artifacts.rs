@@ -1,13 +1,20 @@
 //! The output files of a run, as far as they are readable.
 
-use super::table::Table;
+use super::table::{ROUNDING, Table};
 use crate::{
     error::{Error, Result},
     io::output::field_snapshot::Snapshot,
     job::{Job, Loaded},
 };
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+/// The most times that are drawn, and the most cells of all drawings together.
+const MOST: usize = 12;
+const MOST_CELLS: usize = 2_000_000;
 
 /// Files that only a run creates; a folder without any of them does not belong to a run.
 const SIGNS: [&str; 5] = ["job.toml", "summary.json", "history.csv", "probes.csv", "profiles.csv"];
@@ -42,8 +49,10 @@ pub(super) struct Found {
     pub probes: Option<Table>,
     /// `profiles.csv`.
     pub profiles: Option<Table>,
-    /// `fields.vtkhdf` at its last time.
+    /// `fields.vtkhdf` at its last time, without rounding errors.
     pub snapshot: Option<Snapshot>,
+    /// The largest number of each field at the times that are drawn.
+    pub largest: BTreeMap<String, f64>,
     /// Files that are missing.
     pub gaps: Vec<Gap>,
 }
@@ -71,21 +80,34 @@ impl Found {
         found.history =
             found.take("history.csv", "energies, steps and iterations", |path| Table::read(path, ""));
         found.resultants = found.take("resultants.csv", "forces of supports, contacts and loads", |path| {
-            Ok(Table::read(path, "source")?.without_unfinished("step"))
+            Ok(Table::read(path, "source")?.without_unfinished("step").without_rounding())
         });
         let wants = |there: fn(&Job) -> bool, job: &Option<Job>| job.as_ref().is_none_or(there);
         if folder.join("probes.csv").exists() || wants(|job| !job.output.probe.is_empty(), &found.job) {
             found.probes = found.take("probes.csv", "probes over time", |path| {
-                Ok(Table::read(path, "probe")?.without_unfinished("step"))
+                Ok(Table::read(path, "probe")?.without_unfinished("step").without_rounding())
             });
         }
         if folder.join("profiles.csv").exists() || wants(|job| !job.output.profile.is_empty(), &found.job) {
             found.profiles = found.take("profiles.csv", "values along boundaries", |path| {
-                Ok(Table::read(path, "profile")?.without_unfinished("time"))
+                Ok(Table::read(path, "profile")?.without_unfinished("time").without_rounding())
             });
         }
         found.snapshot = found.take("fields.vtkhdf", "pictures of the body", Snapshot::read);
+        if let Some(snapshot) = &found.snapshot {
+            let largest = Snapshot::largest(&folder.join("fields.vtkhdf"), &drawn_times(snapshot));
+            found.largest = largest.unwrap_or_default();
+        }
+        let Self { snapshot, largest, .. } = &mut found;
+        snapshot.iter_mut().for_each(|snapshot| snapshot.clear_below(ROUNDING, largest));
         Ok(found)
+    }
+
+    /// The fields at one of their times, without rounding errors.
+    pub(super) fn snapshot_at(&self, step: usize) -> Result<Snapshot> {
+        let mut snapshot = Snapshot::read_at(&self.folder.join("fields.vtkhdf"), Some(step))?;
+        snapshot.clear_below(ROUNDING, &self.largest);
+        Ok(snapshot)
     }
 
     /// 2 or 3, if it is known.
@@ -111,6 +133,16 @@ impl Found {
         };
         self.gaps.push(Gap { file, why, lacking });
         None
+    }
+}
+
+/// The numbers of the times of the field file that are drawn: evenly spaced, the last among them, fewer of a large body.
+pub(super) fn drawn_times(last: &Snapshot) -> Vec<usize> {
+    let cells = (last.cells.len() / last.corners).max(1);
+    let end = last.times.len().saturating_sub(1);
+    match MOST.min(MOST_CELLS / cells).min(last.times.len()) {
+        0 | 1 => vec![end],
+        count => (0..count).map(|n| n * end / (count - 1)).collect(),
     }
 }
 

@@ -15,8 +15,6 @@ use crate::{
 
 /// Number of probes in one chart above which lines cannot be distinguished.
 const MOST_PROBES: usize = 7;
-/// A force or a component of a vector below this share of the largest one of the run is a rounding error.
-const ROUNDING: f64 = 1e-9;
 
 /// Each quantity of the probes over time, with a line for each probe.
 pub(super) fn probes(table: &Table) -> Result<Pictures> {
@@ -25,24 +23,10 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
     let mut out = Pictures::default();
     for column in table.header().iter().filter(|name| !["step", "time", "probe"].contains(&name.as_str())) {
         let curves: Vec<Vec<[f64; 2]>> = tables.iter().map(|table| table.curve("time", column)).collect();
-        let (vector, axis) = column.rsplit_once('_').unwrap_or((column, ""));
-        let quantity = format!("{} {axis}", vector.replace('_', " "));
-        let quantity = quantity.trim_end();
+        let quantity = column.replace('_', " ");
         let unit = unit_by_name(column);
         let last = |curve: &[[f64; 2]]| curve.last().map_or(0.0, |point| point[1]);
         let range = |curve: &Vec<[f64; 2]>| extent(curve.iter().map(|point| point[1]));
-        // Beside the other components of the same vector these may be rounding errors.
-        let names_of_vector =
-            table.header().iter().filter(|name| name.rsplit_once('_').is_some_and(|(of, _)| of == vector));
-        let largest = names_of_vector
-            .filter_map(|name| table.column(name))
-            .flatten()
-            .fold(0.0, |most: f64, value| most.max(value.abs()));
-        let is_noise = |curve: &Vec<[f64; 2]>| curve.iter().all(|point| point[1].abs() <= ROUNDING * largest);
-        if largest > 0.0 && curves.iter().all(is_noise) {
-            out.constant.extend(names.iter().map(|name| format!("{quantity} of {name}: 0 {unit}")));
-            continue;
-        }
         if curves.iter().filter_map(range).all(is_constant) {
             let pairs = names.iter().zip(&curves);
             let named =
@@ -60,12 +44,12 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
         };
         let series = names.iter().zip(curves).enumerate();
         let series = series.map(|(place, (name, curve))| Series::new(place, name.clone(), Look::Line, curve));
-        let chart = Chart::new(Axis::time(), Axis::new(quantity, unit), series.collect());
+        let chart = Chart::new(Axis::time(), Axis::new(quantity.clone(), unit), series.collect());
         out.pictures.push(Picture::of_chart(
             chart,
             &format!("probes_{column}"),
             format!("Chart of {quantity} of the probes over time; at the end {ends}"),
-            format!("{} of the probes. At the end: {ends}.{left_out}", capital(quantity)),
+            format!("{} of the probes. At the end: {ends}.{left_out}", capital(&quantity)),
         )?);
     }
     Ok(out)
@@ -91,8 +75,6 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
     let forces: Vec<&str> = forces.iter().map(String::as_str).collect();
     let areas = ["touching_area", "open_area", "sticking_area", "slipping_area"];
-    let columns = forces.iter().filter_map(|force| table.column(force));
-    let largest = columns.flatten().fold(0.0, |most, force| f64::max(most, force.abs()));
     let mut out = Pictures::default();
     for (number, source) in table.names().iter().enumerate() {
         let rows = table.of(source);
@@ -100,7 +82,8 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
             "momentum" => ("rate of change of momentum", "rate of change of momentum"),
             source => (source, "force"),
         };
-        let is_felt = |force: &&str| exceeds(&rows, force, ROUNDING * largest);
+        let is_felt =
+            |force: &&str| rows.column(force).is_some_and(|values| values.iter().any(|value| *value != 0.0));
         let (felt, unfelt): (Vec<&str>, Vec<&str>) = forces.iter().copied().partition(is_felt);
         let unit = of(["N/m", "N"]);
         let none = unfelt.iter().map(|force| format!("{} of {what}: 0 {unit}", force.replace('_', " ")));
@@ -153,11 +136,6 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
         },
     )?);
     Ok(out)
-}
-
-/// Whether a column has an entry whose size is larger than this.
-fn exceeds(table: &Table, column: &str, size: f64) -> bool {
-    table.column(column).is_some_and(|values| values.iter().any(|value| value.abs() > size))
 }
 
 /// Whether values from `low` to `high` are the same in the digits that are shown.
@@ -279,7 +257,7 @@ mod tests {
         let path = folder.path().join("probes.csv");
         std::fs::write(&path, text).expect("written");
         let Pictures { pictures, constant } =
-            probes(&Table::read(&path, "probe").expect("table")).expect("drawn");
+            probes(&Table::read(&path, "probe").expect("table").without_rounding()).expect("drawn");
         assert_eq!(
             pictures.iter().map(|picture| picture.name.as_str()).collect::<Vec<_>>(),
             ["probes_velocity_x"]
@@ -294,7 +272,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("resultants.csv");
         std::fs::write(&path, text).expect("written");
-        let table = Table::read(&path, "source").expect("table");
+        let table = Table::read(&path, "source").expect("table").without_rounding();
         let Pictures { pictures, constant } = resultants(&table, 2).expect("drawn");
         let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
         assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0"]);

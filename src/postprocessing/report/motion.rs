@@ -1,7 +1,7 @@
 //! An animation: the deformed body at the output times, with the nodes of a contact boundary on the graph of its law.
 
 use super::{
-    artifacts::Found,
+    artifacts::{Found, drawn_times},
     body::{Body, Drawn, Look},
     boundary::{Boundary, Laws},
     picture::Picture,
@@ -18,26 +18,19 @@ use crate::{
 };
 use std::fmt::Write;
 
-/// The most and the fewest drawings of an animation.
-const MOST: usize = 12;
+/// The fewest drawings of an animation.
 const FEWEST: usize = 3;
-/// The most cells of all drawings together.
-const MOST_CELLS: usize = 2_000_000;
 /// Seconds for which a drawing is shown.
 const SECONDS: f64 = 0.6;
 
 /// The animation of a run with these contacts, if its fields differ at three times or more.
 pub(super) fn picture(found: &Found, look: Look, contacts: &[Laws]) -> Result<Option<Picture>> {
     let Some(last) = &found.snapshot else { return Ok(None) };
-    let cells = last.cells.len() / last.corners;
-    let count = MOST.min(MOST_CELLS / cells.max(1)).min(last.times.len());
-    if count < FEWEST {
+    let times = drawn_times(last);
+    if times.len() < FEWEST {
         return Ok(None);
     }
-    let path = found.folder.join("fields.vtkhdf");
-    let step = |n: usize| n * (last.times.len() - 1) / (count - 1);
-    let snapshots =
-        (0..count).map(|n| Snapshot::read_at(&path, Some(step(n)))).collect::<Result<Vec<_>>>()?;
+    let snapshots = times.into_iter().map(|step| found.snapshot_at(step)).collect::<Result<Vec<_>>>()?;
     let bodies: Vec<Body> = snapshots.iter().map(|snapshot| Body::new(snapshot).with_look(look)).collect();
     let all: Vec<&Body> = bodies.iter().collect();
     let common = Body::in_common("all drawings", &all, true);

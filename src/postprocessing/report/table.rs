@@ -4,6 +4,11 @@ use crate::error::{Error, Result};
 use crate::io::output::csv::records;
 use std::path::Path;
 
+/// A number below this share of the largest one of its quantity in the run is a rounding error.
+pub(super) const ROUNDING: f64 = 1e-9;
+/// Columns that say where and when the numbers of a row are.
+const PLACES: [&str; 5] = ["step", "time", "x", "y", "z"];
+
 /// Columns of numbers and text.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Table {
@@ -119,6 +124,28 @@ impl Table {
         self.filtered(|at| values.get(at) != values.last())
     }
 
+    /// The same with zeros in place of rounding errors: numbers far below the largest one that any component of the same quantity has
+    /// in any row.
+    pub(super) fn without_rounding(mut self) -> Self {
+        let largest: Vec<f64> = self.header.iter().map(|name| self.largest(quantity(name))).collect();
+        let is_place: Vec<bool> = self.header.iter().map(|name| PLACES.contains(&name.as_str())).collect();
+        for row in &mut self.rows {
+            for (at, value) in row.iter_mut().enumerate() {
+                if !is_place[at] && value.abs() <= ROUNDING * largest[at] {
+                    *value = 0.0;
+                }
+            }
+        }
+        self
+    }
+
+    /// The largest magnitude of the finite numbers of a quantity.
+    fn largest(&self, of: &str) -> f64 {
+        let columns = self.header.iter().filter(|name| quantity(name) == of);
+        let values = columns.filter_map(|name| self.column(name)).flatten();
+        values.filter(|value| value.is_finite()).fold(0.0, |most, value| f64::max(most, value.abs()))
+    }
+
     /// The rows with this number in this column.
     pub(super) fn at(&self, column: &str, number: f64) -> Self {
         let values = self.column(column).unwrap_or_default();
@@ -139,6 +166,12 @@ impl Table {
     }
 }
 
+/// The quantity of a column: its name, without the axes of a component of a vector or tensor.
+fn quantity(column: &str) -> &str {
+    let is_axes = |end: &str| !end.is_empty() && end.chars().all(|letter| "xyz".contains(letter));
+    column.rsplit_once('_').filter(|(_, end)| is_axes(end)).map_or(column, |(quantity, _)| quantity)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,6 +183,19 @@ mod tests {
         assert_eq!(table.names(), ["left", "right"]);
         assert_eq!(table.of("left").last("time").column("x"), Some(vec![3.0, 4.0]));
         assert_eq!(table.column("y"), None);
+    }
+
+    #[test]
+    fn numbers_far_below_the_largest_of_their_quantity_in_the_run_are_zero() {
+        let text = "time,profile,x,gap,traction_x,traction_y,pressure\n0,left,1,1,5,0,2e4\n1,left,1e-12,inf,-2e-9,6e-9,1e-6\n1,right,2,,1,1,4\n";
+        let table = Table::parse(text.as_bytes(), "profile").expect("table").without_rounding();
+        let last = table.of("left").last("time");
+        let of = |name: &str| last.column(name).expect("a column")[0];
+        assert_eq!(
+            ["x", "gap", "traction_x", "traction_y", "pressure"].map(of),
+            [1e-12, f64::INFINITY, 0.0, 6e-9, 0.0]
+        );
+        assert!(table.of("right").column("gap").expect("a column")[0].is_nan());
     }
 
     #[test]

@@ -2,7 +2,9 @@
 //!
 //! Nested dissection leaves `n log n` entries of a factor in 2D and `n^(4/3)` in 3D, and needs `n^(3/2)` and `n^2`
 //! operations; the work of multigrid is proportional to the unknowns. The constants were measured on one core of a common server
-//! with 10^4 to 10^6 unknowns (docs/speed.md); estimates can be wrong by a factor of two.
+//! with 10^4 to 10^6 unknowns (docs/speed.md); without Newton iterations, flow and friction they can be wrong by a factor of two. They
+//! serve for choices only, and are the same on every machine: a choice that depended on measured times could differ between a run and
+//! its restart, whose results would then differ in the last bits. `solver check` estimates times from steps that it tries.
 
 use super::{
     linear_solver::{FactorPrecision, Preconditioner, ProblemSize},

@@ -25,6 +25,8 @@ impl Frame {
 /// Exponents of metre, kilogram and second.
 type Dimension = [f64; 3];
 const ONE: Dimension = [0.0; 3];
+const MOMENT: Dimension = [2.0, 1.0, -2.0];
+const INERTIA: Dimension = [2.0, 1.0, 0.0];
 const LENGTH: Dimension = [1.0, 0.0, 0.0];
 const TIME: Dimension = [0.0, 0.0, 1.0];
 const VELOCITY: Dimension = [1.0, 0.0, -1.0];
@@ -39,10 +41,17 @@ fn times(dimension: Dimension, by: Dimension) -> Dimension {
 /// Steps of a scene, and their length in s.
 pub const STEPS: u32 = 12;
 const STEP: f64 = 0.003;
+/// A time in s at which adaptive steps must end, and a kink of a load so shortly before it that a step is shorter than any certified.
+const LANDING: f64 = 7.3 * STEP;
+const KINK: f64 = LANDING - 1e-3 * STEP;
 
 /// A scene that is drawn and written down.
 pub struct Scene<const D: usize> {
     pub job: String,
+    /// A job that goes on from the end of the first one for as long, in some scenes.
+    pub second: Option<String>,
+    /// Both in one, if their steps are the same.
+    pub both: Option<String>,
     pub mesh: GlobalMesh<D>,
 }
 
@@ -179,6 +188,8 @@ struct Content {
     is_elastic: bool,
     is_viscous: bool,
     is_quadratic: bool,
+    /// Whether adaptive steps leave the range of lengths for which they are certified.
+    leaves_range: bool,
 }
 
 /// The scene of this number in a frame.
@@ -196,13 +207,14 @@ pub fn scene<const D: usize>(number: u64, frame: Frame) -> Scene<D> {
         is_elastic: draw.chance(0.9) || scheme == "midpoint",
         is_viscous: draw.chance(0.5),
         is_quadratic: draw.chance(0.3),
+        leaves_range: false,
     };
     let mesh = mesh::<D>(&mut draw);
     draw.line("[mesh]\nfile = \"mesh.msh\"");
     if content.is_quadratic {
         draw.line("order = 2");
     }
-    time(&mut draw, &content);
+    let content = Content { leaves_range: time(&mut draw, &content), ..content };
     let hypothesis = draw.one_of(&["plane_stress", "plane_strain"]);
     draw.line("[material]");
     if D == 2 {
@@ -223,7 +235,25 @@ pub fn scene<const D: usize>(number: u64, frame: Frame) -> Scene<D> {
     draw.line(format!("point = {corner}"));
     let half = draw.number(STEP * f64::from(STEPS / 2), TIME);
     draw.line(format!("[checkpoint]\nat = [{half:e}]"));
-    Scene { job: draw.text, mesh }
+    let has_stages = draw.chance(0.12);
+    let second = has_stages.then(|| second(&draw));
+    // A stage starts with the velocity that its supports have then, not with their mean over the step before.
+    let is_same = content.scheme == "implicit_euler"
+        && !["[time.adaptive]", "\ndisplacement = "].iter().any(|words| draw.text.contains(words));
+    let both = (has_stages && is_same).then(|| {
+        let end = |steps: u32| format!("end = {:e}\n", draw.number(STEP * f64::from(steps), TIME));
+        draw.text.replacen(&end(STEPS), &end(2 * STEPS), 1)
+    });
+    Scene { job: draw.text, second, both, mesh }
+}
+
+/// The job of a second stage: the same, with loads and motions that go on.
+fn second<const D: usize>(draw: &Draw<D>) -> String {
+    let before = draw.number(STEP * f64::from(STEPS), TIME);
+    let job = draw.text.replace("*t", &format!("*(t + {before:e})"));
+    let is_initial = |line: &&str| line.starts_with("[initial]") || line.starts_with("velocity = [\"");
+    let lines: Vec<&str> = job.lines().filter(|line| !is_initial(line)).collect();
+    format!("{}\n[initial]\nfrom = \"out/job\"\n", lines.join("\n"))
 }
 
 fn mesh<const D: usize>(draw: &mut Draw<D>) -> GlobalMesh<D> {
@@ -263,18 +293,25 @@ fn same_dimension<const A: usize, const D: usize>(mesh: GlobalMesh<A>) -> Global
     }
 }
 
-fn time<const D: usize>(draw: &mut Draw<D>, content: &Content) {
+/// The keys of the time; says whether adaptive steps leave their certified range.
+fn time<const D: usize>(draw: &mut Draw<D>, content: &Content) -> bool {
     draw.line(format!("[time]\nscheme = \"{}\"", content.scheme));
     draw.key("end", STEP * f64::from(STEPS), TIME);
     let step = STEP / f64::from(draw.frame.steps);
     draw.key("step", step, TIME);
     let adapts = draw.chance(0.2) && content.scheme != "midpoint";
+    let leaves_range = draw.chance(0.4) && adapts;
+    if leaves_range {
+        let landing = draw.number(LANDING, TIME);
+        draw.line(format!("land_on = [{landing:e}]"));
+    }
     // Convergence is tried with fixed steps.
     if adapts && draw.frame.steps == 1 {
         draw.line("[time.adaptive]");
         draw.key("smallest_step", STEP / 64.0, TIME);
         draw.key("largest_step", STEP, TIME);
     }
+    leaves_range
 }
 
 /// The keys of a material; says whether it is viscous.
@@ -391,6 +428,11 @@ fn loads<const D: usize>(draw: &mut Draw<D>, content: &Content) {
         let value = draw.varying(direction.map(|x| 3.0 * x), pressure, &factor);
         draw.line(format!("[[traction]]\non = [\"top\", \"right\"]\nvalue = {value}"));
     }
+    if content.leaves_range {
+        let (direction, rate) = (draw.direction(), draw.number(1.0 / KINK, [0.0, 0.0, -1.0]));
+        let value = draw.varying(direction, pressure, &format!("min({rate:e}*t, 1)"));
+        draw.line(format!("[[traction]]\non = [\"right\"]\nvalue = {value}"));
+    }
     if draw.chance(0.25) {
         let factor = draw.factor();
         let value = draw.number(2.0, pressure);
@@ -471,19 +513,28 @@ fn contacts<const D: usize>(draw: &mut Draw<D>, content: &Content) {
         let wear = draw.decades(1e-4, 1e-2);
         draw.line("[contact.wear]");
         draw.key("coefficient", wear, pressure.map(|x| -x));
-    } else if !gap_of_obstacle && normal == Normal::Rate && content.scheme != "midpoint" && draw.chance(0.4) {
+    } else if !gap_of_obstacle && normal == Normal::Rate && content.scheme != "midpoint" && draw.chance(0.6) {
         let (normal, energy) = (draw.between(10.0, 200.0), draw.between(1e-5, 1e-3));
+        let (is_cohesive, strength) = (draw.chance(0.6), draw.decades(0.05, 5.0));
+        // Bonds soften from a thousandth of the body's length on, which it moves during the run.
+        let (normal, energy) = if is_cohesive {
+            (1e3 * strength, 0.5e-3 * strength * draw.between(1.1, 6.0))
+        } else {
+            (normal, energy)
+        };
         draw.line("[contact.adhesion]");
         draw.key("stiffness", normal, stiffness);
         draw.key("tangential_stiffness", 0.5 * normal, stiffness);
         draw.key("energy", energy, times(pressure, LENGTH));
-        if draw.chance(0.4) {
-            let strength = draw.between(0.2, 0.9) * (2.0 * normal * energy).sqrt();
+        if is_cohesive {
             draw.key("strength", strength, pressure);
         } else {
             let slowness = draw.decades(1e-5, 1e-3);
             draw.key("viscosity", slowness, times(pressure, [1.0, 0.0, 1.0]));
         }
+    }
+    if draw.chance(0.1) {
+        draw.line("[solver]\nguesses = 2");
     }
 }
 
@@ -569,6 +620,7 @@ fn obstacle<const D: usize>(draw: &mut Draw<D>, content: &Content) {
     down[D - 1] = -1.0;
     let kind = draw.one_of(&["plane", "sphere", "shape"]);
     let is_loaded = content.scheme != "midpoint" && draw.chance(0.25);
+    let is_turned = is_loaded && kind != "plane" && draw.chance(0.8);
     if is_loaded {
         velocity = [0.0; D];
     }
@@ -593,8 +645,11 @@ fn obstacle<const D: usize>(draw: &mut Draw<D>, content: &Content) {
             draw.line(format!("distance = \"sqrt({squares}) - {radius:e}\""));
         }
         draw.line(format!("centre = {centre}"));
-        if draw.chance(0.4) {
+        let rotates = draw.chance(0.4) && !is_turned;
+        if rotates {
             draw.key("rotation", 3.0, [0.0, 0.0, -1.0]);
+        }
+        if rotates || is_turned {
             if D == 3 {
                 let axis = draw.vector(std::array::from_fn(|i| [0.2, 1.0, 0.1][i]), ONE);
                 draw.line(format!("axis = {axis}"));
@@ -610,6 +665,13 @@ fn obstacle<const D: usize>(draw: &mut Draw<D>, content: &Content) {
         ));
         draw.key("mass", mass, [0.0, 1.0, 0.0]);
         draw.key("velocity", approach, VELOCITY);
+        if is_turned {
+            let (moment, inertia, factor) = (draw.between(-2.0, 2.0), draw.decades(0.01, 1.0), draw.factor());
+            let moment = draw.number(moment, MOMENT);
+            draw.line(format!("moment = \"{moment:e}*({factor})\""));
+            draw.key("moment_of_inertia", inertia, INERTIA);
+            draw.key("angular_velocity", 2.0, [0.0, 0.0, -1.0]);
+        }
     }
 }
 
@@ -645,5 +707,29 @@ fn friction<const D: usize>(draw: &mut Draw<D>) {
                 _ => draw.key("distance", 0.002, LENGTH),
             }
         }
+    }
+}
+
+#[test]
+fn the_scenes_of_a_test_have_every_feature() {
+    let scenes: Vec<(String, bool)> = (0..60)
+        .map(|number| {
+            if number % 3 == 2 {
+                let scene = scene::<3>(number, Frame::PLAIN);
+                (scene.job, scene.second.is_some())
+            } else {
+                let scene = scene::<2>(number, Frame::PLAIN);
+                (scene.job, scene.second.is_some())
+            }
+        })
+        .collect();
+    let with = |word: &str| (0..60).filter(|at| scenes[*at].0.contains(word)).collect::<Vec<usize>>();
+    let stages: Vec<usize> = (0..60).filter(|at| scenes[*at].1).collect();
+    let words =
+        ["guesses", "\nmoment = ", "\nstrength = ", "land_on", "[time.adaptive]", "order = 2", "[[region]]"];
+    for (word, found) in words.into_iter().map(|word| (word, with(word))).chain([("a second stage", stages)])
+    {
+        println!("{word}: {found:?}");
+        assert!(!found.is_empty(), "{word}");
     }
 }
