@@ -67,7 +67,7 @@ fn main() {
     for name in ["PETSC_DIR", "PETSC_ARCH", "PKG_CONFIG_PATH"] {
         println!("cargo::rerun-if-env-changed={name}");
     }
-    println!("cargo::rustc-env=CLARKE_GIT_ID={}", git_id());
+    println!("cargo::rustc-env=CLARKE_GIT_LOG={}", git_log().display());
 
     let petsc = find_petsc();
     check_configuration(&petsc.include_paths);
@@ -138,19 +138,20 @@ fn check_configuration(include_paths: &[PathBuf]) {
     }
 }
 
-/// The commit that is built, or what `CLARKE_GIT_ID` says of a source without one. With the variable set, a new commit
-/// alone compiles nothing again.
-fn git_id() -> String {
-    println!("cargo::rerun-if-env-changed=CLARKE_GIT_ID");
-    if let Ok(id) = env::var("CLARKE_GIT_ID") {
-        return id;
+/// The log of the commits that were checked out, or an empty file for a source without one. Only `src/main.rs` reads it, so
+/// that a new commit alone compiles the thin binary again and not the library.
+fn git_log() -> PathBuf {
+    let asked = Command::new("git").args(["rev-parse", "--git-path", "logs/HEAD"]).output();
+    let named = asked.ok().filter(|o| o.status.success());
+    let log = named.map(|o| PathBuf::from(String::from_utf8_lossy(&o.stdout).trim()));
+    if let Some(log) = log.and_then(|log| log.canonicalize().ok()) {
+        // Changes rarely, and goes with the repository. Of a source without one, cargo would repeat the build each time.
+        if Path::new(".git/config").is_file() {
+            println!("cargo::rerun-if-changed=.git/config");
+        }
+        return log;
     }
-    println!("cargo::rerun-if-changed=.git/HEAD");
-    println!("cargo::rerun-if-changed=.git/logs/HEAD");
-    Command::new("git")
-        .args(["describe", "--always", "--dirty", "--abbrev=10"])
-        .output()
-        .ok()
-        .filter(|o| o.status.success())
-        .map_or_else(|| "unknown".into(), |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
+    let none = Path::new(&env::var("OUT_DIR").expect("cargo sets OUT_DIR")).join("no_git_log");
+    std::fs::write(&none, "").expect("a file is written to OUT_DIR");
+    none
 }

@@ -48,7 +48,7 @@ const COMMANDS: [&str; 10] =
 #[derive(Debug, Parser)]
 #[command(
     name = "solver",
-    version = run::VERSION,
+    version = run::version(),
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     arg_required_else_help = true,
@@ -188,8 +188,9 @@ struct RunArguments {
     trust: bool,
 }
 
-/// Executes the command line and returns the exit code.
-pub fn main() -> ExitCode {
+/// Executes the command line of a program whose source has this id, and returns the exit code.
+pub fn main(source: &str) -> ExitCode {
+    run::state_source(source);
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let result = match Cli::try_parse_from(&arguments) {
         Ok(cli) => dispatch(cli),

@@ -88,9 +88,8 @@ pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result
 }
 
 /// Ends the run on all ranks unless the returned value is dropped in time. A library that fails on one rank amid a collective
-/// operation
-/// of its own leaves the other ranks waiting in it, so that they never reach the agreement; the run ends with exit code 4 in
-/// either case.
+/// operation of its own leaves the other ranks waiting in it, so that they never reach the agreement; the run ends with exit code
+/// 4 in either case.
 fn end_alone_after_grace(rank: i32, error: &Error) -> Sender<()> {
     let words = format!(
         "error: rank {rank}: {error}\nOther ranks wait inside the library and cannot be notified: the run ends here."
@@ -121,8 +120,7 @@ pub(crate) fn pass() -> Result<()> {
 }
 
 /// For tests: counts agreements and file operations of this thread from zero, and makes the one of this number fail. Returns how
-/// many
-/// there were.
+/// many there were.
 #[doc(hidden)]
 pub fn fail_at(number: Option<u64>) -> u64 {
     FAILS.set(number.unwrap_or(u64::MAX));

@@ -29,8 +29,7 @@ pub struct Mpi {
 
 impl Mpi {
     /// Initialises MPI, and installs a panic hook that ends the run on all ranks with exit code 4, so that no rank waits for one
-    /// that
-    /// has ended.
+    /// that has ended.
     pub fn start() -> Result<Self> {
         let (universe, _) = mpi::initialize_with_threading(Threading::Funneled)
             .ok_or_else(|| Error::Internal("MPI is already initialised in this process".into()))?;
@@ -119,8 +118,7 @@ impl Session {
     }
 
     /// Turns a failure on any rank into the same failure on all ranks. Collective; to be called at the end of each phase in which
-    /// a rank
-    /// can fail, and before anything that depends on the outcome.
+    /// a rank can fail, and before anything that depends on the outcome.
     pub fn agree<T, E: Into<Error>>(&self, result: Result<T, E>) -> Result<T, Agreed> {
         agree(self.world(), result)
     }
@@ -190,8 +188,7 @@ fn number(ordered: i64) -> f64 {
 }
 
 /// Inverts the bits of negative numbers except for the sign, so that the order of the integers is that of the floating-point
-/// numbers.
-/// The map is its own inverse.
+/// numbers. The map is its own inverse.
 fn flipped(bits: i64) -> i64 {
     if bits < 0 { bits ^ i64::MAX } else { bits }
 }

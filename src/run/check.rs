@@ -119,7 +119,7 @@ fn report<const D: usize, const S: usize>(
     let (preconditioner, reason) = scheme.preconditioner();
     let problem = ProblemSize::of(session, body, steps, job.solver.factor_precision)?;
     Ok(Report {
-        version: super::VERSION,
+        version: super::version(),
         petsc_version: session.petsc().version()?,
         ranks: session.ranks(),
         dimension: D,

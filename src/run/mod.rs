@@ -31,7 +31,7 @@ pub use check::Report;
 pub use inventory::Inventory;
 pub use scene::Scene;
 pub use simulation::Simulation;
-pub use start::{Clock, Start, VERSION};
+pub use start::{Clock, Start, state_source, version};
 pub use summary::Summary;
 
 use crate::{

@@ -2,11 +2,23 @@
 
 use std::{
     path::PathBuf,
+    sync::OnceLock,
     time::{Duration, Instant},
 };
 
-/// Version of the solver with the id of its source.
-pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_GIT_ID"), ")");
+/// The version with the id of its source, once the program has stated it.
+static VERSION: OnceLock<String> = OnceLock::new();
+
+/// Version of the solver, with the id of its source in a program that has stated it.
+pub fn version() -> &'static str {
+    VERSION.get().map_or(env!("CARGO_PKG_VERSION"), String::as_str)
+}
+
+/// States the id of the source that is built, once at the start of a program: the library has none of its own, so that a new
+/// commit does not compile it again.
+pub fn state_source(id: &str) {
+    VERSION.get_or_init(|| format!("{} ({id})", env!("CARGO_PKG_VERSION")));
+}
 
 /// The state from which a run starts.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -55,7 +55,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let is_restart = start.is_restart();
     let start_state = ready.began_from.as_ref().map(|state| state.digest.clone());
     let physics = session.agree(job.physics())?;
-    let identity = Identity { version: super::VERSION.into(), physics, start_state };
+    let identity = Identity { version: super::version().into(), physics, start_state };
     let candidates = candidates(session, start, folder)?;
     let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
     session.on_first(|| prepare_folder(folder, (!is_restart).then_some(&claimed[..]), &mut log))?;
@@ -380,7 +380,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             status,
             error,
             warnings: Vec::new(),
-            version: super::VERSION,
+            version: super::version(),
             petsc_version: session.petsc().version()?,
             ranks: session.ranks(),
             dimension: D,

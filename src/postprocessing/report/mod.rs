@@ -18,7 +18,7 @@ use crate::{
     error::{Error, Result},
     io::output::field_list::VON_MISES,
     postprocessing::drawing::{body, chart, colour, markup, picture, scale, svg, view},
-    run::VERSION,
+    run::version,
 };
 use artifacts::Found;
 use page::Page;
@@ -73,7 +73,7 @@ fn write_page(page: &Page, folder: &Path, name: &str, missing: Vec<String>) -> R
         write(&folder.join("thumbnail.png"), &picture.thumbnail()?)?;
     }
     let path = folder.join(name);
-    let mut made_by = format!("Made by solver report, version {VERSION}. All quantities in SI units.");
+    let mut made_by = format!("Made by solver report, version {}. All quantities in SI units.", version());
     if !page.pictures().is_empty() {
         made_by += " The folder of this page contains the pictures as SVG and PNG files.";
     }

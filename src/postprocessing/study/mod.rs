@@ -39,7 +39,7 @@ use crate::{
     error::{Exit, Result},
     job::{describe_kind, markdown_of},
     parallel::session::Session,
-    run::VERSION,
+    run::version,
 };
 use compare::Compared;
 use document::Take;
@@ -147,7 +147,7 @@ fn assembled(
     let study = &plan.study;
     let take = study.timing.take;
     let mut results = Results {
-        version: VERSION,
+        version: version(),
         ranks: session.ranks(),
         title: study.about.title.clone().unwrap_or_else(|| plan.name.clone()),
         source: study.about.reference.clone(),

@@ -4,7 +4,7 @@ use super::{document::Take, plan::Planned};
 use crate::{
     error::{Error, Result},
     parallel::session::Session,
-    run::VERSION,
+    run::version,
 };
 use mpi::{topology::Communicator, traits::Root};
 use serde::{Deserialize, Serialize};
@@ -197,7 +197,7 @@ pub(super) fn digest(planned: &Planned, ranks: usize) -> Result<String> {
     let ranks = if planned.is_side_by_side { 0 } else { ranks };
     let mut hash = Xxh3::new();
     hash.update(planned.loaded.job.to_toml()?.as_bytes());
-    hash.update(VERSION.as_bytes());
+    hash.update(version().as_bytes());
     hash.update(&(ranks as u64).to_le_bytes());
     if let Some(file) = planned.loaded.job.mesh_file() {
         hash.update(file_digest(file)?.as_bytes());
