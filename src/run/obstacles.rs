@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Closeness, Contact, Gaps},
+        effect::{Closeness, Contact, Gaps, OVERRUN, longest_side},
         state::State,
     },
     job::Job,
@@ -17,9 +17,6 @@ use serde::Serialize;
 
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
-
-/// Penetration at nodes that supports hold, as a share of the body's size, above which a warning is given.
-const OVERRUN: f64 = 1e-6;
 
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -33,7 +30,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     state: &State,
 ) -> Result<Vec<String>> {
     let displacement = session.agree(state.displacement.local())?;
-    let size = size(session, &body.mesh.nodes);
+    let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
         if !contact.law.depends_on_displacement() {
@@ -135,7 +132,7 @@ fn gaps_of_all<const D: usize>(
     Gaps { smallest: -nearest, largest: farthest, without: session.total(without) }
 }
 
-/// Warnings about nodes that supports hold inside of an obstacle, which carry no contact force, and, after the last step, about contacts
+/// Warnings about nodes that supports hold inside of an obstacle, where constraints have no contact force, and, after the last step, about contacts
 /// that have never touched. Collective, with the same warnings on all ranks.
 pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     session: &Session,
@@ -145,7 +142,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     has_ended: bool,
 ) -> Result<Vec<String>> {
     let displacement = session.agree(state.displacement.local())?;
-    let size = size(session, &body.mesh.nodes);
+    let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
         if !contact.law.depends_on_displacement() {
@@ -156,8 +153,8 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
         if held > OVERRUN * size {
             out.push(format!(
                 "contact.{number}: the obstacle moved up to {held:.3e} m beyond nodes of the boundary {on} that a support holds along \
-                 the normal: there is no contact force at these nodes, and contact forces do not include what the support would have to \
-                 carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
+                 the normal: a constraint has no contact force at these nodes, and contact forces do not include what the support would \
+                 have to carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
             ));
         }
         let touched = larger(penetration, held) >= -ROUNDING * size;
@@ -181,19 +178,6 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
         }
     }
     Ok(out)
-}
-
-/// The longest side of the box around the body. Collective.
-fn size<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> f64 {
-    let mut ends = [[f64::NEG_INFINITY; 3]; 2];
-    for node in nodes {
-        for (axis, x) in node.iter().enumerate() {
-            ends[0][axis] = larger(ends[0][axis], *x);
-            ends[1][axis] = larger(ends[1][axis], -x);
-        }
-    }
-    let ends = ends.map(|end| session.largest(end));
-    (0..D).map(|axis| ends[0][axis] + ends[1][axis]).fold(0.0, larger)
 }
 
 /// The smallest and the largest depth of nodes inside of the obstacle in m, negative outside; minus infinity without an obstacle.

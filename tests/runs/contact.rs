@@ -454,3 +454,41 @@ fn corners_of_quadratic_cells_have_the_mean_traction_around_for_any_division_int
     let pressed = file.field("contact_pressure", file.times().len() - 1).iter().filter(|p| **p > 0.0).count();
     assert!(pressed > 12, "{pressed} nodes, corners and midpoints, are under pressure");
 }
+
+#[test]
+fn a_body_that_bounces_turns_as_much_as_the_moment_of_its_contact_forces_says() {
+    let bounce = |order: usize, dimension: usize| {
+        let case = Case::of("pressing_disc")
+            .without("support")
+            .without("material.viscosity")
+            .set("material", "{density = 1.0, elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}}")
+            .set("contact", "[{on = ['bottom'], redistribute_mass = true, normal.unilateral.gap = 0.01}]")
+            .set("time", "{end = 0.016, step = 1e-3, scheme = 'midpoint'}")
+            .set("solver.tolerance", "1e-13")
+            .set("output", "{folder = 'out'}");
+        // Cells whose diagonals all have the same direction are not symmetric.
+        if dimension == 2 {
+            case.set("mesh", &format!("{{rectangle = {{size = [1, 1], cells = [6, 6]}}, order = {order}}}"))
+                .set("material.hypothesis", "'plane_strain'")
+                .set("initial.velocity", "[0, -1]")
+        } else {
+            case.set("mesh", &format!("{{box = {{size = [1, 1, 1], cells = [3, 3, 3]}}, order = {order}}}"))
+                .set("initial.velocity", "[0, 0, -1]")
+        }
+    };
+    for (order, dimension, ranks) in [(1, 2, 1), (1, 2, 3), (2, 2, 2), (1, 3, 2), (2, 3, 1)] {
+        let resultants = bounce(order, dimension).run(ranks).table("resultants.csv");
+        let (contact, momentum) =
+            (resultants.only("source", "contact bottom"), resultants.only("source", "momentum"));
+        let force = if dimension == 2 { "force_y" } else { "force_z" };
+        let size = contact.numbers(force).iter().fold(0.0, |most, force| larger(most, force.abs()));
+        assert!(size > 1.0, "it bounces: {size} N");
+        let moments: &[&str] =
+            if dimension == 2 { &["moment_z"] } else { &["moment_x", "moment_y", "moment_z"] };
+        for column in moments.iter().copied().chain([force]) {
+            let off = contact.numbers(column).into_iter().zip(momentum.numbers(column));
+            let off = off.fold(0.0, |most, (one, other)| larger(most, (one - other).abs()));
+            assert!(off <= 1e-10 * size, "{column}, order {order} in {dimension}D: {off} of {size}");
+        }
+    }
+}

@@ -49,8 +49,8 @@ pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
     Decrease, Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK,
-    PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns,
-    contact_nodes, set_walls,
+    OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel, choose_unknowns,
+    contact_nodes, longest_side, set_walls,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

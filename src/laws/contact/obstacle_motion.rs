@@ -90,16 +90,22 @@ impl<const D: usize> ObstacleMotion<D> {
 impl Gap {
     /// Whether the surface of the obstacle may have a velocity; false for a given gap, whose change is not a motion of a surface.
     pub fn surface_may_move(&self) -> bool {
+        let rotation = match self {
+            Self::Distance(_) => &None,
+            Self::Plane(Plane { rotation, .. })
+            | Self::Sphere(Sphere { rotation, .. })
+            | Self::Shape(Shape { rotation, .. }) => rotation,
+        };
+        self.is_driven() || rotation.as_ref().is_some_and(|rotation| *rotation != Scalar::default())
+    }
+
+    /// Whether the place of the surface depends on the time.
+    pub(super) fn is_driven(&self) -> bool {
         let moves = |components: &[Scalar]| components.iter().any(Scalar::depends_on_time);
-        let turns = |rotation: &Option<Scalar>| rotation.as_ref().is_some_and(|r| *r != Scalar::default());
         match self {
             Self::Distance(_) => false,
-            Self::Plane(Plane { point, normal, rotation }) => {
-                moves(point) || moves(normal) || turns(rotation)
-            }
-            Self::Sphere(Sphere { centre, rotation, .. }) | Self::Shape(Shape { centre, rotation, .. }) => {
-                moves(centre) || turns(rotation)
-            }
+            Self::Plane(Plane { point, normal, .. }) => moves(point) || moves(normal),
+            Self::Sphere(Sphere { centre, .. }) | Self::Shape(Shape { centre, .. }) => moves(centre),
         }
     }
 

@@ -5,6 +5,11 @@
 //! the other; the way between them is taken as straight. The obstacle has passed if the point leaves it on this way through a surface
 //! that faces the same way as the boundary: then the obstacle is on the body's side. Where the point leaves through any other surface,
 //! the obstacle was lifted, or has moved sideways.
+//!
+//! The prescribed motion of an obstacle is known at all times. Where it is not uniform within a step, the depth of the point is taken at
+//! [`SAMPLES`] times inside of the step, too. The obstacle has come and gone if the point is outside of it at both ends and inside at one
+//! of these times, deeper than the depths at the ends of this step and of its neighbours differ from each other: then the steps do not
+//! resolve the motion. A motion that they resolve may touch between their ends, with an error that is that of the scheme.
 
 use super::{
     obstacle::{Gap, Sphere, to_sphere},
@@ -19,6 +24,9 @@ use crate::{
 const BEHIND: f64 = 0.05;
 /// Lengths of this share of the way or of the coordinates are rounding.
 const ROUNDING: f64 = 1e-9;
+/// Times inside of a step at which the prescribed motion of an obstacle is looked at. Obstacles that come and go in less than a 32nd of a
+/// step may be missed.
+const SAMPLES: usize = 31;
 /// The half-width for derivatives of the distance, as a share of the coordinates.
 const WIDTH: f64 = 1e-6;
 
@@ -41,6 +49,9 @@ impl Gap {
     pub fn passes<const D: usize>(&self, sweep: &Sweep<D>) -> Result<bool> {
         let Sweep { times, places, normal, loses_obstacle } = sweep;
         let Some(depth) = self.depth(times[1], &places[1]) else { return Ok(false) };
+        if self.comes_and_goes(sweep) {
+            return Ok(true);
+        }
         let centres: [Vector<D>; 2] = match self {
             Self::Sphere(Sphere { centre, .. }) => times.map(|time| vector(centre, time)),
             Self::Shape(shape) => times.map(|time| vector(&shape.centre, time)),
@@ -74,6 +85,39 @@ impl Gap {
         let width = WIDTH * size;
         let at = |along: f64| self.depth(times[1], &add_scaled(&leaves, along, normal)).unwrap_or_default();
         Ok(at(-width) - at(width) > 2.0 * BEHIND * width)
+    }
+
+    /// Whether the prescribed motion takes the obstacle to a point and away again, unseen at the ends of the step and of its neighbours.
+    fn comes_and_goes<const D: usize>(&self, sweep: &Sweep<D>) -> bool {
+        let Sweep { times: [start, end], places: [before, after], .. } = sweep;
+        if !self.is_driven() {
+            return false;
+        }
+        let depth = |share: f64| {
+            let place = std::array::from_fn(|i| before[i] + share * (after[i] - before[i]));
+            self.depth::<D>(start + share * (end - start), &place).unwrap_or(f64::NEG_INFINITY)
+        };
+        let ends = [depth(0.0), depth(1.0)];
+        let size = [before, after].into_iter().flatten().fold(0.0, |most, x| larger(most, x.abs()));
+        if ends.iter().any(|end| *end > ROUNDING * size) {
+            return false;
+        }
+        let inside = (1..=SAMPLES).map(|at| depth(at as f64 / (SAMPLES + 1) as f64));
+        let deepest = inside.fold(f64::NEG_INFINITY, f64::max);
+        if deepest <= ROUNDING * size {
+            return false;
+        }
+        // The place of the point in the neighbouring steps is not known; that of the obstacle is. A depth that is no number is ignored.
+        let length = end - start;
+        let around = [
+            self.depth(start - length, before).unwrap_or(f64::NAN),
+            self.depth(end + length, after).unwrap_or(f64::NAN),
+        ];
+        let known = ends.into_iter().chain(around);
+        let [least, most] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], depth| {
+            [least.min(depth), most.max(depth)]
+        });
+        deepest > ROUNDING * size + (most - least)
     }
 }
 
@@ -132,6 +176,39 @@ mod tests {
         }
         for disc in discs(0.2, [0.0, 0.5], [0.0, -2.0]) {
             assert!(!passes(&disc, rest(0.0)), "back to the right side: {disc:?}");
+        }
+    }
+
+    #[test]
+    fn an_obstacle_that_comes_and_goes_within_a_step_passes() {
+        let driven = |height: &str| {
+            let centre = || vec![expression("0"), expression(height)];
+            let shape = Shape {
+                distance: Some(expression("sqrt(x^2 + y^2) - 0.2")),
+                centre: centre(),
+                ..Shape::default()
+            };
+            let disc = Sphere { centre: centre(), radius: 0.2, hollow: false, rotation: None, axis: None };
+            let point = vec![expression("0"), expression(&format!("{height} + 0.2"))];
+            let plane = Plane { point, normal: numbers(&[0.0, 1.0]), rotation: None };
+            [Gap::Sphere(disc), Gap::Shape(shape), Gap::Plane(plane)]
+        };
+        let rest = [[0.03, 0.0]; 2];
+        for gap in driven("-0.3 + 0.25*sin(pi*t)^2") {
+            assert!(passes(&gap, rest), "0.15 m deep at t = 0.5 s, and 0.1 m away at the ends: {gap:?}");
+            assert!(!passes(&gap, [[0.03, 0.2]; 2]), "the point is above its highest place: {gap:?}");
+        }
+        for gap in driven("-0.3 + 0.25*exp(-(20*(t - 0.43))^2)") {
+            assert!(passes(&gap, rest), "for a tenth of the step: {gap:?}");
+        }
+        for gap in driven("-0.3 + 0.05*sin(pi*t)^2") {
+            assert!(!passes(&gap, rest), "it does not reach the point: {gap:?}");
+        }
+        for gap in driven("-0.199 - 0.01*(2*t - 1)^2") {
+            assert!(!passes(&gap, rest), "steps that resolve its motion touch between their ends: {gap:?}");
+        }
+        for gap in driven("-0.3 + 0.25*sin(pi*t/2)^2") {
+            assert!(!passes(&gap, rest), "it is inside at the end, which the gap shows: {gap:?}");
         }
     }
 

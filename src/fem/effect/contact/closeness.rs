@@ -3,9 +3,9 @@
 /// How near a body and its obstacle have come in any step so far; minus infinity where they never could touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Closeness {
-    /// Largest penetration in m of a point that is free to move along the normal, at least 0 if it had a contact pressure.
+    /// Largest penetration in m of a point that may have a contact pressure, at least 0 if it had one.
     pub penetration: f64,
-    /// Largest penetration in m of a point that supports hold along the normal, at which there is no contact pressure.
+    /// Largest penetration in m of a point that supports hold along the normal, at which a constraint has no contact pressure.
     pub held: f64,
 }
 

@@ -49,7 +49,7 @@ impl<const D: usize> Contact<D> {
     /// Counts the points on this rank by state, at velocities in a vector of Newton's method.
     pub fn count(&self, velocity: &[f64]) -> PointCount {
         let mut count = PointCount::default();
-        for point in self.points.iter().filter(|point| point.unknown != Unknown::Held) {
+        for point in self.points.iter().filter(|point| point.carries(&self.law)) {
             count.open += usize::from(point.pressure_at(&self.law, Newton, velocity) == 0.0);
             let along = point.normal_component(Newton, velocity);
             let branch = if point.unknown == Unknown::Parameter {

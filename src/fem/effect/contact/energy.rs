@@ -2,7 +2,7 @@
 
 use super::{
     Contact,
-    point::{Point, Unknown, Vectors::Body},
+    point::{Point, Vectors::Body},
 };
 use crate::{
     error::Result,
@@ -22,11 +22,11 @@ pub struct ContactEnergy {
     pub dissipated: f64,
     /// Terms of the time scheme.
     pub numerical: f64,
-    /// Work of the pressures of moving obstacles on the body.
+    /// Work of the pressures of moving obstacles on the body, and of supports against pressures where they hold the normal.
     pub work: f64,
     /// Power that friction and laws of the velocity dissipate.
     pub dissipated_power: f64,
-    /// Power of the friction of moving obstacles on the body.
+    /// Power of the friction of moving obstacles on the body, and of supports against laws of the velocity.
     pub driving_power: f64,
 }
 
@@ -37,14 +37,17 @@ impl<const D: usize> Contact<D> {
     /// The pressure takes up `k p v`. With the penetrations `d`, the energy `e` of the law, a gap that grows by `g` and wear by `h`,
     /// `k p v + numerical = (e(d_n) - e(d_{n-1})) + p g + p h`: stored energy, work on the obstacle, dissipation. Where the law stores
     /// nothing, as a rigid obstacle, `p (d_n - d_{n-1})` is dissipated. Friction `q` on an obstacle with the velocity `w` absorbs
-    /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle.
+    /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle. Where supports prescribe a part of `v`, they do the work of the
+    /// pressure there.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64, with_means: bool) -> ContactEnergy {
         let mut sum = ContactEnergy::default();
         for point in &self.points {
             let v = point.normal_component(Body, velocity);
             let pressure = point.pressure_at(&self.law, Body, velocity);
+            let of_supports = point.weight * pressure * point.held_velocity(velocity);
             if !self.law.depends_on_displacement() {
                 sum.dissipated_power += point.weight * pressure * v;
+                sum.driving_power += of_supports;
                 continue;
             }
             let mean = if with_means { 0.5 * (pressure + self.pressure_before(point)) } else { pressure };
@@ -70,7 +73,7 @@ impl<const D: usize> Contact<D> {
             let dissipated = lost + times(mean, worn);
             let given = times(mean, point.growth);
             sum.dissipated += point.weight * dissipated;
-            sum.work -= point.weight * given;
+            sum.work += length * of_supports - point.weight * given;
             sum.numerical += point.weight * (stored + dissipated + given - length * pressure * v);
         }
         if let Some(friction) = &self.friction {
@@ -82,9 +85,6 @@ impl<const D: usize> Contact<D> {
 
     /// Pressure in Pa at a point before the step.
     fn pressure_before(&self, point: &Point<D>) -> f64 {
-        if point.unknown == Unknown::Held {
-            return 0.0;
-        }
         if self.law.has_vertical_parts() {
             return point.pressure_before;
         }

@@ -69,6 +69,7 @@ pub use loaded_obstacle::{
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use sliding::Decrease;
+pub use sweep::OVERRUN;
 pub use unknowns::{choose_unknowns, set_walls};
 
 /// The law along the normal of a contact boundary, and its points.
@@ -105,6 +106,8 @@ pub struct Contact<const D: usize> {
     blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
     pub reference: ReferenceValues,
+    /// The longest side of the box around the body in m.
+    size: f64,
     facets: Vec<u32>,
     points: Vec<Point<D>>,
     friction: Option<Friction<D>>,
@@ -170,6 +173,7 @@ impl<const D: usize> Contact<D> {
             step_length: 0.0,
             blend: Blend::euler(0.0),
             reference,
+            size: longest_side(session, &mesh.nodes),
             facets: facets.to_vec(),
             points,
             friction: None,
@@ -277,4 +281,17 @@ impl<const D: usize> Contact<D> {
             friction.add_tractions(nodal);
         }
     }
+}
+
+/// The longest side in m of the box around nodes of all ranks. Collective.
+pub fn longest_side<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> f64 {
+    let mut ends = [[f64::NEG_INFINITY; 3]; 2];
+    for node in nodes {
+        for (axis, x) in node.iter().enumerate() {
+            ends[0][axis] = larger(ends[0][axis], *x);
+            ends[1][axis] = larger(ends[1][axis], -x);
+        }
+    }
+    let ends = ends.map(|end| session.largest(end));
+    (0..D).map(|axis| ends[0][axis] + ends[1][axis]).fold(0.0, larger)
 }

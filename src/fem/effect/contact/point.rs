@@ -16,7 +16,7 @@ pub(super) enum Unknown {
     Parameter,
     /// The velocity itself.
     Velocity,
-    /// None: supports fix all components along the normal.
+    /// None: supports prescribe all components along the normal.
     Held,
 }
 
@@ -315,8 +315,27 @@ impl<const D: usize> Point<D> {
         match self.unknown {
             Unknown::Parameter => self.pressure,
             Unknown::Velocity => law.pressure(self.normal_component(vectors, velocity), self.context),
+            // Supports prescribe the velocity, and with it a pressure that is a function of it.
+            Unknown::Held if self.carries(law) && self.can_touch() => {
+                law.pressure(self.normal_component(vectors, velocity), self.context)
+            }
             Unknown::Held => 0.0,
         }
+    }
+
+    /// Whether its pressure is known from the motion: not that of a constraint where supports hold the normal, and would carry it.
+    pub(super) fn carries(&self, law: &NormalResponse) -> bool {
+        self.unknown != Unknown::Held || !law.has_vertical_parts()
+    }
+
+    /// The velocity along the normal that supports prescribe, in m/s: that of the point without its part in the free components.
+    pub(super) fn held_velocity(&self, velocity: &[f64]) -> f64 {
+        let first = self.numbers[Vectors::Body as usize][..self.count].iter().zip(&self.force);
+        let others = self.others.iter().map(|other| (&other.numbers[Vectors::Body as usize], &other.force));
+        let power = first
+            .chain(others)
+            .map(|(&node, force)| (0..D).map(|i| force[i] * velocity[node as usize * D + i]).sum::<f64>());
+        self.normal_component(Vectors::Body, velocity) - power.sum::<f64>() / self.weight
     }
 
     /// Visits the forces in N on the body of a pressure in Pa, with those that supports take up.

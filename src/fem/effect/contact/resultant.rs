@@ -10,8 +10,8 @@ use crate::{
     linear_algebra::tensor::{Vector, larger},
 };
 
-/// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points whose normal a support holds count for
-/// friction only.
+/// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points of constraints whose normal a support
+/// holds count for friction only.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactAreas {
     /// With contact pressure.
@@ -60,7 +60,7 @@ impl<const D: usize> Contact<D> {
     /// Areas and pressures on this rank in the step just solved, at its velocities with ghosts.
     pub fn areas(&self, velocity: &[f64]) -> ContactAreas {
         let mut areas = ContactAreas { largest_pressure: f64::NEG_INFINITY, ..ContactAreas::default() };
-        for point in self.points.iter().filter(|point| point.unknown != Unknown::Held) {
+        for point in self.points.iter().filter(|point| point.carries(&self.law)) {
             let pressure = point.pressure_at(&self.law, Body, velocity);
             if pressure == 0.0 {
                 areas.open += point.weight;
@@ -103,7 +103,7 @@ impl<const D: usize> Contact<D> {
                 state.friction = tangential.along(Body, traction);
                 state.sticks = motions.next().map(|(motion, _)| motion == Motion::Sticks);
             }
-            if point.unknown != Unknown::Held {
+            if point.carries(&self.law) {
                 state.pressure = match point.unknown {
                     Unknown::Parameter => point.pressure_in(traction),
                     _ => point.pressure_at(&self.law, Body, velocity),

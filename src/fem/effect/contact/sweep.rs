@@ -5,7 +5,7 @@ use super::{
     closeness::{Closeness, Gaps},
     loaded_obstacle::LoadedObstacle,
     point::{
-        Point, Unknown,
+        Point,
         Vectors::{self, Body},
     },
 };
@@ -17,15 +17,29 @@ use crate::{
     parallel::session::Session,
 };
 
+/// Penetration at nodes that supports hold, as a share of the body's size, from which on an obstacle counts as beyond them.
+pub const OVERRUN: f64 = 1e-6;
+
 impl<const D: usize> Contact<D> {
     /// Fails where the obstacle has passed a point in the step just solved, from displacements at its start and velocities at its end
-    /// (with ghosts).
+    /// (with ghosts), and where a force has moved it beyond a point that supports hold, whose constraint would stop it.
     pub fn refuse_passage(&self, step: Step, displacement: &[f64], velocity: &[f64]) -> Result<()> {
         if !self.law.depends_on_displacement() || matches!(self.gap, Gap::Distance(_)) {
             return Ok(());
         }
         let times = [step.time - step.length, step.time];
+        let is_loaded = self.obstacle.as_ref().is_some_and(LoadedObstacle::moves);
         for point in &self.points {
+            let depth = point.context.penetration + self.advance(point, Body, velocity);
+            if is_loaded && !point.carries(&self.law) && depth > OVERRUN * self.size {
+                return Err(Error::Failed(format!(
+                    "the step to t = {:.6e} s (length {:.3e} s) failed: the force on its obstacle presses it {depth:.3e} m beyond the \
+                     boundary at {:?} m, where a support holds the normal; the constraint there would stop the obstacle, with a force \
+                     that is not determined; let the contact end before the support (key `where`), free the normal component there, \
+                     or take a law with a finite pressure, as normal.compliance",
+                    step.time, step.length, point.place
+                )));
+            }
             let [worn, worn_before] = point.worn;
             let along = point.normal_component(Body, displacement);
             let moved = along + point.blend_offset + self.advance(point, Body, velocity);
@@ -43,12 +57,12 @@ impl<const D: usize> Contact<D> {
                 loses_obstacle: point.penetration_before > f64::NEG_INFINITY && !point.can_touch(),
             };
             if self.gap.passes(&sweep)? {
-                let driven = self.obstacle.as_ref().is_some_and(LoadedObstacle::moves);
-                let speed = if driven { "its force or its mass" } else { "its motion" };
+                let speed = if is_loaded { "its force or its mass" } else { "its motion" };
                 return Err(Error::Failed(format!(
                     "the step to t = {:.6e} s (length {:.3e} s) failed: its obstacle passes through the boundary at {:?} m, in front of \
-                     which it is at the start of the step and behind which at the end; take a smaller [time] step, in which obstacle \
-                     and body approach each other by less than the size of the obstacle, or correct {speed}",
+                     which it is at the start of the step and behind which at the end, or comes and goes within the step; take a \
+                     smaller [time] step, in which obstacle and body approach each other by less than the size of the obstacle and \
+                     which resolves the motion, or correct {speed}",
                     step.time, step.length, point.place
                 )));
             }
@@ -69,12 +83,12 @@ impl<const D: usize> Contact<D> {
         let mut closeness = self.closeness;
         for point in &self.points {
             let after = point.context.penetration + self.advance(point, Body, velocity);
-            if point.unknown == Unknown::Held {
-                closeness.held = larger(closeness.held, after);
-            } else {
+            if point.carries(&self.law) {
                 let presses = point.pressure_at(&self.law, Body, velocity) != 0.0;
                 closeness.penetration =
                     larger(closeness.penetration, if presses { larger(after, 0.0) } else { after });
+            } else {
+                closeness.held = larger(closeness.held, after);
             }
         }
         self.closeness = closeness;
