@@ -17,6 +17,7 @@ use super::{
     StepOutcome,
     condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
     equations::{Floor, StepMatrix},
+    flow::Flow,
     flow_corrections::FlowCorrections,
     frames::Frames,
     linear_solver::SolverSettings,
@@ -30,7 +31,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{ContactNode, contact_nodes},
+        effect::ContactNode,
     },
     linear_algebra::petsc::{DistributedVector, Matrix, Precision, ProjectedKsp},
     parallel::session::Session,
@@ -122,18 +123,21 @@ impl Condensed {
         settings: &SolverSettings,
         precision: Precision,
     ) -> Result<Self> {
-        let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.held);
+        let contact: Vec<ContactNode<D>> = body.contact_nodes();
         let nodes = ContactNodes::new(&contact);
         body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| nodes.number(node)));
         let like = DistributedVector::ghosted(D, contact.len(), &[])?;
         let mut linear_solver = ProjectedKsp::new("", &like, D)?;
         linear_solver.linear_solver().set_method("cg")?;
         linear_solver.precondition_by_operator()?;
-        let newton = Newton::new(&like, &body.contacts, linear_solver, settings)?;
+        let mut newton = Newton::new(&like, &body.contacts, linear_solver, settings)?;
+        if body.only_surface_acts() {
+            newton.flow = Some(Flow::at_nodes(velocities, &like, nodes.nodes.clone())?);
+        }
         let frames = Frames::new(session, &body.mesh, &contact)?;
         let start = session.share_start(nodes.motions.len());
         let flowing =
-            if body.flows() { Some(Box::new(FlowCorrections::new(velocities, settings)?)) } else { None };
+            if body.only_cells_flow() { Some(Box::new(FlowCorrections::new(velocities, settings)?)) } else { None };
         Ok(Self {
             newton,
             elimination: Elimination {
@@ -187,7 +191,7 @@ impl Condensed {
             subspace: Subspace::whole(&self.velocity)?,
             workspace: Workspace::new(session, &self.nodes.motions, unknowns.len())?,
         };
-        let scales = if has_springs {
+        let scales = if has_springs || body.only_surface_acts() {
             resistances_of_body(session, &body.contacts, like, matrix)?
         } else {
             let (mut motion, mut product) = (self.velocity.like()?, self.velocity.like()?);

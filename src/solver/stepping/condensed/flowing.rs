@@ -16,7 +16,7 @@ use crate::{
     linear_algebra::petsc::{DistributedVector, ProjectedKsp},
     solver::stepping::{
         StepOutcome,
-        equations::StepMatrix,
+        equations::{NodeByNode, StepMatrix},
         flow::Flow,
         flow_corrections::FlowCorrections,
         linear_solver::SolverSettings,
@@ -197,7 +197,7 @@ impl<const D: usize> StepMatrix for Preconditioned<'_, D> {
         elimination.backward(z)
     }
 
-    fn set_subspace(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+    fn set_subspace(&self, project: NodeByNode<'_>) -> Result<bool> {
         let mut elimination = self.elimination.borrow_mut();
         let whole = &mut **self.whole.borrow_mut();
         factored_mut(&mut elimination.factored)?.condensed.set_subspace(&mut |column| {
