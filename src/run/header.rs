@@ -17,7 +17,8 @@ pub(super) fn lines<const D: usize, const S: usize>(
     let Setup { body, scheme, verdict, .. } = ready;
     let (job, mesh) = (&loaded.job, &body.mesh);
     let ranks = if session.ranks() == 1 { "1 rank".into() } else { format!("{} ranks", session.ranks()) };
-    let mut lines = vec![format!("Clarke {}, PETSc {}, {ranks}", super::version(), session.petsc().version()?)];
+    let mut lines =
+        vec![format!("Clarke {}, PETSc {}, {ranks}", super::version(), session.petsc().version()?)];
     if let Some(title) = job.about.as_ref().and_then(|a| a.title.as_deref()) {
         lines.push(format!("job        {title}"));
     }

@@ -3,7 +3,10 @@
 use super::{Body, Called};
 use crate::{
     fem::{
-        effect::{Contact, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents, Term},
+        effect::{
+            Contact, ContactNode, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents,
+            Term, contact_nodes,
+        },
         space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, linear_at, nodal_forces},
     },
     linear_algebra::{
@@ -42,6 +45,17 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Whether implicit steps are nonlinear without contact by flow alone, without damage and effects at the surface.
     pub fn only_cells_flow(&self) -> bool {
         self.flows() && self.surface_effects.is_empty() && self.called(|p| p.end && p.weakens).is_empty()
+    }
+
+    /// Whether implicit steps are nonlinear without contact by effects at the surface alone.
+    pub fn only_surface_acts(&self) -> bool {
+        self.flows() && self.called(|p| p.end).is_empty()
+    }
+
+    /// The nodes of this rank at which contact laws and effects at the surface act in a step, with the directions in which they do.
+    pub fn contact_nodes(&self) -> Vec<ContactNode<D>> {
+        let effects = self.surface_effects.iter().filter(|_| !self.is_explicit());
+        contact_nodes(&self.contacts, effects.flat_map(|effect| effect.nodes()), &self.held)
     }
 
     /// Names of the effects, without contact, whose forces at the end of an implicit step may fall with the displacement.

@@ -213,6 +213,10 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         true
     }
 
+    fn nodes(&self) -> Vec<u32> {
+        self.points.iter().filter(|(_, point)| point.weight > 0.0).map(|(_, point)| point.node).collect()
+    }
+
     fn evaluate(
         &mut self,
         at: Evaluation,

@@ -92,6 +92,10 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
         "contact_memory"
     }
 
+    fn nodes(&self) -> Vec<u32> {
+        self.points.iter().map(|(_, point)| point.node).collect()
+    }
+
     fn evaluate(
         &mut self,
         at: Evaluation,

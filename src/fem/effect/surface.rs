@@ -22,6 +22,9 @@ pub trait SurfaceEffect<const D: usize> {
         false
     }
 
+    /// The local numbers of the nodes where it has forces.
+    fn nodes(&self) -> Vec<u32>;
+
     /// Evaluates its law at this displacement (`D` values a node, with ghosts) and writes its trial history.
     ///
     /// With the converged state it adds its force in N at the nodes of this rank to `forces`. At the start of an implicit step it is given

@@ -22,10 +22,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{
-        body::Body,
-        effect::{ContactNode, contact_nodes},
-    },
+    fem::{body::Body, effect::ContactNode},
     linear_algebra::petsc::{DistributedVector, Matrix, Precision, ProjectedKsp},
     parallel::session::Session,
 };
@@ -106,7 +103,7 @@ impl Refinement {
 impl<const D: usize> Condensed<D> {
     /// A solver for the contacts of a body, whose unknowns it numbers. Collective.
     pub(super) fn new<const S: usize>(session: &Session, body: &mut Body<D, S>) -> Result<Self> {
-        let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.held);
+        let contact: Vec<ContactNode<D>> = body.contact_nodes();
         let nodes = ContactNodes::new(&contact);
         body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| nodes.number(node)));
         let frames = Rc::new(Frames::new(session, &body.mesh, &contact)?);

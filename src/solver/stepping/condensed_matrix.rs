@@ -1,6 +1,6 @@
 //! The matrix of a step, condensed to the motions on which contact laws act.
 
-use super::equations::StepMatrix;
+use super::equations::{NodeByNode, StepMatrix};
 use crate::{
     error::Result,
     linear_algebra::petsc::{DenseCholesky, DistributedVector, MISSING_DIRECTIONS, times_own_transpose},
@@ -83,6 +83,10 @@ pub(super) struct Subspace {
     work_vector: DistributedVector,
     /// The blocks of the projection for which the factor was computed, node after node of all ranks.
     projection_blocks: Vec<f64>,
+    /// The same of symmetric, positive forces in addition to `S`; empty if there are none.
+    additions: Vec<f64>,
+    /// `S` as a full matrix, in the order of the motions, once it was needed; its lower half.
+    product: Vec<f64>,
     factor: Option<DenseCholesky>,
     is_active: bool,
 }
@@ -91,7 +95,15 @@ impl Subspace {
     /// The whole space, for vectors with the layout of `like`.
     pub(super) fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
         let work_vector = like.like()?;
-        Ok(RefCell::new(Self { work_vector, projection_blocks: Vec::new(), factor: None, is_active: false }))
+        let (projection_blocks, additions, product) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(RefCell::new(Self {
+            work_vector,
+            projection_blocks,
+            additions,
+            product,
+            factor: None,
+            is_active: false,
+        }))
     }
 }
 
@@ -198,10 +210,10 @@ impl CondensedMatrix {
         }
     }
 
-    /// Writes the blocks of a projection that works node by node, node after node of all ranks. Collective.
+    /// Writes the blocks of a map, node after node of all ranks. Collective.
     fn write_blocks(
         &self,
-        project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
+        map: NodeByNode<'_>,
         column: &mut DistributedVector,
         workspace: &mut Workspace,
     ) -> Result<()> {
@@ -214,7 +226,7 @@ impl CondensedMatrix {
                     values.iter_mut().skip(i).step_by(dimension).for_each(|value| *value = 1.0);
                 }
             }
-            project(column)?;
+            map(column)?;
             image.clear();
             image.extend_from_slice(&column.owned()?);
         }
@@ -232,23 +244,41 @@ impl CondensedMatrix {
         Ok(())
     }
 
-    /// Factors `P S P + k (I - P)`, where `P` has these blocks; in the order of the motions.
-    fn factor_on_subspace(&self, blocks: &[f64]) -> Result<DenseCholesky> {
+    /// Writes `S` as a full matrix, in the order of the motions.
+    fn write_product(&self, full: &mut Vec<f64>) -> Result<()> {
         let size = self.positions.len();
-        let mut full = vec![0.0; size * size];
+        full.clear();
+        full.resize(size * size, 0.0);
         for at in 0..size {
             full[at * size + at..][..size - at].copy_from_slice(column(&self.lower, size, at));
         }
-        let product = times_own_transpose(size, &full)?;
+        let product = times_own_transpose(size, full)?;
         for (to, &place) in full.chunks_exact_mut(size.max(1)).zip(&self.positions) {
             let from = &product[place * size..][..size];
             to.iter_mut().zip(&self.positions).for_each(|(value, &place)| *value = from[place]);
         }
+        Ok(())
+    }
+
+    /// Factors `P (S + B) P + k (I - P)` with the blocks of `P` and of the additions `B`, in the order of the motions.
+    fn factor_on_subspace(&self, subspace: &mut Subspace) -> Result<DenseCholesky> {
+        let size = self.positions.len();
+        if subspace.product.is_empty() {
+            self.write_product(&mut subspace.product)?;
+        }
+        let mut full = subspace.product.clone();
         let mean = (0..size).map(|at| full[at * size + at]).sum::<f64>() / size as f64;
         let mut first = 0;
         for node in &self.nodes {
-            let block = &blocks[first..first + node.len() * node.len()];
-            first += block.len();
+            let blocks = first..first + node.len() * node.len();
+            first = blocks.end;
+            if let Some(block) = subspace.additions.get(blocks.clone()) {
+                for (entry, value) in block.iter().enumerate() {
+                    let (row, column) = (node.start + entry / node.len(), node.start + entry % node.len());
+                    full[column * size + row] += value;
+                }
+            }
+            let block = &subspace.projection_blocks[blocks];
             for line in 0..size {
                 multiply_entries(&mut full, block, node.clone().map(|at| at * size + line));
             }
@@ -264,8 +294,20 @@ impl CondensedMatrix {
         }
         DenseCholesky::new(size, &full)
     }
+
+    /// The blocks of nodes, node after node of all ranks.
+    fn blocks_of_nodes<'a>(&'a self, blocks: &'a [f64]) -> impl Iterator<Item = (usize, &'a [f64])> {
+        let mut first = 0;
+        self.nodes.iter().map(move |node| {
+            let block = &blocks[first..][..node.len() * node.len()];
+            first += block.len();
+            (node.len(), block)
+        })
+    }
 }
 
+/// Share of the largest entry of a block at which a pivot counts as zero.
+const ROUNDING: f64 = 1e-12;
 /// Largest number of components of a node.
 const MAX_DIMENSION: usize = 3;
 
@@ -300,24 +342,68 @@ impl StepMatrix for CondensedMatrix {
         self.write(amounts, z)
     }
 
-    fn set_subspace(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
-        let mut subspace = self.subspace.borrow_mut();
+    fn set_subspace(&self, project: NodeByNode<'_>) -> Result<bool> {
+        let subspace = &mut *self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
         self.write_blocks(project, &mut subspace.work_vector, workspace)?;
         let blocks = &workspace.blocks;
-        let (mut removed, mut first) = (0.0, 0);
-        for count in self.nodes.iter().map(ExactSizeIterator::len) {
-            removed += (0..count).map(|i| 1.0 - blocks[first + i * (count + 1)]).sum::<f64>();
-            first += count * count;
-        }
-        subspace.is_active = removed.round() >= MISSING_DIRECTIONS;
+        let missing = |(count, block): (usize, &[f64])| -> f64 {
+            (0..count).map(|i| 1.0 - block[i * (count + 1)]).sum()
+        };
+        let removed: f64 = self.blocks_of_nodes(blocks).map(missing).sum();
+        subspace.is_active = removed.round() >= MISSING_DIRECTIONS || !subspace.additions.is_empty();
         if !subspace.is_active || (subspace.factor.is_some() && subspace.projection_blocks == *blocks) {
             return Ok(false);
         }
-        subspace.factor = Some(self.factor_on_subspace(blocks)?);
         subspace.projection_blocks.clone_from(blocks);
+        subspace.factor = Some(self.factor_on_subspace(subspace)?);
         Ok(true)
     }
+
+    fn set_additions(&self, add: NodeByNode<'_>) -> Result<()> {
+        let subspace = &mut *self.subspace.borrow_mut();
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.write_blocks(add, &mut subspace.work_vector, workspace)?;
+        let mut additions = std::mem::take(&mut subspace.additions);
+        additions.clear();
+        for (count, block) in self.blocks_of_nodes(&workspace.blocks) {
+            let symmetric =
+                |entry: usize| 0.5 * (block[entry] + block[entry % count * count + entry / count]);
+            let start = additions.len();
+            additions.extend((0..block.len()).map(symmetric));
+            if !is_positive(count, &additions[start..]) {
+                additions[start..].fill(0.0);
+            }
+        }
+        if additions.iter().all(|value| *value == 0.0) {
+            additions.clear();
+        }
+        subspace.additions = additions;
+        subspace.factor = None;
+        Ok(())
+    }
+}
+
+/// Whether a symmetric block is positive semidefinite, up to rounding errors: pivots of its elimination.
+fn is_positive(size: usize, block: &[f64]) -> bool {
+    let mut rest = [0.0; MAX_DIMENSION * MAX_DIMENSION];
+    rest[..block.len()].copy_from_slice(block);
+    let largest = block.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    for at in 0..size {
+        let pivot = rest[at * size + at];
+        if !(pivot > ROUNDING * largest) {
+            let is_zero = |other: usize| rest[other * size + at].abs() <= ROUNDING * largest;
+            if pivot.abs() <= ROUNDING * largest && (at..size).all(is_zero) {
+                continue;
+            }
+            return false;
+        }
+        for row in at + 1..size {
+            let factor = rest[row * size + at] / pivot;
+            (at..size).for_each(|column| rest[row * size + column] -= factor * rest[at * size + column]);
+        }
+    }
+    true
 }
 
 /// Replaces these entries by their product with a symmetric block.

@@ -11,10 +11,7 @@ use super::{
     substructuring::{MAX_INTERFACE_UNKNOWNS, interface_nodes},
 };
 use crate::{
-    fem::{
-        body::Body,
-        effect::{Contact, contact_nodes},
-    },
+    fem::{body::Body, effect::Contact},
     linear_algebra::petsc::Precision,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -57,7 +54,7 @@ const MAX_CONDENSED_MOTIONS: usize = 4_000;
 
 /// The number of motions on which the contacts of a body act, over all ranks. Collective.
 fn motion_count<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
-    session.total(contact_nodes(&body.contacts, &body.held).iter().map(|contact| contact.active).sum())
+    session.total(body.contact_nodes().iter().map(|contact| contact.active).sum())
 }
 
 /// Iterations of a step without contact, with contact, and with friction, which may fix nodes that are free in the preconditioner's
@@ -89,7 +86,7 @@ impl ProblemSize {
             contact: !contacts.is_empty(),
             condensed: !contacts.is_empty()
                 && !contacts.iter().any(Contact::needs_ghosts)
-                && (!body.flows() || body.only_cells_flow())
+                && (!body.flows() || body.only_cells_flow() || body.only_surface_acts())
                 && motions <= MAX_CONDENSED_MOTIONS,
             friction: contacts.iter().any(|contact| contact.friction().is_some()),
             precision: if body.flows() { FactorPrecision::Double } else { precision },

@@ -9,6 +9,9 @@ use crate::{
     parallel::session::Session,
 };
 
+/// A linear map that replaces the values of each contact node by others.
+pub(super) type NodeByNode<'a> = &'a mut dyn FnMut(&mut DistributedVector) -> Result<()>;
+
 /// The constant matrix `K` of a step.
 pub trait StepMatrix {
     /// `y = K x`. Collective.
@@ -28,8 +31,14 @@ pub trait StepMatrix {
 
     /// Sets the subspace of later solves, given the projection on it; returns whether a preconditioner was created
     /// for it. Collective.
-    fn set_subspace(&self, _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+    fn set_subspace(&self, _project: NodeByNode<'_>) -> Result<bool> {
         Ok(false)
+    }
+
+    /// Sets forces in addition to the matrix for the preconditioner of later solves, given what replaces velocities by these forces.
+    /// Collective.
+    fn set_additions(&self, _add: NodeByNode<'_>) -> Result<()> {
+        Ok(())
     }
 
     /// The matrix itself, if its entries are stored.
@@ -68,6 +77,9 @@ impl Floor {
         residual <= self.at(speed)
     }
 }
+
+/// The number of Krylov iterations that take as long as factoring the condensed matrix with the forces at the surface.
+const MANY_ITERATIONS: usize = 15;
 
 /// The residual decreased to less than this share of the last one unless it stagnates.
 const STAGNATION: f64 = 0.5;
@@ -161,6 +173,8 @@ pub struct SolveCounts {
     pub residuals: usize,
     /// Krylov iterations.
     pub linear_iterations: usize,
+    /// Those of the last linear system.
+    pub last_iterations: usize,
     /// Linear systems in which CG found negative curvature.
     pub indefinite: usize,
     /// Number of times that the preconditioner was rebuilt.
@@ -378,7 +392,15 @@ impl<const D: usize> ContactEquations<'_, D> {
         let mut operator = ReducedJacobian { matrix: self.matrix, cells, contacts: self.contacts, ghosted };
         open.copy_from(residual)?;
         operator.reduce(open)?;
-        if operator.may_project() {
+        let is_slow = self.counts.last_iterations > MANY_ITERATIONS;
+        if let Some(cells) = operator.cells.as_mut().filter(|_| is_slow || self.counts.sets.len() == 1) {
+            self.matrix.set_additions(&mut |column| {
+                velocity.fill(0.0)?;
+                cells.add_derivative(column, velocity)?;
+                column.copy_from(velocity)
+            })?;
+        }
+        if operator.may_project() || operator.cells.is_some() {
             let rebuilt = self.matrix.set_subspace(&mut |column| operator.project(column))?;
             self.counts.refreshed += usize::from(rebuilt);
         }
@@ -389,6 +411,7 @@ impl<const D: usize> ContactEquations<'_, D> {
             solve(self.linear_solver, &mut operator, open, velocity)?
         };
         self.counts.linear_iterations += outcome.linear.iterations;
+        self.counts.last_iterations = outcome.linear.iterations;
         self.counts.indefinite += usize::from(outcome.indefinite);
         self.counts.refreshed += usize::from(outcome.refreshed);
         if !outcome.linear.converged() {

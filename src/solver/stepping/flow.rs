@@ -1,4 +1,5 @@
-//! Forces of cells with viscoplastic flow in the equations of Newton's method.
+//! Forces of cells that flow and of effects at the surface in the equations of Newton's method, for all nodes or, where only effects at the
+//! surface act, for contact nodes alone.
 
 use super::equations::CellForces;
 use crate::{
@@ -11,6 +12,8 @@ use crate::{
 pub(super) struct Flow {
     values: DistributedVector,
     forces: DistributedVector,
+    /// The nodes that vectors of Newton's method contain; all if absent.
+    part: Option<Part>,
     /// The derivatives of the forces at the point of linearisation.
     tangents: Tangents,
     /// The velocity of the last forces, and their derivatives there: Newton's method linearises where it has just evaluated, and the
@@ -19,6 +22,12 @@ pub(super) struct Flow {
     evaluated_tangents: Tangents,
     /// Whether they belong to this step and are not in use yet.
     is_fresh: bool,
+}
+
+/// Nodes of this rank, ascending, and a work vector of all nodes.
+struct Part {
+    nodes: Vec<usize>,
+    free: DistributedVector,
 }
 
 /// The displacement at the end of a step is `displacement + length v_n`.
@@ -41,11 +50,25 @@ pub(super) struct FlowForces<'a, const D: usize, const S: usize> {
 impl Flow {
     /// Vectors with the layout of `like`.
     pub(super) fn new(like: &DistributedVector) -> Result<Self> {
+        Self::with(like, like, None)
+    }
+
+    /// The same where Newton's method has vectors of these nodes of this rank only, with the layout of `motions`.
+    pub(super) fn at_nodes(
+        like: &DistributedVector,
+        motions: &DistributedVector,
+        nodes: Vec<usize>,
+    ) -> Result<Self> {
+        Self::with(like, motions, Some(Part { nodes, free: like.like()? }))
+    }
+
+    fn with(like: &DistributedVector, motions: &DistributedVector, part: Option<Part>) -> Result<Self> {
         Ok(Self {
             values: like.like()?,
             forces: like.like()?,
+            part,
             tangents: Tangents::default(),
-            evaluated: like.like()?,
+            evaluated: motions.like()?,
             evaluated_tangents: Tangents::default(),
             is_fresh: false,
         })
@@ -60,6 +83,19 @@ impl Flow {
         let symmetric = cells.has_symmetric_tangent();
         self.is_fresh = false;
         FlowForces { flow: self, cells, start, symmetric }
+    }
+
+    /// Copies a velocity of all nodes to a vector of Newton's method, without held components: there `to` has that of the supports.
+    pub(super) fn copy_free_parts<const D: usize>(
+        &mut self,
+        held: &Held<D>,
+        velocity: &DistributedVector,
+        to: &mut DistributedVector,
+    ) -> Result<()> {
+        self.extend::<D>(to)?;
+        self.forces.copy_from(velocity)?;
+        self.forces.add_scaled(-1.0, &self.values)?;
+        self.add_free_parts(held, to)
     }
 
     /// Sets the share of softening in the derivatives.
@@ -78,19 +114,44 @@ impl Flow {
         out: &mut DistributedVector,
     ) -> Result<()> {
         self.forces.add_ghosts_to_owners()?;
+        self.add_free_parts(held, out)
+    }
+
+    /// The same for forces that are sums over all ranks already.
+    fn add_free_parts<const D: usize>(&mut self, held: &Held<D>, out: &mut DistributedVector) -> Result<()> {
         let forces = self.forces.owned()?;
-        held.add_free_parts(&forces, &mut out.owned_mut()?);
+        let Some(Part { nodes, free }) = &mut self.part else {
+            held.add_free_parts(&forces, &mut out.owned_mut()?);
+            return Ok(());
+        };
+        let (mut free, mut out) = (free.owned_mut()?, out.owned_mut()?);
+        free.fill(0.0);
+        held.add_free_parts(&forces, &mut free);
+        for (out, &node) in out.chunks_exact_mut(D).zip(&*nodes) {
+            out.iter_mut().zip(&free[node * D..]).for_each(|(out, force)| *out += force);
+        }
         Ok(())
+    }
+
+    /// Copies a velocity or its change to the vector of all nodes, with ghosts.
+    fn extend<const D: usize>(&mut self, values: &DistributedVector) -> Result<()> {
+        match &self.part {
+            None => self.values.copy_from(values)?,
+            Some(Part { nodes, .. }) => {
+                let (from, mut to) = (values.owned()?, self.values.owned_mut()?);
+                let pairs = from.chunks_exact(D).zip(nodes);
+                pairs.for_each(|(from, &node)| to[node * D..][..D].copy_from_slice(from));
+            }
+        }
+        self.values.update_ghosts()
     }
 }
 
 impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
     /// The displacement at the end of the step, with ghosts.
     fn displace(&mut self, velocity: &DistributedVector) -> Result<()> {
-        let values = &mut self.flow.values;
-        values.copy_from(velocity)?;
-        values.update_ghosts()?;
-        let (start, mut values) = (self.start.displacement.local()?, values.local_mut()?);
+        self.flow.extend::<D>(velocity)?;
+        let (start, mut values) = (self.start.displacement.local()?, self.flow.values.local_mut()?);
         values.iter_mut().zip(start.iter()).for_each(|(v, u)| *v = u + self.start.length * *v);
         Ok(())
     }
@@ -150,8 +211,7 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
 
     fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
         let flow = &mut *self.flow;
-        flow.values.copy_from(change)?;
-        flow.values.update_ghosts()?;
+        flow.extend::<D>(change)?;
         {
             let (values, mut forces) = (flow.values.local()?, flow.forces.local_mut()?);
             forces.fill(0.0);

@@ -14,7 +14,7 @@ use super::{
     condensed::CONTACT_SHARE,
     contacts::restore_pressures,
     corrections::MAX_CORRECTIONS,
-    equations::StepMatrix,
+    equations::{NodeByNode, StepMatrix},
     flow::Flow,
     linear_solver::SolverSettings,
     newton::Newton,
@@ -238,7 +238,7 @@ impl StepMatrix for Preconditioned<'_> {
         self.solver.borrow_mut().precondition(r, z)
     }
 
-    fn set_subspace(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+    fn set_subspace(&self, project: NodeByNode<'_>) -> Result<bool> {
         self.solver.borrow_mut().set_subspace(project, &mut self.work.borrow_mut())
     }
 }

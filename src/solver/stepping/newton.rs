@@ -307,20 +307,16 @@ impl Newton {
 
     /// Writes the unknowns of the velocity before the last step, with that of the supports in this one: after a sudden change it is a
     /// better start than the extrapolation, which repeats the change. Returns whether there is such a velocity: Newton's method must
-    /// have its unknowns in the whole body. Collective.
+    /// have forces of flow or of effects at the surface. Collective.
     fn writes_steady_start<const D: usize, const S: usize>(
-        &self,
+        &mut self,
         problem: &StepProblem<'_, D, S>,
         trial: &DistributedVector,
         start: &mut DistributedVector,
     ) -> Result<bool> {
-        if self.flow.is_none() || problem.state.step < 2 {
-            return Ok(false);
-        }
-        start.copy_from(&problem.state.previous_velocity)?;
-        start.add_scaled(-1.0, trial)?;
-        problem.body.held.clear(&mut start.owned_mut()?);
-        start.add_scaled(1.0, trial)?;
+        let Some(flow) = self.flow.as_mut().filter(|_| problem.state.step > 1) else { return Ok(false) };
+        start.copy_from(trial)?;
+        flow.copy_free_parts(&problem.body.held, &problem.state.previous_velocity, start)?;
         let mut unknowns = start.owned_mut()?;
         problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
         Ok(true)

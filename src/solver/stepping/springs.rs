@@ -6,7 +6,7 @@
 
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, effect::contact_nodes},
+    fem::body::Body,
     linear_algebra::petsc::BlockRows,
     mesh::free_motions,
     parallel::{agreement::Agreed, session::Session},
@@ -70,7 +70,7 @@ impl Springs {
         mut rows: BlockRows,
     ) -> Result<RowsWithSprings> {
         // Points of Gauss quadrature may touch nodes of other ranks.
-        let nodes = contact_nodes(&body.contacts, &body.held);
+        let nodes = body.contact_nodes();
         let nodes = nodes.iter().filter(|contact| contact.node < body.mesh.owned);
         let motions: Vec<(usize, [f64; D])> =
             nodes.flat_map(|c| c.frame[..c.active].iter().map(|motion| (c.node, *motion))).collect();

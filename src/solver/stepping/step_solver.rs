@@ -6,7 +6,7 @@ use super::{
     condensed::Condensed,
     contacts::restore_pressures,
     corrections::correct,
-    equations::Floor,
+    equations::{Floor, StepMatrix},
     factor_cache::{FactorCache, Prepared},
     flow::Flow,
     flow_corrections::{Corrected, FlowCorrections},
@@ -245,7 +245,12 @@ impl StepSolver {
             return Ok(false);
         }
         self.precision = solver.precision().unwrap_or(self.precision);
-        *scales = resistances(session, &body.contacts, like, |motion| solver.power(matrix, motion))?;
+        // Forces at the surface resist motions of single nodes, which a condensed matrix does not do.
+        let is_stiffened = self.newton.as_ref().is_some_and(|newton| newton.flow.is_some());
+        *scales = resistances(session, &body.contacts, like, |motion| match is_stiffened {
+            true => StepMatrix::power(&*matrix, motion),
+            false => solver.power(matrix, motion),
+        })?;
         Ok(true)
     }
 
@@ -464,7 +469,10 @@ fn nonlinear<const D: usize, const S: usize>(
         newton.bounded = Some(Bounded::new(like, settings)?);
     }
     let mut flowing = None;
-    if body.flows() && solver.precision().is_some() {
+    if body.only_surface_acts() && solver.precision().is_some() {
+        let nodes = body.contact_nodes().iter().map(|contact| contact.node).collect();
+        newton.flow = Some(Flow::at_nodes(like, solver.unknowns(like), nodes)?);
+    } else if body.flows() && solver.precision().is_some() {
         flowing = Some(Box::new(FlowCorrections::new(like, settings)?));
     } else if body.flows() {
         newton.flow = Some(Flow::new(like)?);

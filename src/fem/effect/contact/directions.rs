@@ -15,8 +15,12 @@ pub struct ContactNode<const D: usize> {
     pub active: usize,
 }
 
-/// The nodes of all contacts that act at nodes, ascending. `held` is what supports hold.
-pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], held: &Held<D>) -> Vec<ContactNode<D>> {
+/// The nodes of all contacts that act at nodes, and `others`, on whose whole motion laws act, ascending. `held` is what supports hold.
+pub fn contact_nodes<const D: usize>(
+    contacts: &[Contact<D>],
+    others: impl Iterator<Item = u32>,
+    held: &Held<D>,
+) -> Vec<ContactNode<D>> {
     let mut nodes: BTreeMap<usize, Vec<Option<Vector<D>>>> = BTreeMap::new();
     for contact in contacts {
         for point in &contact.points {
@@ -30,6 +34,7 @@ pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], held: &Held<D>) ->
         let tangential = contact.friction.iter().flat_map(|friction| &friction.points);
         tangential.for_each(|point| nodes.entry(point.node()).or_default().push(None));
     }
+    others.for_each(|node| nodes.entry(node as usize).or_default().push(None));
     let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
     let axes: Vec<Vector<D>> = (0..D).map(axis).collect();
     let frame = |(node, active): (usize, Vec<Option<Vector<D>>>)| match active[..] {
