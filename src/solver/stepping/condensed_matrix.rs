@@ -391,7 +391,7 @@ fn is_positive(size: usize, block: &[f64]) -> bool {
     let largest = block.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     for at in 0..size {
         let pivot = rest[at * size + at];
-        if !(pivot > ROUNDING * largest) {
+        if pivot.is_nan() || pivot <= ROUNDING * largest {
             let is_zero = |other: usize| rest[other * size + at].abs() <= ROUNDING * largest;
             if pivot.abs() <= ROUNDING * largest && (at..size).all(is_zero) {
                 continue;

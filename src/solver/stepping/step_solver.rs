@@ -444,6 +444,9 @@ fn can_condense(settings: &SolverSettings, problem: ProblemSize) -> Result<bool>
         && !has_option("ksp_type")?)
 }
 
+/// Newton's method and flow corrections, where they are needed.
+type Nonlinear = (Option<Box<Newton>>, Option<Box<FlowCorrections>>);
+
 /// Newton's method for a body with this kind of linear solver, and corrections of condensed steps in which cells flow; nothing if its steps
 /// are linear. Vectors have the layout of `like`. Collective.
 fn nonlinear<const D: usize, const S: usize>(
@@ -452,7 +455,7 @@ fn nonlinear<const D: usize, const S: usize>(
     solver: &dyn LinearSolver,
     like: &DistributedVector,
     settings: &SolverSettings,
-) -> Result<(Option<Box<Newton>>, Option<Box<FlowCorrections>>)> {
+) -> Result<Nonlinear> {
     if body.contacts.is_empty() && !body.flows() {
         return Ok((None, None));
     }
