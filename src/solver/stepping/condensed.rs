@@ -156,7 +156,7 @@ impl<const D: usize> LinearSolver for Condensed<D> {
             nodes: frames.groups.clone(),
             own: own.clone(),
             motions: nodes.motions.clone(),
-            springs: springs.unwrap_or_default(),
+            springs,
             subspace: Subspace::whole(&self.velocity)?,
             workspace: Workspace::new(session, &nodes.motions, frames.unknowns.len())?,
         };
@@ -188,7 +188,7 @@ impl<const D: usize> LinearSolver for Condensed<D> {
     fn power(&mut self, matrix: &Matrix, motion: &DistributedVector) -> Result<f64> {
         let Self { unknowns, elimination, right_hand_side, velocity, .. } = self;
         let condensed = &factored_mut(&mut elimination.factored)?.condensed;
-        if !condensed.springs.is_empty() {
+        if condensed.springs.is_some() {
             return StepMatrix::power(matrix, motion);
         }
         unknowns.nodes.restrict(motion, velocity)?;

@@ -33,8 +33,8 @@ pub(super) struct CondensedMatrix {
     /// The range of this rank in these motions.
     pub own: Range<usize>,
     pub motions: Vec<Motion>,
-    /// Stiffness of the springs in the factor along each motion of this rank, in N s/m; empty without springs.
-    pub springs: Vec<f64>,
+    /// Stiffness of the springs in the factor along each motion of this rank, in N s/m; `None` on all ranks without springs.
+    pub springs: Option<Vec<f64>>,
     pub subspace: RefCell<Subspace>,
     pub workspace: RefCell<Workspace>,
 }
@@ -319,7 +319,9 @@ impl StepMatrix for CondensedMatrix {
         let [amounts, product] = &mut workspace.ordered_amounts;
         self.times_upper(amounts, product);
         self.times_lower(product, amounts);
-        for ((spring, amount), number) in self.springs.iter().zip(&workspace.own).zip(self.own.clone()) {
+        for ((spring, amount), number) in
+            self.springs.iter().flatten().zip(&workspace.own).zip(self.own.clone())
+        {
             amounts[self.positions[number]] -= spring * amount;
         }
         self.write(amounts, y)
