@@ -649,11 +649,9 @@ fn obstacle<const D: usize>(draw: &mut Draw<D>, content: &Content) {
         if rotates {
             draw.key("rotation", 3.0, [0.0, 0.0, -1.0]);
         }
-        if rotates || is_turned {
-            if D == 3 {
-                let axis = draw.vector(std::array::from_fn(|i| [0.2, 1.0, 0.1][i]), ONE);
-                draw.line(format!("axis = {axis}"));
-            }
+        if (rotates || is_turned) && D == 3 {
+            let axis = draw.vector(std::array::from_fn(|i| [0.2, 1.0, 0.1][i]), ONE);
+            draw.line(format!("axis = {axis}"));
         }
     }
     if is_loaded {
