@@ -13,7 +13,7 @@
 
 use super::{
     condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
-    equations::{Floor, StepMatrix},
+    equations::{Floor, NodeByNode, StepMatrix},
     frames::Frames,
     problem::System,
     solver::{Assembled, LinearSolver, Reduced},
@@ -286,11 +286,7 @@ impl<const D: usize> LinearSolver for Condensed<D> {
         elimination.backward(z)
     }
 
-    fn set_subspace(
-        &mut self,
-        project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
-        work: &mut DistributedVector,
-    ) -> Result<bool> {
+    fn set_subspace(&mut self, project: NodeByNode<'_>, work: &mut DistributedVector) -> Result<bool> {
         let nodes = &self.unknowns.nodes;
         factored_mut(&mut self.elimination.factored)?.condensed.set_subspace(&mut |column| {
             nodes.extend(column, work)?;

@@ -362,7 +362,7 @@ impl StepMatrix for CondensedMatrix {
         Ok(true)
     }
 
-    fn set_additions(&self, add: NodeByNode<'_>) -> Result<()> {
+    fn set_additions(&self, add: NodeByNode<'_>) -> Result<bool> {
         let subspace = &mut *self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
         self.write_blocks(add, &mut subspace.work_vector, workspace)?;
@@ -382,7 +382,7 @@ impl StepMatrix for CondensedMatrix {
         }
         subspace.additions = additions;
         subspace.factor = None;
-        Ok(())
+        Ok(true)
     }
 }
 

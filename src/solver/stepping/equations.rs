@@ -35,10 +35,10 @@ pub trait StepMatrix {
         Ok(false)
     }
 
-    /// Sets forces in addition to the matrix for the preconditioner of later solves, given what replaces velocities by these forces.
-    /// Collective.
-    fn set_additions(&self, _add: NodeByNode<'_>) -> Result<()> {
-        Ok(())
+    /// Sets forces in addition to the matrix for the preconditioner of later solves, given what replaces velocities by these forces;
+    /// returns whether the subspace is to be set again for it. Collective.
+    fn set_additions(&self, _add: NodeByNode<'_>) -> Result<bool> {
+        Ok(false)
     }
 
     /// The matrix itself, if its entries are stored.
@@ -393,14 +393,15 @@ impl<const D: usize> ContactEquations<'_, D> {
         open.copy_from(residual)?;
         operator.reduce(open)?;
         let is_slow = self.counts.last_iterations > MANY_ITERATIONS;
+        let mut has_additions = false;
         if let Some(cells) = operator.cells.as_mut().filter(|_| is_slow || self.counts.sets.len() == 1) {
-            self.matrix.set_additions(&mut |column| {
+            has_additions = self.matrix.set_additions(&mut |column| {
                 velocity.fill(0.0)?;
                 cells.add_derivative(column, velocity)?;
                 column.copy_from(velocity)
             })?;
         }
-        if operator.may_project() || operator.cells.is_some() {
+        if operator.may_project() || has_additions {
             let rebuilt = self.matrix.set_subspace(&mut |column| operator.project(column))?;
             self.counts.refreshed += usize::from(rebuilt);
         }

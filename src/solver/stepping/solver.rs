@@ -1,6 +1,10 @@
 //! Linear solvers of steps.
 
-use super::{equations::StepMatrix, problem::System, springs::RowsWithSprings};
+use super::{
+    equations::{NodeByNode, StepMatrix},
+    problem::System,
+    springs::RowsWithSprings,
+};
 use crate::{
     error::Result,
     linear_algebra::petsc::{DistributedVector, Interpolation, Matrix, Precision, ProjectedKsp},
@@ -89,11 +93,7 @@ pub(super) trait LinearSolver {
 
     /// Sets this subspace, given the projection on it and a work vector of the body; returns whether anything was rebuilt for it.
     /// Collective.
-    fn set_subspace(
-        &mut self,
-        _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
-        _work: &mut DistributedVector,
-    ) -> Result<bool> {
+    fn set_subspace(&mut self, _project: NodeByNode<'_>, _work: &mut DistributedVector) -> Result<bool> {
         Ok(false)
     }
 
