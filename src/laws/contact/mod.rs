@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 use crate::laws::expression::Scalar;
 
 pub use adhesion::{Adhesion, Toughness};
-pub use friction_law::{FrictionBound, FrictionHistory, Slip};
+pub use friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip};
 pub use interface::Interface;
 pub use laws::*;
 pub use memory::Memory;

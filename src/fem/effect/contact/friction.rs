@@ -24,7 +24,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{effect::Blend, space::Held},
-    laws::contact::FrictionLaw,
+    laws::contact::{FrictionLaw, SlidingContext, Slip},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     mesh::Mesh,
 };
@@ -33,6 +33,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct Friction<const D: usize> {
     pub law: FrictionLaw,
+    /// The current step, as the law sees it at points with the first history.
+    pub context: SlidingContext,
     /// `c` in the parameter `s = c v + q`, in Pa s/m.
     pub scale: f64,
     /// Whether the bound depends on the pressure while a step is solved.
@@ -85,8 +87,8 @@ impl<const D: usize> Friction<D> {
                 weight: point.weight,
                 tangents,
                 count,
-                law,
-                history: [law.history().map_or(0.0, |history| history.initial); 2],
+                context: SlidingContext::default(),
+                history: law.first_histories(),
                 pressure: 0.0,
                 traction: [0.0; D],
                 tangent: Tangent::free(),
@@ -96,6 +98,7 @@ impl<const D: usize> Friction<D> {
         let follows = law.follows_pressure();
         Ok(Self {
             law,
+            context: SlidingContext::default(),
             scale: 1.0,
             follows,
             points: out,
@@ -119,10 +122,9 @@ impl<const D: usize> Friction<D> {
 
     /// Starts a step from this blend of earlier histories.
     pub(super) fn start_step(&mut self, blend: Blend) {
-        if let Some(history) = self.law.history() {
-            self.law.start_step([history.initial; 2], blend);
-            self.points.iter_mut().for_each(|point| point.law.start_step(point.history, blend));
-        }
+        let Self { law, points, .. } = self;
+        self.context = law.context(law.first_histories(), blend);
+        points.iter_mut().for_each(|point| point.context = law.context(point.history, blend));
     }
 
     /// Advances the histories by a step from this blend of earlier ones, at these velocities at its end, with ghosts.
@@ -130,12 +132,12 @@ impl<const D: usize> Friction<D> {
         if self.law.history().is_none() {
             return;
         }
-        let Self { points, obstacle_velocities, .. } = self;
+        let Self { law, points, obstacle_velocities, .. } = self;
         for (at, point) in points.iter_mut().enumerate() {
             let along = point.along(Body, velocity);
             let obstacle = obstacle_velocities.get(at).map_or([0.0; D], |obstacle| *obstacle);
             let speed = norm(&add_scaled(&along, -1.0, &obstacle));
-            point.history = [point.law.history_after(point.history, blend, speed), point.history[0]];
+            point.history = [law.history_after(point.history, blend, speed), point.history[0]];
         }
     }
 
@@ -159,7 +161,7 @@ impl<const D: usize> Friction<D> {
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
             let length = norm(&unknown);
-            let found = point.law.resolve(scale * length, scale, point.pressure);
+            let found = self.law.resolve(scale * length, scale, point.pressure, point.context);
             let shares = if found.traction == 0.0 {
                 // Without traction the velocity is bitwise equal to the unknown.
                 [1.0, 0.0]
@@ -202,7 +204,7 @@ impl<const D: usize> Friction<D> {
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
             let length = norm(&unknown);
-            let found = point.law.resolve(scale * length, scale, point.pressure);
+            let found = self.law.resolve(scale * length, scale, point.pressure, point.context);
             let at_rest = length == 0.0 || found.speed == 0.0;
             let touches = follows && points[point.at].theta == 0.0;
             point.tangent = if found.derivative == 0.0 || (at_rest && touches) {
@@ -330,7 +332,7 @@ impl<const D: usize> Friction<D> {
 
     /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.
     pub(super) fn steepest_decrease(&self) -> f64 {
-        let decrease = |point: &TangentialPoint<D>| point.law.steepest_decrease() * point.pressure;
+        let decrease = |point: &TangentialPoint<D>| self.law.steepest_decrease(point.context) * point.pressure;
         self.points.iter().fold(0.0, |most, point| larger(most, decrease(point)))
     }
 
@@ -341,7 +343,7 @@ impl<const D: usize> Friction<D> {
                 return (Motion::Separated, point.weight);
             }
             let parameter: Vector<D> = std::array::from_fn(|i| self.scale * sliding[i] + point.traction[i]);
-            let found = point.law.resolve(norm(&parameter), self.scale, point.pressure);
+            let found = self.law.resolve(norm(&parameter), self.scale, point.pressure, point.context);
             (if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }, point.weight)
         })
     }
@@ -368,7 +370,7 @@ impl<const D: usize> Friction<D> {
         let obstacle =
             self.obstacle_velocities.iter().fold(0.0, |most, obstacle| larger(most, norm(obstacle)));
         self.sliding(Newton, velocity).fold([ROUNDING * obstacle, 0.0], |[v, q], (point, sliding)| {
-            let bound = point.law.bound(0.0, points[point.at].pressure);
+            let bound = self.law.bound(0.0, points[point.at].pressure, point.context);
             [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
         })
     }
@@ -394,14 +396,14 @@ impl<const D: usize> Friction<D> {
             let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
             let pressure = points[point.at].pressure;
             let (speed, size) = (norm(&sliding), norm(&traction));
-            let beyond = (size - point.law.bound(0.0, pressure)).max(0.0);
+            let beyond = (size - self.law.bound(0.0, pressure, point.context)).max(0.0);
             let to_rest = (speed / speeds).hypot(beyond / tractions);
-            let to_rest = if point.law.jumps_at_rest() {
+            let to_rest = if self.law.jumps_at_rest() {
                 to_rest
             } else {
                 to_rest.min(distance_along_parameter(
-                    &point.law,
-                    pressure,
+                    |s, c| self.law.resolve(s, c, pressure, point.context),
+                    self.law.steepest_decrease(point.context) * pressure.max(0.0),
                     [sliding, traction],
                     [speeds, tractions],
                 ))
@@ -409,7 +411,7 @@ impl<const D: usize> Friction<D> {
             if speed == 0.0 {
                 return to_rest;
             }
-            let bound = point.law.bound(speed, pressure) / speed;
+            let bound = self.law.bound(speed, pressure, point.context) / speed;
             let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
             to_rest.min(norm(&off) / tractions)
         };
@@ -439,17 +441,17 @@ impl<const D: usize> Friction<D> {
 }
 
 /// The scaled distance of a sliding velocity and a traction to the point of the graph with the same parameter `c v + q`, where `c` is
-/// the ratio of the scales or, where the graph decreases faster, twice its steepest decrease.
+/// the ratio of the scales or, where the graph decreases faster, twice its steepest decrease. `resolve` finds the point for `s` and `c`.
 fn distance_along_parameter<const D: usize>(
-    law: &FrictionLaw,
-    pressure: f64,
+    resolve: impl Fn(f64, f64) -> Slip,
+    decrease: f64,
     [sliding, traction]: [Vector<D>; 2],
     [speeds, tractions]: [f64; 2],
 ) -> f64 {
-    let c = (tractions / speeds).max(2.0 * law.steepest_decrease() * pressure.max(0.0));
+    let c = (tractions / speeds).max(2.0 * decrease);
     let parameter = add_scaled(&traction, c, &sliding);
     let size = norm(&parameter);
-    let found = law.resolve(size, c, pressure);
+    let found = resolve(size, c);
     let off = |value: &Vector<D>, found: f64| {
         let share = if size > 0.0 { found / size } else { 0.0 };
         norm(&add_scaled(value, -share, &parameter))

@@ -104,7 +104,7 @@ impl<const D: usize> Contact<D> {
                 } else {
                     sliding.pressure
                 };
-                let speed = sliding.law.resolve(parameter, friction.scale, pressure).speed;
+                let speed = friction.law.resolve(parameter, friction.scale, pressure, sliding.context).speed;
                 let erosion = wear.erosion(point.context.step_length * speed);
                 let change = erosion - point.context.erosion;
                 point.context.erosion = erosion;
@@ -138,10 +138,10 @@ impl<const D: usize> Contact<D> {
         let blend = self.blend_to_end(length);
         for (sliding, slip) in friction.sliding(Body, velocity) {
             let (speed, point) = (norm(&slip), &self.points[sliding.at]);
-            if let Some(history) = sliding.law.history() {
-                let after = sliding.law.history_after(sliding.history, blend, speed);
+            if let Some(history) = friction.law.history() {
+                let after = friction.law.history_after(sliding.history, blend, speed);
                 let values = [after, sliding.history[0], sliding.history[1], history.initial];
-                let [now, before, earlier, start] = values.map(|value| sliding.law.history_measure(value));
+                let [now, before, earlier, start] = values.map(|value| friction.law.history_measure(value));
                 let error = curvature.error([now, before, earlier]) / history.share;
                 out[0].add(sliding.weight, [error, now - start, NEGLIGIBLE_HISTORY]);
             }
@@ -191,6 +191,11 @@ impl<const D: usize> Contact<D> {
         WORN.iter().position(|worn| *worn == name).filter(|_| self.wear.is_some())
     }
 
+    /// Whether the friction coefficient, or a bound without pressure, may decrease with the sliding velocity in the current step.
+    pub fn has_decreasing_friction(&self) -> bool {
+        self.friction.as_ref().is_some_and(|friction| friction.law.steepest_decrease(friction.context) > 0.0)
+    }
+
     /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
     pub fn steepest_friction_decrease(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, Friction::steepest_decrease)
@@ -205,7 +210,7 @@ impl<const D: usize> Contact<D> {
     /// before it. Friction that depends on an unbounded pressure counts as not decreasing; see
     /// [`decrease_per_pressure`](Self::decrease_per_pressure).
     pub fn monotonicity_constants(&self, step_length: f64) -> [f64; 2] {
-        let friction = self.friction().map_or(0.0, |law| law.in_step(step_length).steepest_decrease());
+        let friction = self.friction().map_or(0.0, |law| law.first_decrease(step_length));
         let most = self.law.greatest_pressure();
         let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
         [self.law.monotonicity_constant(step_length), tangential]
@@ -230,7 +235,7 @@ impl<const D: usize> Contact<D> {
     /// The steepest descent of the friction coefficient in s/m in a step of this length in s, where the pressure that multiplies it is
     /// unbounded.
     pub fn decrease_per_pressure(&self, step_length: f64) -> Option<f64> {
-        let fall = self.friction()?.in_step(step_length).steepest_decrease();
+        let fall = self.friction()?.first_decrease(step_length);
         (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 

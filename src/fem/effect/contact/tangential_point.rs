@@ -2,7 +2,7 @@
 
 use super::point::Vectors::{self, Body, Newton};
 use crate::{
-    laws::contact::FrictionLaw,
+    laws::contact::SlidingContext,
     linear_algebra::tensor::{Vector, dot, norm},
 };
 
@@ -20,8 +20,8 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Orthonormal; `count` of them are used.
     pub tangents: [Vector<D>; D],
     pub count: usize,
-    /// The law in the current step.
-    pub law: FrictionLaw,
+    /// The current step, as the law sees it.
+    pub context: SlidingContext,
     /// What the law keeps, if it has a history: after the last step, and before it.
     pub history: [f64; 2],
     /// The contact pressure in Pa that determines the bound.
