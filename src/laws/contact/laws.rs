@@ -26,7 +26,7 @@ pub use unilateral::{Bound, Unilateral};
 
 use super::{
     friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip, friction_laws},
-    normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response, normal_laws},
+    normal_law::{NodeContext, NormalParameters, Resolved, Response, normal_laws},
 };
 use crate::{
     error::Result,

@@ -32,7 +32,7 @@ pub use friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip};
 pub use interface::Interface;
 pub use laws::*;
 pub use memory::Memory;
-pub use normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+pub use normal_law::{NodeContext, NormalParameters, Resolved, Response};
 pub use obstacle::{Gap, Plane, Sphere};
 pub use obstacle_load::ObstacleLoad;
 pub use obstacle_motion::{ObstacleMotion, Rate};
