@@ -12,6 +12,7 @@ mod norton;
 mod perzyna;
 mod return_mapping;
 mod tangent;
+mod thickness;
 
 pub use drucker_prager::DruckerPrager;
 pub use flow::{Flow, InPlaces, Parameters};
@@ -20,6 +21,7 @@ pub use norton::Norton;
 pub use perzyna::{Metric, Perzyna};
 pub use return_mapping::{Extrapolated, Returned};
 pub use tangent::Tangent;
+pub use thickness::ThroughThickness;
 
 use crate::{
     laws::{
@@ -73,9 +75,8 @@ macro_rules! laws {
             /// The message where elasticity is missing.
             pub const WITHOUT_ELASTICITY: &'static str = "viscoplasticity requires elasticity: it relaxes the elastic stress";
 
-            /// The names of the laws in the job, each with its [`NOT_IN_PLANE_STRESS`](Parameters::NOT_IN_PLANE_STRESS).
-            pub const NAMES: &'static [(&'static str, Option<[&'static str; 2]>)] =
-                &[$(($name, <$law as Parameters>::NOT_IN_PLANE_STRESS),)*];
+            /// The names of the laws in the job.
+            pub const NAMES: &'static [&'static str] = &[$($name,)*];
 
             /// The names of the laws, each with the key of its yield stress.
             pub const YIELD_STRESSES: &'static [(&'static str, Option<&'static str>)] =
@@ -124,8 +125,7 @@ laws! {
     Perzyna<N> = "perzyna",
     /// Maxwell's linear relaxation of stress.
     Maxwell = "maxwell",
-    /// Overstress law with the yield condition of Drucker and Prager, whose yield stress increases with pressure. For 3D and plane
-    /// strain.
+    /// Overstress law with the yield condition of Drucker and Prager, whose yield stress increases with pressure.
     DruckerPrager<N> = "drucker_prager",
     /// Norton's creep: the creep rate is a power of the stress, without a yield stress, with optional strain hardening.
     Norton = "norton",
