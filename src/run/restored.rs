@@ -6,7 +6,11 @@ use super::{
 };
 use crate::{
     error::{Error, Exit, Result},
-    fem::{body::Body, effect::SUPPORT_REACTION, state::State},
+    fem::{
+        body::Body,
+        effect::{Moment, SUPPORT_REACTION},
+        state::State,
+    },
     io::output::{
         checkpoint::{self, Identity},
         checkpoint_folder::{checkpoint_path, list},
@@ -118,7 +122,7 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         body.elastic_support.reactions = vec![0.0; body.mesh.owned * D];
     }
     let mut found = checkpoint::transfer(session, &file, &physics, body, state)?;
-    found.at_rest.retain(|name| name != SUPPORT_REACTION);
+    found.at_rest.retain(|name| name != SUPPORT_REACTION.name(Moment::Last));
     let handover = take_over(session, &found.physics, body, state)?;
     for field in [&mut state.velocity, &mut state.previous_velocity] {
         body.held.clear(&mut field.owned_mut()?);

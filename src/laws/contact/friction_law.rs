@@ -6,7 +6,10 @@
 //! is a parameter of the graph ([`FrictionBound::resolve`]), and also of the vector graph: the law is radial, so that the vectors
 //! `s`, velocity and traction have the same direction.
 
-use crate::laws::{law::LawFault, step::Blend};
+use crate::laws::{
+    law::LawFault,
+    step::{Blend, Quantity},
+};
 
 /// The point of a friction graph with a given parameter `s = c v + q`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,10 +40,8 @@ pub struct SlidingContext {
 /// A number at each point on which a friction law depends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionHistory {
-    /// Its name in field files and checkpoints.
-    pub name: &'static str,
-    /// The name of its value before the last step in checkpoints.
-    pub earlier_name: &'static str,
+    /// What it is.
+    pub quantity: Quantity,
     /// Its value at the start of the run.
     pub initial: f64,
     /// Share of the tolerance of adaptive steps that its error may take.

@@ -40,6 +40,8 @@ pub(super) struct Friction<const D: usize> {
     /// Whether the bound depends on the pressure while a step is solved.
     pub follows: bool,
     pub points: Vec<TangentialPoint<D>>,
+    /// Nodes that this rank owns.
+    pub owned: usize,
     /// Velocity in m/s of the obstacle along the tangents of each point; empty where the obstacle does not move.
     pub obstacle_velocities: Vec<Vector<D>>,
     /// Tangents that supports fix beside free ones, with the points of the contact; empty where the obstacle does not move.
@@ -102,6 +104,7 @@ impl<const D: usize> Friction<D> {
             scale: 1.0,
             follows,
             points: out,
+            owned: mesh.owned,
             obstacle_velocities: Vec::new(),
             held: held_tangents,
         })
@@ -332,7 +335,8 @@ impl<const D: usize> Friction<D> {
 
     /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.
     pub(super) fn steepest_decrease(&self) -> f64 {
-        let decrease = |point: &TangentialPoint<D>| self.law.steepest_decrease(point.context) * point.pressure;
+        let decrease =
+            |point: &TangentialPoint<D>| self.law.steepest_decrease(point.context) * point.pressure;
         self.points.iter().fold(0.0, |most, point| larger(most, decrease(point)))
     }
 

@@ -110,6 +110,8 @@ pub struct Contact<const D: usize> {
     size: f64,
     facets: Vec<u32>,
     points: Vec<Point<D>>,
+    /// Nodes that this rank owns.
+    owned: usize,
     friction: Option<Friction<D>>,
     /// Nodes at which points meet whose normals are not orthogonal, as lists of contacts and their points; each node is in the list of
     /// one of these contacts.
@@ -176,6 +178,7 @@ impl<const D: usize> Contact<D> {
             size: longest_side(session, &mesh.nodes),
             facets: facets.to_vec(),
             points,
+            owned: mesh.owned,
             friction: None,
             edges: Vec::new(),
             needs_ghosts,

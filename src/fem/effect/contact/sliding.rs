@@ -11,7 +11,10 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{
-        effect::{Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES},
+        effect::{
+            Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, History, HistoryStore,
+            Moment, Quantity, quantity,
+        },
         space::Held,
     },
     laws::contact::{FrictionLaw, NodeContext, Wear},
@@ -155,40 +158,16 @@ impl<const D: usize> Contact<D> {
         out
     }
 
-    /// The names of the histories that friction and wear keep at nodes. Fields show the first ones; `all` has those, too, that only the
-    /// next step needs.
-    pub fn history_names(&self, all: bool) -> impl Iterator<Item = &'static str> {
-        let count = if all { 2 } else { 1 };
-        let friction = self.friction.iter().filter_map(|friction| names(&friction.law));
-        let worn = self.wear.iter().map(|_| WORN);
-        friction.chain(worn).flat_map(move |names| names.into_iter().take(count))
+    /// The histories that friction and wear keep at nodes.
+    pub fn histories(&self) -> impl Iterator<Item = &dyn HistoryStore> {
+        let friction = self.friction.iter().map(|friction| friction as &dyn HistoryStore);
+        friction.chain([self as &dyn HistoryStore])
     }
 
-    /// The history of this name at each of its nodes on this rank.
-    pub fn history(&self, name: &str) -> Vec<(usize, f64)> {
-        let Some(friction) = &self.friction else { return Vec::new() };
-        if let Some(at) = position_of_history(&friction.law, name) {
-            return friction.points.iter().map(|point| (point.node(), point.history[at])).collect();
-        }
-        let Some(at) = self.position_of_wear(name) else { return Vec::new() };
-        friction.points.iter().map(|sliding| (sliding.node(), self.points[sliding.at].worn[at])).collect()
-    }
-
-    /// Sets the history of this name from values at the owned nodes of the body.
-    pub fn restore_history(&mut self, name: &str, nodal: &[f64]) {
-        if let Some(friction) = &mut self.friction
-            && let Some(at) = position_of_history(&friction.law, name)
-        {
-            friction.points.iter_mut().for_each(|point| point.history[at] = nodal[point.node()]);
-        }
-        if let Some(at) = self.position_of_wear(name) {
-            self.points.iter_mut().for_each(|point| point.worn[at] = nodal[point.node()]);
-        }
-    }
-
-    /// Which of the depths of wear has this name, if there is wear.
-    fn position_of_wear(&self, name: &str) -> Option<usize> {
-        WORN.iter().position(|worn| *worn == name).filter(|_| self.wear.is_some())
+    /// Visits the same histories.
+    pub fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        self.friction.iter_mut().for_each(|friction| visit(friction));
+        visit(self);
     }
 
     /// Whether the friction coefficient, or a bound without pressure, may decrease with the sliding velocity in the current step.
@@ -285,14 +264,35 @@ impl Decrease {
     }
 }
 
-/// Names of the depths of wear: the present one, and that before the last step.
-const WORN: [&str; 2] = ["wear", "previous_wear"];
+/// The depth of wear.
+const WEAR: Quantity = quantity!("wear");
 
-/// The names of what a friction law keeps: the present value, and that before the last step.
-fn names(law: &FrictionLaw) -> Option<[&'static str; 2]> {
-    law.history().map(|history| [history.name, history.earlier_name])
+/// Wear, where there is friction.
+impl<const D: usize> HistoryStore for Contact<D> {
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        let friction = self.friction.as_ref().filter(|_| self.wear.is_some())?;
+        let worn = |at: usize| self.points[at].worn[moment as usize];
+        let values = friction.points.iter().map(|sliding| (sliding.node(), worn(sliding.at)));
+        Some(History::of_nodes((WEAR, moment), self.owned, values))
+    }
+
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        if quantity == WEAR && self.wear.is_some() {
+            self.points.iter_mut().for_each(|point| point.worn[moment as usize] = values[point.node()]);
+        }
+    }
 }
 
-fn position_of_history(law: &FrictionLaw, name: &str) -> Option<usize> {
-    names(law)?.iter().position(|known| *known == name)
+impl<const D: usize> HistoryStore for Friction<D> {
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        let kept = self.law.history()?.quantity;
+        let values = self.points.iter().map(|point| (point.node(), point.history[moment as usize]));
+        Some(History::of_nodes((kept, moment), self.owned, values))
+    }
+
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        if self.law.history().is_some_and(|history| history.quantity == quantity) {
+            self.points.iter_mut().for_each(|point| point.history[moment as usize] = values[point.node()]);
+        }
+    }
 }

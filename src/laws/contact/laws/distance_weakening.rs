@@ -14,7 +14,7 @@
 use crate::laws::{
     contact::friction_law::{FrictionBound, FrictionHistory, SlidingContext},
     law::LawFault,
-    step::Blend,
+    step::{Blend, quantity},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -87,7 +87,7 @@ impl FrictionBound for DistanceWeakening {
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        Some(FrictionHistory { name: "slip", earlier_name: "previous_slip", initial: 0.0, share: 1.0 })
+        Some(FrictionHistory { quantity: quantity!("slip"), initial: 0.0, share: 1.0 })
     }
 
     /// Where a point comes to rest its slip ends, whatever the blend of a two-step scheme continues.
@@ -129,7 +129,9 @@ mod tests {
         assert!((linear.slope(1.0, 10.0, at) + 0.1 * 8.0).abs() < 1e-14);
         assert_eq!((linear.bound(9.0, 10.0, at), linear.slope(9.0, 10.0, at)), (2.0, 0.0));
         let exponential = law(Decay::Exponential);
-        assert!((exponential.bound(3.0, 10.0, after(0.5, 0.0)) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
+        assert!(
+            (exponential.bound(3.0, 10.0, after(0.5, 0.0)) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14
+        );
         for law in [linear, exponential] {
             assert!((law.steepest_decrease(after(0.0, 0.1)) - 0.08).abs() < 1e-16);
         }

@@ -32,7 +32,7 @@
 use crate::laws::{
     contact::friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip},
     law::LawFault,
-    step::Blend,
+    step::{Blend, quantity},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -189,8 +189,11 @@ impl FrictionBound for RateAndState {
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        let [name, earlier_name] = ["friction_state", "previous_friction_state"];
-        Some(FrictionHistory { name, earlier_name, initial: self.first_state(), share: SHARE })
+        Some(FrictionHistory {
+            quantity: quantity!("friction_state"),
+            initial: self.first_state(),
+            share: SHARE,
+        })
     }
 
     /// A two-step scheme blends the logarithms of the states.
@@ -237,7 +240,8 @@ impl FrictionBound for RateAndState {
             return at(s / c);
         }
         // The coefficient is at most its slope at rest times the velocity, and the state at most that of rest.
-        let [mut low, mut high] = [(s / (c + pressure * self.at(0.0, context)[1])).ln().max(LEAST), (s / c).ln()];
+        let [mut low, mut high] =
+            [(s / (c + pressure * self.at(0.0, context)[1])).ln().max(LEAST), (s / c).ln()];
         let mut now = high;
         for _ in 0..ITERATIONS {
             let speed = now.exp();
