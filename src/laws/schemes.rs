@@ -83,6 +83,6 @@ schemes! {
     /// Second order in time, for impacts and waves. All stresses are taken at the midpoint of the step, rigid contact at its end. The
     /// total energy of elastic bodies, of compliant foundations and of obstacles moved by forces is conserved exactly and never grows in
     /// an impact on a rigid obstacle; no vibration is damped, however short. Requires a density, fixed steps and, for contact,
-    /// `redistribute_mass`. Damage, adhesion, contact memory, moving supports and moments on obstacles are refused.
+    /// `redistribute_mass`. Damage, adhesion, contact memory and moving supports are refused.
     Midpoint = "midpoint" { order: 2, kind: Midpoint, formula: Some(midpoint::blend) }
 }

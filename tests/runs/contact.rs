@@ -266,6 +266,26 @@ fn rolling(in_space: bool) -> Case {
         .set("contact.0.obstacle_load.moment_of_inertia", "0.04")
 }
 
+/// Forces and moments on obstacles hold at the midpoint, too: no energy is lost but in friction.
+#[test]
+fn a_disc_rolls_under_the_midpoint_rule() {
+    let case = Case::of("rolling_disc")
+        .without("check")
+        .set("mesh.rectangle.cells", "[30, 2]")
+        .set("material.density", "1.0")
+        .set("contact.0.redistribute_mass", "true")
+        .set("time", "{end = 0.02, step = 2e-4, scheme = 'midpoint'}");
+    for ranks in [1, 2] {
+        let results = case.run(ranks);
+        let imbalance = results.summary()["max_energy_imbalance"].as_f64().expect("a number");
+        assert!(imbalance < 1e-10, "{imbalance}");
+        let table = results.table("resultants.csv").only("source", "contact top");
+        let last = |column: &str| *table.numbers(column).last().expect("rows");
+        let rolls = -0.1 * last("obstacle_angular_velocity") / last("obstacle_velocity");
+        assert!((rolls - 1.0).abs() < 0.05, "it rolls: {rolls}");
+    }
+}
+
 #[test]
 fn a_disc_and_a_ball_roll_as_fast_as_their_inertia_lets_them() {
     // F / (m + I / R^2); the ball lies deeper, so that more of it slides.

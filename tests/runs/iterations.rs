@@ -66,3 +66,29 @@ fn multigrid_takes_as_many_iterations_as_it_did() {
         ("cube of quadratic cells", &quadratic_cube, 2, [17.0, 96.0]),
     ]);
 }
+
+/// A force moves an obstacle at about the cost of its motion if it is prescribed.
+#[test]
+fn an_obstacle_moved_by_a_force_takes_as_many_iterations_as_one_whose_motion_is_given() {
+    for viscoplastic in [true, false] {
+        let case = || {
+            let case = Case::of("indented_block");
+            if viscoplastic { case } else { case.without("material.viscoplasticity") }
+        };
+        let kept = case().run_and_keep(1);
+        let loaded = kept.results();
+        let table = loaded.table("resultants.csv").only("source", "contact top");
+        let (times, ways) = (table.numbers("time"), table.numbers("obstacle_displacement"));
+        let mut heights = "0, 0.2".to_owned();
+        for (time, way) in times.iter().zip(&ways) {
+            heights += &format!(", {time}, {:.17}", 0.2 - way);
+        }
+        let sphere = format!("{{centre = [0.0, 'interpolate(t, {heights})'], radius = 0.1}}");
+        let given = case()
+            .without("contact.0.obstacle_load")
+            .without("check")
+            .set("contact.0.obstacle.sphere", &sphere);
+        let [found, prescribed] = [&loaded, &given.run(1)].map(|results| results.number("newton_iterations"));
+        assert!(found <= 1.2 * prescribed && prescribed > 40.0, "{found} instead of {prescribed}");
+    }
+}

@@ -15,7 +15,7 @@ use clarke::{
     linear_algebra::petsc::{Matrix, NonlinearProblem, ProjectedKsp},
     mesh::GlobalMesh,
     parallel::session::Session,
-    solver::stepping::{ContactEquations, Floor, Scratch, SolveCounts},
+    solver::stepping::{ContactEquations, Floor, ObstacleMotions, Scratch, SolveCounts},
 };
 
 fn laws() -> Vec<NormalResponse> {
@@ -147,6 +147,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 matrix: &matrix,
                 cells: None,
                 contacts: &mut contacts,
+                obstacles: &mut ObstacleMotions::default(),
                 right_hand_side: &load,
                 floor: Floor::default(),
                 scratch: &mut scratch,

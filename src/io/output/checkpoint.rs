@@ -44,18 +44,12 @@ pub struct Header {
     /// For each contact whose obstacle a force moves: displacement in m and velocity in m/s after the last step, and before it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacles: Vec<[f64; 4]>,
-    /// For the same contacts: the stiffness in N/m against the obstacle that the last step has found.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub obstacle_stiffness: Vec<f64>,
     /// For the same contacts: the resultant in N of the contact tractions in the last step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_resultants: Vec<f64>,
     /// For each contact whose obstacle a moment turns: angle and angular velocity in rad/s after the last step, and before it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_rotations: Vec<[f64; 4]>,
-    /// For the same contacts: the stiffness in N m against the rotation that the last step has found.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub obstacle_rotation_stiffness: Vec<f64>,
     /// For the same contacts: the resultant moment in N m of the contact tractions in the last step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_rotation_resultants: Vec<f64>,
@@ -105,10 +99,8 @@ impl Header {
             step_length: state.step_length,
             totals: *totals,
             obstacles: motions(0).map(LoadedMotion::saved).collect(),
-            obstacle_stiffness: motions(0).map(LoadedMotion::stiffness).collect(),
             obstacle_resultants: motions(0).map(LoadedMotion::resultant).collect(),
             obstacle_rotations: motions(1).map(LoadedMotion::saved).collect(),
-            obstacle_rotation_stiffness: motions(1).map(LoadedMotion::stiffness).collect(),
             obstacle_rotation_resultants: motions(1).map(LoadedMotion::resultant).collect(),
             start_state: identity.start_state.clone(),
             closeness: body
@@ -219,18 +211,13 @@ pub fn restore<const D: usize, const S: usize>(
         }
     }
     let saved = [
-        (&header.obstacles, &header.obstacle_stiffness, &header.obstacle_resultants),
-        (
-            &header.obstacle_rotations,
-            &header.obstacle_rotation_stiffness,
-            &header.obstacle_rotation_resultants,
-        ),
+        (&header.obstacles, &header.obstacle_resultants),
+        (&header.obstacle_rotations, &header.obstacle_rotation_resultants),
     ];
-    for (number, (motions, stiffness, resultants)) in saved.into_iter().enumerate() {
+    for (number, (motions, resultants)) in saved.into_iter().enumerate() {
         for (at, motion) in loaded_motions(body, number).enumerate() {
             motions.get(at).into_iter().for_each(|saved| motion.restore(*saved));
             motion.restore_resultant(resultants.get(at).copied().unwrap_or(0.0));
-            motion.restore_stiffness(stiffness.get(at).copied().unwrap_or(0.0));
         }
     }
     for (contact, saved) in body.contacts.iter_mut().zip(&header.closeness) {
@@ -331,23 +318,18 @@ fn transfer_motions<const D: usize, const S: usize>(
 ) {
     let translation = ("direction", &["obstacle_load.direction"][..], "displacement");
     let rotation = ("moment", &["obstacle.sphere.axis", "obstacle.shape.axis"][..], "rotation");
-    let saved = [
-        (translation, &header.obstacles, &header.obstacle_stiffness),
-        (rotation, &header.obstacle_rotations, &header.obstacle_rotation_stiffness),
-    ];
-    for (number, ((key, alike, what), motions, stiffness)) in saved.into_iter().enumerate() {
+    let saved = [(translation, &header.obstacles), (rotation, &header.obstacle_rotations)];
+    for (number, ((key, alike, what), motions)) in saved.into_iter().enumerate() {
         let there = motions_of(&header.physics, key, alike);
         let here = motions_of(physics, key, alike);
         let name = |contact: usize| format!("{what} of the obstacle of contact.{contact}");
         for ((contact, own), motion) in here.iter().zip(loaded_motions(body, number)) {
             let at = there.iter().position(|(_, other)| own == other);
-            let Some((at, [displacement, velocity, ..])) = at.and_then(|at| Some((at, *motions.get(at)?)))
-            else {
+            let Some([displacement, velocity, ..]) = at.and_then(|at| motions.get(at).copied()) else {
                 found.at_rest.push(name(*contact));
                 continue;
             };
             motion.restore([displacement, velocity, displacement, velocity]);
-            motion.restore_stiffness(stiffness.get(at).copied().unwrap_or(0.0));
         }
         let is_dropped = |(_, other): &&(usize, Vec<_>)| here.iter().all(|(_, own)| own != other);
         found.dropped.extend(there.iter().filter(is_dropped).map(|(contact, _)| name(*contact)));

@@ -118,7 +118,7 @@ fn check_midpoint(findings: &mut Findings<'_>) {
         tables.into_iter().flat_map(move |table| keys.iter().map(move |key| format!("{table}.{key}")))
     };
     let unsupported = keys(materials.collect(), &["damage"])
-        .chain(keys(items(root, "contact"), &["adhesion", "memory", "obstacle_load.moment"]))
+        .chain(keys(items(root, "contact"), &["adhesion", "memory"]))
         .chain(keys(items(root, "support"), &["displacement", "velocity"]))
         .chain(["time.adaptive".to_owned()]);
     for path in unsupported.filter(|path| root.find(path).is_some()) {

@@ -4,7 +4,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{CONTACT, Energy, NUMERICAL, Step, WORK},
+        effect::{CONTACT, Contact, Energy, NUMERICAL, Step, WORK},
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
@@ -40,18 +40,11 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     if body.contacts.is_empty() {
         return Ok(());
     }
-    prepare_gaps(body, state, step)?;
-    restore_pressures(body, state)
-}
-
-/// The same, with the pressures that the points have.
-pub(super) fn prepare_gaps<const D: usize, const S: usize>(
-    body: &mut Body<D, S>,
-    state: &State,
-    step: Step,
-) -> Result<()> {
     let displacement = state.displacement.local()?;
-    body.contacts.iter_mut().try_for_each(|contact| contact.prepare(step.time, step.length, &displacement))
+    for contact in &mut body.contacts {
+        contact.prepare(step.time, step.length, &displacement)?;
+    }
+    restore_pressures(body, state)
 }
 
 /// Fails where an obstacle passes a boundary in the step with this solution, which has ghosts.
@@ -79,11 +72,12 @@ pub(super) fn keep_closeness<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Sets the pressures of all contacts to those of the converged state.
+/// Sets the pressures of all contacts to those of the converged state, and obstacles that forces move to the start of the step.
 pub(super) fn restore_pressures<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     state: &State,
 ) -> Result<()> {
+    body.contacts.iter_mut().try_for_each(Contact::restart_obstacle)?;
     if let Some(traction) = &state.contact_traction {
         let traction = traction.owned()?;
         body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));

@@ -99,7 +99,7 @@ impl Descent {
             if !norm.is_finite() {
                 return Ok(false);
             }
-            self.velocity.copy_from(&equations.scratch.velocity)?;
+            equations.write_motion(&mut self.velocity)?;
             let place = loop {
                 equations.set_softening(share);
                 equations.linearise(x)?;
@@ -184,7 +184,7 @@ impl Descent {
         self.trial.copy_from(x)?;
         self.trial.add_scaled(-length, &self.direction)?;
         equations.residual(&self.trial, &mut self.trial_residual)?;
-        self.change.copy_from(&equations.scratch.velocity)?;
+        equations.write_motion(&mut self.change)?;
         self.change.add_scaled(-1.0, &self.velocity)?;
         let power = self.trial_residual.dot(&self.change)? / length;
         Ok(Place { length, power, residual: self.trial_residual.norm()?, change: self.change.norm()? })

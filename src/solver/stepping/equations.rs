@@ -1,5 +1,6 @@
 //! The equations of one step, `K v + C(v) = b`, in the form that PETSc's SNES requires.
 
+use super::obstacle_motions::ObstacleMotions;
 use crate::{
     error::{Error, Result},
     fem::effect::{Contact, set_walls},
@@ -108,6 +109,8 @@ pub struct ContactEquations<'a, const D: usize> {
     pub matrix: &'a dyn StepMatrix,
     /// The contacts that define `C`.
     pub contacts: &'a mut [Contact<D>],
+    /// The motions of their obstacles that forces drive.
+    pub obstacles: &'a mut ObstacleMotions,
     /// Nonlinear forces of cells in addition to `K v`, if there are any.
     pub cells: Option<&'a mut dyn CellForces>,
     /// `b` in N.
@@ -256,6 +259,49 @@ impl<const D: usize> ContactEquations<'_, D> {
         self.solve_linearised(residual, direction, ProjectedKsp::solve_if_definite)
     }
 
+    /// Writes the residual at these unknowns, with the motions of obstacles that belong to them.
+    fn write_residual_of(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
+        for evaluation in 0.. {
+            self.scratch.velocity.copy_from(x)?;
+            {
+                let mut velocity = self.scratch.velocity.owned_mut()?;
+                self.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+            }
+            self.write_residual(residual)?;
+            if self.obstacles.is_empty() {
+                break;
+            }
+            let velocity = self.scratch.velocity.owned()?;
+            let at = (&*velocity, &*residual);
+            if !self.obstacles.update(self.session, self.contacts, at, evaluation)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes the derivatives with the motions of obstacles at the last linearisation.
+    fn linearise_obstacles(&mut self) -> Result<()> {
+        if self.obstacles.is_empty() {
+            return Ok(());
+        }
+        if let Some(cells) = &mut self.cells {
+            let matrix = self.matrix;
+            self.obstacles.linearise(self.session, |motion, forces| {
+                matrix.multiply(motion, forces)?;
+                cells.add_derivative(motion, forces)
+            })?;
+        }
+        let velocity = self.scratch.velocity.owned()?;
+        self.obstacles.find_loose(self.session, self.contacts, &velocity)
+    }
+
+    /// Writes the velocities of the last residual relative to the obstacles that forces drive.
+    pub(super) fn write_motion(&self, motion: &mut DistributedVector) -> Result<()> {
+        motion.copy_from(&self.scratch.velocity)?;
+        self.obstacles.subtract(self.contacts, motion)
+    }
+
     /// Writes the residual at the mapped velocities.
     fn write_residual(&mut self, residual: &mut DistributedVector) -> Result<()> {
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
@@ -271,18 +317,14 @@ impl<const D: usize> ContactEquations<'_, D> {
 impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
         self.counts.residuals += 1;
-        self.scratch.velocity.copy_from(x)?;
-        {
-            let mut velocity = self.scratch.velocity.owned_mut()?;
-            self.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
-        }
-        self.write_residual(residual)?;
+        self.write_residual_of(x, residual)?;
+        if std::env::var("XV").is_ok() { eprintln!("r {:.3e} {}", residual.norm()?, self.contacts.iter().map(|c| c.show()).collect::<String>()); }
         if !self.equilibrated {
             let last = residual.norm()?;
             let stagnates = last >= STAGNATION * self.scratch.residuals[1];
             self.scratch.residuals[0] = last;
-            self.scratch.is_at_floor =
-                stagnates && self.floor.is_reached(last, self.scratch.velocity.norm()?);
+            let speed = self.scratch.velocity.norm()? + self.obstacles.speed(self.contacts);
+            self.scratch.is_at_floor = stagnates && self.floor.is_reached(last, speed);
             return Ok(());
         }
         let Scratch { velocity, open, correction, .. } = &mut *self.scratch;
@@ -328,6 +370,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             let velocity = velocity.owned()?;
             self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&velocity));
         }
+        self.linearise_obstacles()?;
         let digests = self.contacts.iter().map(Contact::set_digest);
         let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
         // Half the bits suffice to distinguish sets, and their sum over ranks is exact.
@@ -354,6 +397,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         if let Some(cells) = &mut self.cells {
             cells.add_derivative(velocity, result)?;
         }
+        self.obstacles.add_changes(self.session, result)?;
         add_contact(ghosted, self.contacts, velocity, result, Contact::add_derivative)
     }
 
@@ -389,8 +433,16 @@ impl<const D: usize> ContactEquations<'_, D> {
         let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
             && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
         let coupled = coupled || is_unsymmetric;
-        let mut operator = ReducedJacobian { matrix: self.matrix, cells, contacts: self.contacts, ghosted };
+        let mut operator = ReducedJacobian {
+            matrix: self.matrix,
+            cells,
+            contacts: self.contacts,
+            obstacles: self.obstacles,
+            session: self.session,
+            ghosted,
+        };
         open.copy_from(residual)?;
+        operator.obstacles.add_approach(open)?;
         operator.reduce(open)?;
         let is_slow = self.counts.last_iterations > MANY_ITERATIONS;
         let mut has_additions = false;
@@ -426,6 +478,7 @@ impl<const D: usize> ContactEquations<'_, D> {
             operator.multiply(velocity, open)?;
             open.scale(-1.0)?;
             open.add_scaled(1.0, residual)?;
+            self.obstacles.add_approach(open)?;
         }
         let (open, mut direction) = (open.owned()?, direction.owned_mut()?);
         self.contacts.iter().for_each(|contact| contact.unmap_direction(&open, &mut direction));
@@ -440,6 +493,8 @@ struct ReducedJacobian<'a, const D: usize> {
     matrix: &'a dyn StepMatrix,
     cells: Option<&'a mut dyn CellForces>,
     contacts: &'a [Contact<D>],
+    obstacles: &'a mut ObstacleMotions,
+    session: &'a Session,
     ghosted: &'a mut Option<[DistributedVector; 2]>,
 }
 
@@ -449,6 +504,7 @@ impl<const D: usize> ReducedJacobian<'_, D> {
         if let Some(cells) = &mut self.cells {
             cells.add_derivative(x, y)?;
         }
+        self.obstacles.add_changes(self.session, y)?;
         add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)
     }
 

@@ -9,6 +9,8 @@ pub(super) struct Fallback {
     /// Ratio of the parameters of the graphs to the resistance of the body; which branches recur depends on it.
     pub stiffness_factor: f64,
     pub iteration: FrictionIteration,
+    /// Whether points with friction yield at first, and less and less until they obey their law.
+    pub yields_at_first: bool,
 }
 
 /// Step lengths of Newton's method, and the equations that determine them.
@@ -26,7 +28,7 @@ pub(super) enum Search {
 }
 
 const fn fallback(search: Search, stiffness_factor: f64, iteration: FrictionIteration) -> Fallback {
-    Fallback { search, stiffness_factor, iteration }
+    Fallback { search, stiffness_factor, iteration, yields_at_first: false }
 }
 
 /// The fallbacks that are tried in turn until a step is solved, each from the start value of the step.
@@ -36,8 +38,9 @@ const fn fallback(search: Search, stiffness_factor: f64, iteration: FrictionIter
 /// and measures their error. Fixed-point iteration avoids cycles between pressure and friction; it is used if friction depends on the
 /// pressure. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
 /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge.
-const FALLBACKS: [Fallback; 14] = [
+const FALLBACKS: [Fallback; 15] = [
     fallback(Search::FullSteps, 1.0, FrictionIteration::Newton),
+    YIELDING,
     fallback(Search::Equilibrated, 1.0, FrictionIteration::Newton),
     fallback(Search::Equilibrated, 10.0, FrictionIteration::Newton),
     fallback(Search::FullSteps, 10.0, FrictionIteration::Newton),
@@ -53,6 +56,10 @@ const FALLBACKS: [Fallback; 14] = [
     fallback(Search::Descent, 1.0, FrictionIteration::FixedPoint),
 ];
 
+/// A light obstacle on a stiff body: points that stick and slide in turn move it to and fro.
+const YIELDING: Fallback =
+    Fallback { yields_at_first: true, ..fallback(Search::FullSteps, 1.0, FrictionIteration::Newton) };
+
 const DESCENT: Fallback = fallback(Search::Descent, 1.0, FrictionIteration::Newton);
 
 /// The properties that determine the fallbacks of a step.
@@ -66,6 +73,8 @@ pub(super) struct Conditions {
     pub has_user_search: bool,
     /// Whether all equations except those of the contact points are linear.
     pub interior_is_linear: bool,
+    /// Whether friction moves obstacles that forces drive.
+    pub rubs_obstacles: bool,
     /// Whether forces of laws may fall with the motion.
     pub softens: bool,
     /// Whether these include those of bonds.
@@ -88,7 +97,7 @@ impl Conditions {
                 Search::Backtracking => true,
                 Search::Descent => self.softens && !self.has_user_search,
             };
-            iteration && search
+            iteration && search && (self.rubs_obstacles || !fallback.yields_at_first)
         };
         let first = self.has_bonds.then_some(DESCENT);
         first.into_iter().chain(FALLBACKS).filter(applies)

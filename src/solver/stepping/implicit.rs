@@ -120,7 +120,7 @@ impl Implicit {
         step: Step,
     ) -> Result<()> {
         if self.is_midpoint {
-            body.contacts.iter_mut().for_each(Contact::conserve_energy);
+            body.contacts.iter_mut().try_for_each(Contact::conserve_energy)?;
         }
         body.contacts.iter_mut().for_each(|contact| contact.start_histories(self.blend));
         if self.blend.earlier == 0.0 || !body.contacts.iter().any(|c| c.law.depends_on_displacement()) {

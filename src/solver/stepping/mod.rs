@@ -1,7 +1,6 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
 mod adaptive;
-mod balance;
 mod bounded;
 mod condensed;
 mod condensed_matrix;
@@ -23,10 +22,10 @@ mod lagged_euler;
 mod linear_solver;
 mod multistart;
 mod newton;
+mod obstacle_motions;
 mod outcome;
 mod problem;
 mod resistance;
-mod root;
 mod solver;
 mod springs;
 mod step_clock;
@@ -44,6 +43,7 @@ pub use cost::Cost;
 pub use equations::{CellForces, ContactEquations, Floor, Scratch, SolveCounts};
 pub use integrator::evaluation;
 pub use linear_solver::{FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize};
+pub use obstacle_motions::ObstacleMotions;
 pub use outcome::StepOutcome;
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};

@@ -9,6 +9,7 @@ use super::{
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
+    obstacle_motions::ObstacleMotions,
     problem::{REMEDY, SOFTENING_REMEDY, StepProblem, System},
     solver::Reduced,
 };
@@ -32,6 +33,10 @@ pub(super) struct Newton {
     /// PETSc's solver for variational inequalities, if it is selected.
     pub bounded: Option<Bounded>,
     scratch: Scratch,
+    /// The motions of obstacles that forces drive.
+    obstacles: ObstacleMotions,
+    /// The unknowns of the last solution with friction points that yield.
+    reached: Option<DistributedVector>,
     /// Branches of all contact points at the start of the step and at its end.
     branches_before: Vec<u8>,
     branches_after: Vec<u8>,
@@ -60,8 +65,19 @@ const LINEAR_SHARE: f64 = 0.3;
 /// The first linear solves of a step reduce their residual only by this factor, while branches may still change.
 const LINEAR_REDUCTION: f64 = 1e-3;
 
+/// Both where forces move obstacles: a light one moves far under a small unbalanced force at the nodes.
+const WITH_OBSTACLES: [f64; 2] = [1e-6, 0.03];
 /// The same for all linear solves of a descent: near its end each direction then squares the error.
 const DESCENT_REDUCTION: f64 = 1e-6;
+
+/// The velocities per traction by which friction points yield relative to the compliance of the body: the first, the ratio of each to the
+/// last, and the largest one that is worth trying, and the last.
+const FIRST_RATIO: f64 = 1e6;
+const RATIO_FACTOR: f64 = 0.1;
+const LARGEST_RATIO_FACTOR: f64 = 0.9;
+const LAST_RATIO: f64 = 1e-5;
+/// The tolerance of these solutions relative to that of the step.
+const YIELDING_TOLERANCE: f64 = 1e4;
 
 /// Fixed-point iterations after which an attempt fails.
 const MAX_FIXED_POINT_ITERATIONS: usize = 200;
@@ -92,6 +108,8 @@ impl Newton {
             settings: settings.clone(),
             bounded: None,
             scratch: Scratch::new(like, contacts)?,
+            obstacles: ObstacleMotions::default(),
+            reached: None,
             branches_before: Vec::new(),
             branches_after: Vec::new(),
             steepest_decreases: Vec::new(),
@@ -119,8 +137,13 @@ impl Newton {
             let iterations = bounded.solve(problem, system, trial)?;
             return self.check_inclusion(problem, trial, iterations);
         }
-        krylov.set_tolerances(LINEAR_REDUCTION, LINEAR_SHARE * system.tolerance, LINEAR_ITERATIONS)?;
         self.start.copy_from(trial)?;
+        let contacts = &mut problem.body.contacts;
+        self.obstacles
+            .start(problem.session, contacts, trial, system.tolerance, |x, y| system.matrix.multiply(x, y))?;
+        let [reduction, share] =
+            if self.obstacles.is_empty() { [LINEAR_REDUCTION, LINEAR_SHARE] } else { WITH_OBSTACLES };
+        krylov.set_tolerances(reduction, share * system.tolerance, LINEAR_ITERATIONS)?;
         write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
         let conditions = self.conditions(problem.body);
         let mut fallbacks = conditions.fallbacks();
@@ -135,6 +158,9 @@ impl Newton {
             self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
             let has_fixed_bounds = fallback.iteration == FrictionIteration::FixedPoint;
             let mut rounds = 0;
+            if fallback.yields_at_first {
+                iterations += self.approach(problem, system, krylov, fallback.search, trial)?;
+            }
             let failed = loop {
                 if has_fixed_bounds {
                     problem.body.contacts.iter_mut().for_each(Contact::update_pressures);
@@ -154,9 +180,14 @@ impl Newton {
                 }
             };
             if let Some(reason) = failed {
-                (failure, next) = (reason, fallbacks.next());
                 trial.copy_from(&self.start)?;
                 restore_pressures(problem.body, problem.state)?;
+                let contacts = &mut problem.body.contacts;
+                let multiply =
+                    |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
+                if !self.obstacles.follow_new_contacts(problem.session, contacts, trial, multiply)? {
+                    (failure, next) = (reason, fallbacks.next());
+                }
                 continue;
             }
             // The pressure rose so much that the friction graph decreases faster than its parameter permits: repeat with a larger one.
@@ -170,6 +201,57 @@ impl Newton {
         Err(explain_failure(problem, &failure, conditions.softens))
     }
 
+    /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
+    /// none; returns the Newton iterations. Collective.
+    fn approach<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        krylov: &mut ProjectedKsp,
+        search: Search,
+        trial: &mut DistributedVector,
+    ) -> Result<usize> {
+        let system = System { tolerance: YIELDING_TOLERANCE * system.tolerance, ..system };
+        let (mut iterations, mut reached) = (0, None);
+        let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
+        loop {
+            set_give(problem.body, ratio);
+            let attempt = self.attempt(problem, system, krylov, search, trial)?;
+            if std::env::var("XV").is_ok() { eprintln!("ratio {ratio:.3e} {} {:?}", attempt.iterations, attempt.failure); }
+            iterations += attempt.iterations;
+            if attempt.failure.is_none() {
+                let unknowns = match &mut self.reached {
+                    Some(unknowns) => unknowns,
+                    none => none.insert(trial.like()?),
+                };
+                unknowns.copy_from(trial)?;
+                {
+                    let mut unknowns = unknowns.owned_mut()?;
+                    problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+                }
+                reached = Some((ratio, self.obstacles.velocities(&problem.body.contacts)));
+                factor = f64::max(RATIO_FACTOR, factor * factor);
+            } else {
+                factor = factor.sqrt();
+            }
+            let (Some((last, velocities)), Some(unknowns)) = (&reached, &self.reached) else { break };
+            if attempt.failure.is_some() {
+                set_give(problem.body, *last);
+                let contacts = &mut problem.body.contacts;
+                problem.session.agree(self.obstacles.set_velocities(contacts, velocities))?;
+                trial.copy_from(unknowns)?;
+                let mut velocity = trial.owned_mut()?;
+                contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+            }
+            if *last <= LAST_RATIO || factor > LARGEST_RATIO_FACTOR {
+                break;
+            }
+            ratio = last * factor;
+        }
+        problem.body.contacts.iter_mut().for_each(|contact| contact.set_give(0.0));
+        Ok(iterations)
+    }
+
     fn conditions<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Conditions {
         let contacts = &body.contacts;
         let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
@@ -178,7 +260,10 @@ impl Newton {
             follows_pressure: contacts.iter().any(follows),
             friction: self.settings.friction,
             has_user_search: self.has_user_search,
-            interior_is_linear: !flows && !contacts.iter().any(Contact::needs_ghosts),
+            // Motions of obstacles are not in equilibrium with those of the contact points alone.
+            interior_is_linear: !flows
+                && !contacts.iter().any(|contact| contact.needs_ghosts() || contact.obstacle.is_some()),
+            rubs_obstacles: !self.obstacles.is_empty() && contacts.iter().any(|c| c.friction().is_some()),
             softens: (flows && body.softening().next().is_some()) || contacts.iter().any(decreases),
             has_bonds: flows && body.softens_at_surface(),
         }
@@ -247,6 +332,7 @@ impl Newton {
             matrix: system.matrix,
             cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
             contacts,
+            obstacles: &mut self.obstacles,
             right_hand_side: system.right_hand_side,
             floor,
             scratch: &mut self.scratch,
@@ -292,7 +378,7 @@ impl Newton {
             problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
         }
         if may_end_at_floor && (at_floor || failure.is_some()) {
-            let speed = trial.norm()?;
+            let speed = trial.norm()? + self.obstacles.speed(&problem.body.contacts);
             if at_floor || floor.is_reached(self.snes.residual().norm()?, speed) {
                 failure = None;
                 // The accuracy of pressures is limited by the same errors.
@@ -301,6 +387,9 @@ impl Newton {
                 let contacts = &mut problem.body.contacts;
                 contacts.iter_mut().for_each(|c| c.reference.forces = c.reference.forces.max(forces));
             }
+        }
+        if failure.is_none() {
+            failure = self.obstacles.failure(self.last_residual().norm()?, self.settings.tolerance);
         }
         Ok(Attempt { iterations, failure })
     }
@@ -389,6 +478,11 @@ impl Newton {
         }
         Ok(session.largest([largest])[0])
     }
+}
+
+/// Lets friction points yield by this ratio of the compliance of the body.
+fn set_give<const D: usize, const S: usize>(body: &mut Body<D, S>, ratio: f64) {
+    body.contacts.iter_mut().for_each(|contact| contact.set_give(ratio / contact.friction_scale()));
 }
 
 /// The failure of a step, which may lie at laws that soften.

@@ -364,11 +364,6 @@ impl StepSolver {
         }
     }
 
-    /// The share of the forces at which a step counts as solved.
-    pub(super) fn relative_tolerance(&self) -> f64 {
-        self.settings.tolerance
-    }
-
     /// How accurately a step is to be solved; refuses forces that are not finite. Sets the reference forces of the contacts.
     /// Collective.
     fn accuracy<const D: usize, const S: usize>(
@@ -461,7 +456,7 @@ fn nonlinear<const D: usize, const S: usize>(
     }
     let mut newton = Box::new(Newton::new(solver.unknowns(like), &body.contacts, settings)?);
     if settings.method == Method::Vinewtonrsls {
-        session.agree(bounded::refuse_oblique_normals(body))?;
+        session.agree(bounded::refuse_other_contacts(body))?;
         if body.flows() {
             return Err(Error::Refused(
                 "[solver] method = \"vinewtonrsls\" does not support viscoplastic flow, damage, adhesion or contact memory at the end of a step; use method = \"newton\" or \

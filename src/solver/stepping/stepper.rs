@@ -2,8 +2,7 @@
 
 use super::{
     StepOutcome,
-    balance::Balance,
-    contacts::{commit_tractions, keep_closeness, prepare_contacts, prepare_gaps, refuse_passage},
+    contacts::{commit_tractions, keep_closeness, prepare_contacts, refuse_passage},
     factor_cache::nearest_cached_length,
     force_scale::ForceScale,
     integrator::Integrator,
@@ -31,12 +30,6 @@ use crate::{
 };
 use std::time::Instant;
 
-/// The unbalanced force on an obstacle relative to its largest part at which its motion counts as solved, as a multiple of the
-/// tolerance of steps.
-const OBSTACLE_SHARE: f64 = 10.0;
-/// Number of solutions of a step after which the search for the motion of an obstacle fails.
-const EVALUATIONS: usize = 100;
-
 /// The choices of a job that determine a [`Stepper`].
 #[derive(Debug, Clone, Copy)]
 pub struct StepperSettings<'a> {
@@ -60,9 +53,6 @@ pub struct Stepper {
     powers: Energy,
     right_hand_side: DistributedVector,
     moving_supports: Option<MovingSupports>,
-    /// The motions of obstacles that forces drive: the contact and the number of each; and the search for their velocities.
-    loaded: Vec<[usize; 2]>,
-    balance: Balance,
     force_scale: ForceScale,
     trial: DistributedVector,
     /// Whether the scheme has completed the last attempted step, so that trial histories belong to its solution.
@@ -127,8 +117,6 @@ impl Stepper {
             powers: Energy::default(),
             right_hand_side: state.velocity.like()?,
             moving_supports: MovingSupports::new(body, state)?,
-            loaded: Vec::new(),
-            balance: Balance::default(),
             force_scale: ForceScale::new(body, &state.velocity)?,
             trial: state.velocity.like()?,
             is_finished: false,
@@ -270,20 +258,7 @@ impl Stepper {
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
-        self.loaded.clear();
-        for (at, contact) in body.contacts.iter().enumerate() {
-            let motions = contact.obstacle.iter().flat_map(|obstacle| obstacle.motions()).enumerate();
-            self.loaded
-                .extend(motions.filter(|(_, motion)| motion.is_some()).map(|(number, _)| [at, number]));
-        }
-        let outcome = if self.loaded.is_empty() {
-            self.solve(session, body, state, step)
-        } else {
-            let mut balance = std::mem::take(&mut self.balance);
-            let outcome = self.solve_with_obstacles(session, body, state, (step, &mut balance));
-            self.balance = balance;
-            outcome
-        };
+        let outcome = self.solve(session, body, state, step);
         if let Some(supports) = &self.moving_supports {
             supports.set(body, &mut self.trial)?;
         }
@@ -351,75 +326,6 @@ impl Stepper {
         Ok(residual.max(self.force_scale.without_translation(session, body, state, known)?))
     }
 
-    /// Solves the started step together with the loaded motions of obstacles: repeats the step with other velocities of the obstacles
-    /// until the momentum of each motion is balanced. Collective.
-    fn solve_with_obstacles<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        state: &State,
-        (step, balance): (Step, &mut Balance),
-    ) -> Result<StepOutcome> {
-        let (travel, balanced_time) = (self.integrator.travel(step), self.integrator.balanced_time(step));
-        let tolerance = OBSTACLE_SHARE * self.solver.relative_tolerance();
-        let mut all = StepOutcome::default();
-        balance.start(self.loaded.len());
-        session
-            .agree(self.loaded.iter().try_for_each(|&motion| finite_force(body, motion, balanced_time)))?;
-        for evaluation in 0..EVALUATIONS {
-            for (&motion, velocity) in self.loaded.iter().zip(&mut balance.velocities) {
-                let Some(motion) = loaded_motion(body, motion) else { continue };
-                *velocity =
-                    if evaluation == 0 { motion.start(travel) } else { motion.set_velocity(*velocity) };
-            }
-            let prepared = prepare_gaps(body, state, step);
-            let prepared = prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step));
-            session.agree(prepared)?;
-            let outcome = self.solve(session, body, state, step)?;
-            all = StepOutcome {
-                newton_iterations: all.newton_iterations + outcome.newton_iterations,
-                linear_iterations: all.linear_iterations + outcome.linear_iterations,
-                active_changes: all.active_changes + outcome.active_changes,
-                indefinite_solves: all.indefinite_solves + outcome.indefinite_solves,
-                fell: all.fell || outcome.fell,
-                ..outcome
-            };
-            for (at, &motion) in self.loaded.iter().enumerate() {
-                let [contact, number] = motion;
-                let contact = &body.contacts[contact];
-                let own = self.trial.local().map(|trial| contact.resultants_on_obstacle(&trial)[number]);
-                let [resultant, area] = session.sum([session.agree(own)?, contact.area()]);
-                let [arm] = session.largest([contact.longest_arm()]);
-                let scale_of_contact = contact.scale * area * if number == 0 { 1.0 } else { arm * arm };
-                let Some(motion) = loaded_motion(body, motion) else { continue };
-                let [value, scale] = motion.unbalanced(balanced_time, resultant);
-                if let Some([velocity, earlier]) = balance.before.get(at) {
-                    motion.keep_slope((value - earlier) / (balance.velocities[at] - velocity));
-                }
-                balance.values[at] = value;
-                balance.slopes[at] = motion.expected_slope().unwrap_or(motion.inertia() + scale_of_contact);
-                // A force that vanishes is compared with the contact forces of the first solutions.
-                balance.scales[at] = f64::max(balance.scales[at], scale);
-            }
-            let is_small = |(value, scale): (&f64, &f64)| value.abs() <= tolerance * scale;
-            if balance.values.iter().zip(&balance.scales).all(is_small) {
-                return Ok(all);
-            }
-            if !balance.advance() {
-                break;
-            }
-        }
-        let Step { time, length, .. } = step;
-        let tried: Vec<String> =
-            balance.before.iter().map(|[velocity, _]| format!("{velocity:.3e}")).collect();
-        Err(Error::Failed(format!(
-            "step to t = {time:.6e} s (length {length:.3e} s) failed: no motion of the obstacles balances their forces and moments; the \
-             last velocities tried were {} m/s or rad/s; let the forces press the obstacles against the body, give them a mass, or take a \
-             smaller step; an obstacle that a moment turns may need a moment_of_inertia",
-            tried.join(", ")
-        )))
-    }
-
     /// The error of the last attempted step: of the velocity, of the strain that it causes, and of the resulting histories of
     /// cells and nodes. Collective.
     pub fn error<const D: usize, const S: usize>(
@@ -476,7 +382,10 @@ impl Stepper {
         if let Some(supports) = &mut self.moving_supports {
             work = supports.work(session, body, step, &self.trial, self.integrator.flow_start())?;
         }
-        let of_obstacles = self.energy_of_obstacles(body, state, step);
+        let mut of_obstacles = Energy::default();
+        for motion in driven(body) {
+            of_obstacles += motion.energy_of_step(state.time);
+        }
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         keep_closeness(body, state)?;
@@ -507,21 +416,6 @@ impl Stepper {
         outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
         Ok(())
-    }
-
-    /// Energies of the motions of obstacles in a solved step before it is committed.
-    fn energy_of_obstacles<const D: usize, const S: usize>(
-        &self,
-        body: &mut Body<D, S>,
-        state: &State,
-        step: Step,
-    ) -> Energy {
-        let times = [self.integrator.balanced_time(step), state.time];
-        let mut energy = Energy::default();
-        for &motion in &self.loaded {
-            energy += loaded_motion(body, motion).map_or_else(Energy::default, |m| m.energy_of_step(times));
-        }
-        energy
     }
 
     /// The work of the loads in J in the step just committed, and their power in W in its equations. Collective.
@@ -596,6 +490,20 @@ impl Stepper {
         if let Some(supports) = &self.moving_supports {
             supports.set(body, &mut self.trial)?;
         }
+        let (travel, time) = (self.integrator.travel(step), self.integrator.balanced_time(step));
+        let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);
+        for (number, contact) in body.contacts.iter_mut().enumerate() {
+            for (what, motion) in ["force", "moment"].into_iter().zip(0..) {
+                let Some(motion) = contact.driven_mut(motion) else { continue };
+                motion.start(travel, time, ratio);
+                let value = motion.driving();
+                if !value.is_finite() {
+                    return Err(Error::Failed(format!(
+                        "the {what} on the obstacle of contact.{number} is {value} at t = {time} s; correct the expression in the job"
+                    )));
+                }
+            }
+        }
         let prepared = prepare_contacts(body, state, step);
         Ok(session.agree(prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step)))?)
     }
@@ -624,30 +532,9 @@ impl Stepper {
     }
 }
 
-/// A motion of an obstacle, by the contact and the number of the motion.
-fn loaded_motion<const D: usize, const S: usize>(
-    body: &mut Body<D, S>,
-    [contact, number]: [usize; 2],
-) -> Option<&mut LoadedMotion> {
-    body.contacts[contact].obstacle.as_mut()?.motions_mut().into_iter().nth(number)?
-}
-
-/// Refuses a force or a moment that is not finite at this time.
-fn finite_force<const D: usize, const S: usize>(
-    body: &mut Body<D, S>,
-    motion: [usize; 2],
-    time: f64,
-) -> Result<()> {
-    let [contact, number] = motion;
-    let Some(motion) = loaded_motion(body, motion) else { return Ok(()) };
-    let value = motion.force().evaluate(time, &[]);
-    if value.is_finite() {
-        return Ok(());
-    }
-    let what = if number == 0 { "force" } else { "moment" };
-    Err(Error::Failed(format!(
-        "the {what} on the obstacle of contact.{contact} is {value} at t = {time} s; correct the expression in the job"
-    )))
+/// The motions of obstacles that forces drive.
+fn driven<const D: usize, const S: usize>(body: &Body<D, S>) -> impl Iterator<Item = &LoadedMotion> {
+    body.contacts.iter().flat_map(|contact| contact.driven()).flatten()
 }
 
 /// Whether two velocities are available for extrapolation.

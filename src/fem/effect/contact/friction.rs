@@ -37,6 +37,8 @@ pub(super) struct Friction<const D: usize> {
     pub context: SlidingContext,
     /// `c` in the parameter `s = c v + q`, in Pa s/m.
     pub scale: f64,
+    /// Velocity per traction in m/(Pa s) that is added to the sliding velocity of the law, see [`TangentialPoint::resolve`]; 0 in solutions.
+    pub give: f64,
     /// Whether the bound depends on the pressure while a step is solved.
     pub follows: bool,
     pub points: Vec<TangentialPoint<D>>,
@@ -89,6 +91,7 @@ impl<const D: usize> Friction<D> {
                 weight: point.weight,
                 tangents,
                 count,
+                follows: true,
                 context: SlidingContext::default(),
                 history: law.first_histories(),
                 pressure: 0.0,
@@ -102,6 +105,7 @@ impl<const D: usize> Friction<D> {
             law,
             context: SlidingContext::default(),
             scale: 1.0,
+            give: 0.0,
             follows,
             points: out,
             owned: mesh.owned,
@@ -164,7 +168,7 @@ impl<const D: usize> Friction<D> {
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
             let length = norm(&unknown);
-            let found = self.law.resolve(scale * length, scale, point.pressure, point.context);
+            let found = point.resolve(&self.law, [scale, self.give], scale * length);
             let shares = if found.traction == 0.0 {
                 // Without traction the velocity is bitwise equal to the unknown.
                 [1.0, 0.0]
@@ -179,10 +183,10 @@ impl<const D: usize> Friction<D> {
         self.add_obstacle_velocities(1.0, values);
     }
 
-    /// Adds to nodal values a multiple of the obstacle's velocity along the tangents.
+    /// Adds to nodal values a multiple of the obstacle's velocity along the tangents where the unknowns follow it.
     fn add_obstacle_velocities(&self, factor: f64, values: &mut [f64]) {
         let pairs = self.points.iter().zip(&self.obstacle_velocities);
-        pairs.for_each(|(point, obstacle)| point.add(Newton, factor, obstacle, values));
+        pairs.filter(|(point, _)| point.follows).for_each(|(point, obstacle)| point.add(Newton, factor, obstacle, values));
     }
 
     /// The points with their sliding velocities.
@@ -207,7 +211,7 @@ impl<const D: usize> Friction<D> {
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
             let length = norm(&unknown);
-            let found = self.law.resolve(scale * length, scale, point.pressure, point.context);
+            let found = point.resolve(&self.law, [scale, self.give], scale * length);
             let at_rest = length == 0.0 || found.speed == 0.0;
             let touches = follows && points[point.at].theta == 0.0;
             point.tangent = if found.derivative == 0.0 || (at_rest && touches) {
@@ -330,7 +334,11 @@ impl<const D: usize> Friction<D> {
 
     /// Hash that differs between linearisations with different sets of branches.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
-        self.points.iter().flat_map(|p| [f64::from(u8::from(p.tangent.sticks)), p.tangent.coefficient])
+        // In 2D the direction of sliding is one of two.
+        let sense = |p: &TangentialPoint<D>| if D == 2 { dot(&p.tangent.toward, &p.tangents[0]).signum() } else { 1.0 };
+        self.points
+            .iter()
+            .flat_map(move |p| [f64::from(u8::from(p.tangent.sticks)), sense(p) * p.tangent.coefficient])
     }
 
     /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.

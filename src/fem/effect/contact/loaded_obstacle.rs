@@ -3,8 +3,8 @@
 //! With the displacement `x` of the obstacle along the direction `d`, the force `F` and the contact tractions, `m x'' = F + R`, where `R`
 //! is the resultant of the tractions on the obstacle along `d`. In a step the displacement and the velocity `w` change as those of the
 //! body: `x = x~ + k' w` and `m (w - w~) / k' = F + R`, with the blends `x~` and `w~` of earlier states and the length `k'` of the
-//! scheme. `R` depends on `w`, through the gaps at the end of the step. The same holds for the angle, the angular velocity, the moment of
-//! inertia and the moments about the centre.
+//! scheme. `w` is an unknown of Newton's method, as are the velocities of the body. The same holds for the angle, the angular velocity, the
+//! moment of inertia and the moments about the centre.
 //!
 //! Where the equations of a step hold at its midpoint, `m (w_m - w_{n-1}) / (k / 2) = F + R` and `x_n = x_{n-1} + k w_m`; the velocity is
 //! extrapolated, `w_n = 2 w_m - w_{n-1}`, except that of an obstacle without mass.
@@ -64,9 +64,10 @@ pub struct LoadedMotion {
     trial: [f64; 2],
     /// Resultant in N (N m) of the contact tractions in the last step and in the current one.
     resultant: [f64; 2],
-    /// By how much the resultant falls per displacement, in N/m, as found in the last step and in the current one; 0 before.
-    stiffness: [f64; 2],
     travel: Travel,
+    /// The force in N where the equations of the current step hold, and the velocity in m/s from which it starts.
+    driving: f64,
+    first: f64,
 }
 
 /// An obstacle with the force and the moment that move it.
@@ -107,14 +108,22 @@ impl<const D: usize> LoadedObstacle<D> {
         ]
     }
 
-    /// The component along the direction of a force on the obstacle, and that of its moment at this place relative to the centre.
-    pub fn resultants(&self, force: &Vector<D>, arm: &Vector<D>) -> [f64; 2] {
-        let in_space = |vector: &Vector<D>| -> Vector<3> {
-            std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
+    /// The velocity in m/s of the material at this place relative to the centre for each motion at 1 m/s (1 rad/s). The component of a
+    /// force along it is the force along the direction, and its moment about the axis.
+    pub(super) fn velocities_at(&self, arm: &Vector<D>) -> [Option<Vector<D>>; 2] {
+        let turned = |axis: &Vector<3>| {
+            let velocity = cross(axis, &std::array::from_fn(|i| arm.get(i).copied().unwrap_or(0.0)));
+            std::array::from_fn(|i| velocity[i])
         };
-        let along = self.translation.as_ref().map_or(0.0, |(direction, _)| dot(direction, force));
-        let about = self.rotation.as_ref();
-        [along, about.map_or(0.0, |(axis, _)| dot(axis, &cross(&in_space(arm), &in_space(force))))]
+        [
+            self.translation.as_ref().map(|(direction, _)| *direction),
+            self.rotation.as_ref().map(|(axis, _)| turned(axis)),
+        ]
+    }
+
+    /// By how much the velocity of each motion in m/s (rad/s) differs from that at the start of the step.
+    pub(super) fn changes(&self) -> [f64; 2] {
+        self.motions().map(|motion| motion.map_or(0.0, LoadedMotion::change))
     }
 
     /// Commits the motion of the step.
@@ -122,16 +131,15 @@ impl<const D: usize> LoadedObstacle<D> {
         self.motions_mut().into_iter().flatten().for_each(LoadedMotion::commit);
     }
 
-    /// Velocity in m/s at the end of the step.
-    pub(super) fn velocity(&self) -> Vector<D> {
-        self.translation
-            .as_ref()
-            .map_or([0.0; D], |(direction, motion)| direction.map(|x| motion.trial[1] * x))
-    }
-
-    /// Angular velocity in rad/s at the end of the step.
-    pub(super) fn angular_velocity(&self) -> Vector<3> {
-        self.rotation.as_ref().map_or([0.0; 3], |(axis, motion)| axis.map(|x| motion.trial[1] * x))
+    /// The velocity in m/s of its material at this place relative to the centre, in the equations of the step.
+    pub(super) fn velocity_at(&self, arm: &Vector<D>) -> Vector<D> {
+        let mut velocity = [0.0; D];
+        for (motion, along) in self.motions().into_iter().zip(self.velocities_at(arm)) {
+            if let (Some(motion), Some(along)) = (motion, along) {
+                velocity = add_scaled(&velocity, motion.velocity(), &along);
+            }
+        }
+        velocity
     }
 
     /// Whether a force moves the obstacle.
@@ -160,17 +168,24 @@ impl<const D: usize> LoadedObstacle<D> {
     }
 }
 
-fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    (0..N).map(|i| a[i] * b[i]).sum()
-}
-
 impl LoadedMotion {
     fn new(force: Scalar, mass: f64, velocity: f64) -> Self {
         let start = [0.0, velocity];
         let (converged, earlier, trial) = (start, start, start);
         let travel = Travel::to_end(Blend::euler(0.0));
-        let (resultant, stiffness) = ([0.0; 2], [0.0; 2]);
-        Self { force, mass, converged, start, earlier, trial, resultant, stiffness, travel }
+        let resultant = [0.0; 2];
+        Self {
+            force,
+            mass,
+            converged,
+            start,
+            earlier,
+            trial,
+            resultant,
+            travel,
+            driving: 0.0,
+            first: velocity,
+        }
     }
 
     /// The force as a function of time.
@@ -209,49 +224,53 @@ impl LoadedMotion {
         self.resultant = [resultant; 2];
     }
 
-    /// The stiffness of the contact in N/m as the last step has found it, 0 before, for checkpoints.
-    pub fn stiffness(&self) -> f64 {
-        self.stiffness[0]
-    }
-
-    /// Sets what [`stiffness`](Self::stiffness) gave.
-    pub fn restore_stiffness(&mut self, stiffness: f64) {
-        self.stiffness = [stiffness; 2];
-    }
-
-    /// The slope of [`unbalanced`](Self::unbalanced) in N s/m that the last step has found, if it has.
-    pub fn expected_slope(&self) -> Option<f64> {
-        (self.stiffness[0] > 0.0).then(|| self.inertia() + self.travel.way * self.stiffness[0])
-    }
-
-    /// Keeps the slope in N s/m between the last two velocities of a step for the next one.
-    pub fn keep_slope(&mut self, slope: f64) {
-        let stiffness = (slope - self.inertia()) / self.travel.way;
-        if stiffness > 0.0 && stiffness.is_finite() {
-            self.stiffness[1] = stiffness;
-        }
-    }
-
-    /// Starts a step; returns the velocity in m/s after the last one.
-    pub fn start(&mut self, travel: Travel) -> f64 {
+    /// Starts a step whose equations hold at `time`, from the last velocity or, if the ratio of the length of the step to that of the last
+    /// one is given, from that extrapolated.
+    pub fn start(&mut self, travel: Travel, time: f64, ratio: Option<f64>) {
         self.travel = travel;
-        self.stiffness[1] = self.stiffness[0];
-        self.set_velocity(self.converged[1])
+        self.driving = self.force.evaluate(time, &[]);
+        let [now, before] = [self.converged[1], self.earlier[1]];
+        self.first = now + ratio.unwrap_or(0.0) * (now - before);
+        self.restart();
+    }
+
+    /// Sets the velocity from which the step starts.
+    pub fn restart(&mut self) {
+        self.set_velocity(self.first);
+    }
+
+    /// The force in N in the equations of the step.
+    pub fn driving(&self) -> f64 {
+        self.driving
+    }
+
+    /// The velocity in m/s in the equations of the step.
+    pub fn velocity(&self) -> f64 {
+        self.trial[1]
+    }
+
+    /// By how much it differs from that from which the step starts.
+    pub fn change(&self) -> f64 {
+        self.trial[1] - self.first
+    }
+
+    /// The change of the velocity in m/s to that without contact; infinite or NaN without mass.
+    pub fn change_to_free(&self) -> f64 {
+        let [_, before] = self.momentum_rates();
+        (before + self.driving) / self.inertia() - self.trial[1]
     }
 
     /// Sets the velocity in m/s in the equations of the step.
-    pub fn set_velocity(&mut self, velocity: f64) -> f64 {
+    pub fn set_velocity(&mut self, velocity: f64) {
         let Travel { blend, way, .. } = self.travel;
         self.trial = [blend.of(self.converged[0], self.earlier[0]) + way * velocity, velocity];
-        velocity
     }
 
-    /// `m (w - w~) / k' - F - R` in N where the equations of a step hold, at `time`, given the resultant `R` in N, and the largest of
-    /// the terms.
-    pub fn unbalanced(&mut self, time: f64, resultant: f64) -> [f64; 2] {
+    /// `m (w - w~) / k' - F - R` in N, given the resultant `R` in N, and the largest of the terms.
+    pub fn unbalanced(&mut self, resultant: f64) -> [f64; 2] {
         self.resultant[1] = resultant;
         let momentum = self.momentum_rates();
-        let force = self.force.evaluate(time, &[]);
+        let force = self.driving;
         let terms = [momentum[0], momentum[1], force, resultant];
         [
             momentum[0] - momentum[1] - force - resultant,
@@ -283,18 +302,18 @@ impl LoadedMotion {
         0.5 * self.mass * self.converged[1] * self.converged[1]
     }
 
-    /// Energies of the solved step before it is committed, given the times in s at which its equations and those of the step before
-    /// hold; the work of the contact tractions counts as work.
-    pub fn energy_of_step(&self, times: [f64; 2]) -> Energy {
+    /// Energies of the solved step before it is committed, given the time in s of its start; the work of the contact tractions counts as
+    /// work.
+    pub fn energy_of_step(&self, start: f64) -> Energy {
         let [displacement, velocity] = self.end();
         let (way, kinetic) = (displacement - self.converged[0], 0.5 * self.mass * velocity * velocity);
         let [momentum, before] = self.momentum_rates();
         let [resultant_before, resultant] = self.resultant;
-        let force = self.force.evaluate(times[0], &[]);
+        let force = self.driving;
         let [mean_force, mean_resultant] = if self.travel.blend.earlier == 0.0 {
             [force, resultant]
         } else {
-            [0.5 * (force + self.force.evaluate(times[1], &[])), 0.5 * (resultant + resultant_before)]
+            [0.5 * (force + self.force.evaluate(start, &[])), 0.5 * (resultant + resultant_before)]
         };
         let open = (force - mean_force) + (resultant - mean_resultant) - (momentum - before);
         Energy::from([
@@ -314,7 +333,6 @@ impl LoadedMotion {
 
     fn commit(&mut self) {
         (self.earlier, self.converged) = (self.converged, self.end());
-        self.stiffness[0] = self.stiffness[1];
         self.resultant[0] = self.resultant[1];
     }
 }
@@ -339,14 +357,12 @@ mod tests {
         };
         let mut disc = LoadedObstacle::<2>::new(&load, [0.0, 0.0, 5.0]);
         // At its lowest point, half a metre below its centre.
-        assert_eq!(disc.resultants(&[5.0, -7.0], &[0.0, -0.5]), [7.0, 2.5]);
-        assert_eq!(
-            (disc.velocity(), disc.angular_velocity(), disc.turns()),
-            ([0.0, -1.0], [0.0, 0.0, -3.0], true)
-        );
+        let velocities = disc.velocities_at(&[0.0, -0.5]).map(|velocity| velocity.expect("both"));
+        assert_eq!(velocities, [[0.0, -1.0], [0.5, 0.0]]);
+        assert_eq!((disc.velocity_at(&[0.0, -0.5]), disc.turns()), ([-1.5, -1.0], true));
         let [falling, turning] = disc.motions_mut().map(|motion| motion.expect("both"));
         for motion in [falling, turning] {
-            motion.start(Travel::to_end(Blend::euler(0.5)));
+            motion.start(Travel::to_end(Blend::euler(0.5)), 0.5, None);
             motion.set_velocity(2.0);
         }
         assert_eq!(disc.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
@@ -354,44 +370,43 @@ mod tests {
         disc.commit();
         assert_eq!(disc.motions().map(|motion| motion.expect("both").motion()), [[1.0, 2.0]; 2]);
         let fixed = LoadedObstacle::<2>::new(&ObstacleLoad { direction: vec![], ..load }, [0.0, 0.0, 1.0]);
-        assert_eq!((fixed.seen_after(&[1.0, 0.0]), fixed.velocity()), ([1.0, 0.0], [0.0, 0.0]));
+        assert_eq!((fixed.seen_after(&[1.0, 0.0]), fixed.moves()), ([1.0, 0.0], false));
     }
 
     #[test]
-    fn the_slope_of_a_step_is_expected_in_the_next_one() {
+    fn a_step_starts_from_an_extrapolated_velocity_and_may_be_free() {
         let mut obstacle = falling();
-        obstacle.start(Travel::to_end(Blend::euler(0.5)));
-        assert_eq!(obstacle.expected_slope(), None);
-        // 3 kg / 0.5 s and 8 N/m over 0.5 s.
-        obstacle.keep_slope(10.0);
-        assert_eq!(obstacle.expected_slope(), None, "the step may be repeated");
-        obstacle.commit();
-        obstacle.start(Travel::to_end(Blend::euler(0.25)));
-        assert_eq!(obstacle.expected_slope(), Some(12.0 + 2.0));
-        obstacle.keep_slope(f64::NAN);
-        obstacle.keep_slope(1.0);
-        obstacle.commit();
-        assert_eq!(obstacle.stiffness(), 8.0, "less than the inertia: not a slope");
-        let mut other = falling();
-        other.restore_stiffness(obstacle.stiffness());
-        other.start(Travel::to_end(Blend::euler(0.25)));
-        assert_eq!(other.expected_slope(), Some(14.0));
+        obstacle.restore([0.0, 2.0, 0.0, 1.5]);
+        obstacle.start(Travel::to_end(Blend::euler(0.5)), 0.5, Some(2.0));
+        assert_eq!((obstacle.velocity(), obstacle.driving()), (3.0, 6.0));
+        // 2 m/s + 6 N / 3 kg 0.5 s = 3 m/s.
+        assert_eq!(obstacle.change_to_free(), 0.0);
+        obstacle.set_velocity(7.0);
+        assert_eq!(obstacle.change(), 4.0);
+        obstacle.restart();
+        assert_eq!(obstacle.velocity(), 3.0);
+        obstacle.start(Travel::to_end(Blend::euler(0.5)), 0.5, None);
+        assert_eq!(obstacle.velocity(), 2.0);
     }
 
     #[test]
     fn steps_of_both_schemes_by_hand() {
         let mut obstacle = falling();
-        assert_eq!(obstacle.start(Travel::to_end(Blend::euler(0.5))), 1.0);
+        obstacle.start(Travel::to_end(Blend::euler(0.5)), 0.5, None);
         obstacle.set_velocity(2.0);
         // 3 kg (2 - 1) m/s / 0.5 s = 6 N.
-        assert_eq!(obstacle.unbalanced(0.5, 0.0), [0.0, 12.0]);
-        assert_eq!(obstacle.unbalanced(0.5, -2.0)[0], 2.0);
+        assert_eq!(obstacle.unbalanced(0.0), [0.0, 12.0]);
+        assert_eq!(obstacle.unbalanced(-2.0)[0], 2.0);
         obstacle.commit();
         assert_eq!(obstacle.motion(), [1.0, 2.0]);
         // The second-order formula: x~ = 4/3 1, w~ = 4/3 2 - 1/3 1 = 7/3, k' = 1/3 s; 3 m/s are 3 (3 - 7/3) / (1/3) = 6 N.
-        obstacle.start(Travel::to_end(Blend { length: 1.0 / 3.0, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }));
+        obstacle.start(
+            Travel::to_end(Blend { length: 1.0 / 3.0, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }),
+            1.0,
+            None,
+        );
         obstacle.set_velocity(3.0);
-        assert!(obstacle.unbalanced(1.0, 0.0)[0].abs() < 1e-13);
+        assert!(obstacle.unbalanced(0.0)[0].abs() < 1e-13);
         obstacle.commit();
         assert!((obstacle.motion()[0] - 7.0 / 3.0).abs() < 1e-15);
         let mut other = falling();
@@ -403,33 +418,37 @@ mod tests {
     fn a_step_through_its_midpoint_loses_no_energy_and_others_lose_what_they_state() {
         let mut obstacle = falling();
         // 3 kg from 1 m/s under 6 N + 3 N for 0.5 s: 2.5 m/s, 0.875 m on the way.
-        obstacle.start(Travel::to_midpoint(0.5));
+        obstacle.start(Travel::to_midpoint(0.5), 1.0, None);
         obstacle.set_velocity(1.75);
-        assert_eq!(obstacle.unbalanced(0.25, 3.0)[0], 0.0);
-        let energy = obstacle.energy_of_step([0.25, f64::NAN]);
+        assert_eq!(obstacle.unbalanced(3.0)[0], 0.0);
+        let energy = obstacle.energy_of_step(f64::NAN);
         let values = [OBSTACLE_KINETIC, OBSTACLE_WORK, WORK, OBSTACLE_NUMERICAL].map(|kind| energy[kind]);
         assert_eq!(values, [9.375, 5.25, 2.625, 0.0]);
         obstacle.commit();
         assert_eq!((obstacle.motion(), obstacle.resultant()), ([0.875, 2.5], 3.0));
         // Implicit Euler to 4 m/s: 3 kg 1.5 m/s / 0.5 s = 9 N over 2 m; 1/2 3 kg (1.5 m/s)^2 are lost.
-        obstacle.start(Travel::to_end(Blend::euler(0.5)));
+        obstacle.start(Travel::to_end(Blend::euler(0.5)), 1.0, None);
         obstacle.set_velocity(4.0);
-        assert_eq!(obstacle.unbalanced(1.0, 3.0)[0], 0.0);
-        let energy = obstacle.energy_of_step([1.0, f64::NAN]);
+        assert_eq!(obstacle.unbalanced(3.0)[0], 0.0);
+        let energy = obstacle.energy_of_step(f64::NAN);
         let values = [OBSTACLE_KINETIC, OBSTACLE_WORK, WORK, OBSTACLE_NUMERICAL].map(|kind| energy[kind]);
         assert_eq!(values, [24.0, 12.0, 6.0, -3.375]);
         // The second-order formula takes means of forces over the step.
-        obstacle.start(Travel::to_end(Blend { length: 0.5, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }));
+        obstacle.start(
+            Travel::to_end(Blend { length: 0.5, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }),
+            1.0,
+            None,
+        );
         obstacle.set_velocity(4.0);
-        obstacle.unbalanced(1.0, 7.0);
+        obstacle.unbalanced(7.0);
         let way = obstacle.trial[0] - obstacle.converged[0];
-        let energy = obstacle.energy_of_step([1.0, 0.5]);
+        let energy = obstacle.energy_of_step(0.5);
         assert!(
             (energy[WORK] - 5.0 * way).abs() < 1e-14 && (energy[OBSTACLE_WORK] - 6.0 * way).abs() < 1e-14
         );
         // One without mass has the velocity of the midpoint.
         let mut light = LoadedMotion { mass: 0.0, ..falling() };
-        light.start(Travel::to_midpoint(0.5));
+        light.start(Travel::to_midpoint(0.5), 1.0, None);
         light.set_velocity(1.75);
         light.commit();
         assert_eq!(light.motion(), [0.875, 1.75]);
@@ -439,7 +458,7 @@ mod tests {
     fn velocities_off_the_straight_line_are_errors() {
         let mut obstacle = falling();
         obstacle.restore([0.0, 2.0, 0.0, 1.0]);
-        obstacle.start(Travel::to_end(Blend::euler(0.5)));
+        obstacle.start(Travel::to_end(Blend::euler(0.5)), 1.0, None);
         obstacle.set_velocity(7.0);
         let step = Step { time: 1.0, length: 0.5, previous_length: 0.5 };
         // Half of 7 - (2 + 1) m/s, 3 kg.

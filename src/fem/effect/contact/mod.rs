@@ -27,6 +27,7 @@ mod bounds;
 mod closeness;
 mod count;
 mod directions;
+mod driven;
 mod energy;
 mod friction;
 mod inclusion;
@@ -49,8 +50,8 @@ use crate::{
         effect::Blend,
         space::{Held, surface_points},
     },
-    laws::contact::{Gap, NormalResponse, Wear},
-    linear_algebra::tensor::{Vector, larger, norm},
+    laws::contact::{Gap, NormalResponse, Rate, Wear},
+    linear_algebra::tensor::{Vector, larger},
     mesh::Mesh,
     parallel::session::Session,
 };
@@ -92,7 +93,10 @@ pub struct Contact<const D: usize> {
     pub gap: Gap,
     /// The motion of the obstacle, if a force moves it.
     pub obstacle: Option<LoadedObstacle<D>>,
-    /// For an obstacle that a moment turns: for each point, the place that touches it relative to the centre.
+    /// Whether the unknowns are relative to this motion.
+    follows: bool,
+    /// For an obstacle that a moment turns: for each point, the place that touches it relative to the centre, where the equations of the
+    /// step hold.
     arms: Vec<Vector<D>>,
     /// Wear of the surface.
     pub wear: Option<Wear>,
@@ -102,6 +106,8 @@ pub struct Contact<const D: usize> {
     pub scale: f64,
     /// Length in s of the current step, as laws of the displacement see it.
     step_length: f64,
+    /// The formula of the obstacle's velocity in the current step.
+    rate: Rate,
     /// The blend of earlier histories from which those of friction and wear start in the current step.
     blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
@@ -168,11 +174,13 @@ impl<const D: usize> Contact<D> {
             law,
             gap,
             obstacle: None,
+            follows: true,
             arms: Vec::new(),
             wear: None,
             closeness: Closeness::default(),
             scale,
             step_length: 0.0,
+            rate: Rate::euler(0.0, 1.0),
             blend: Blend::euler(0.0),
             reference,
             size: longest_side(session, &mesh.nodes),
@@ -228,30 +236,6 @@ impl<const D: usize> Contact<D> {
     /// Whether the surface of the obstacle may move.
     fn surface_may_move(&self) -> bool {
         self.obstacle.is_some() || self.gap.surface_may_move()
-    }
-
-    /// The resultants of the tractions on the obstacle for its [motions](LoadedObstacle::motions), in N and N m, of points on this rank
-    /// in the step just solved, at its velocities with ghosts; 0 for motions that it does not have.
-    pub fn resultants_on_obstacle(&self, velocity: &[f64]) -> [f64; 2] {
-        let Some(obstacle) = &self.obstacle else { return [0.0; 2] };
-        let mut sums = [0.0; 2];
-        let mut add = |at: usize, force: Vector<D>| {
-            let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
-            let parts = obstacle.resultants(&force, &arm);
-            (0..2).for_each(|i| sums[i] -= parts[i]);
-        };
-        for (at, point) in self.points.iter().enumerate() {
-            point.forces(point.pressure_at(&self.law, Body, velocity), |_, force| add(at, force));
-        }
-        for point in self.friction.iter().flat_map(|friction| &friction.points) {
-            add(point.at, point.traction.map(|q| -point.weight * q));
-        }
-        sums
-    }
-
-    /// The largest distance in m of a point on this rank from the centre of an obstacle that a moment turns.
-    pub fn longest_arm(&self) -> f64 {
-        self.arms.iter().fold(0.0, |most, arm| larger(most, norm(arm)))
     }
 
     /// Whether velocities of ghost nodes are read and forces on them are written.

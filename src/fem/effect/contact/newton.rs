@@ -31,7 +31,8 @@ impl<const D: usize> Contact<D> {
             } else {
                 self.law.pressure(point.normal_component(Newton, values), point.context)
             };
-            point.add_along(Newton, pressure / (self.scale * point.free_length), values);
+            let parameter = pressure / (self.scale * point.free_length) - point.carried / point.free_length;
+            point.add_along(Newton, parameter, values);
         }
         if let Some(friction) = &self.friction {
             friction.unmap(values);

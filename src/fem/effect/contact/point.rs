@@ -70,6 +70,12 @@ pub(super) struct Point<const D: usize> {
     pub place: Vector<D>,
     /// The gap in m at the end of the step of the undeformed surface without wear.
     pub reach: f64,
+    /// Normal displacement in m of the surface without wear at the start of the step.
+    pub moved: f64,
+    /// Where a force moves the obstacle: the ratio of the normal velocity to that of the obstacle at which the gap stays as it is, and this
+    /// velocity in m/s for the change of that of the obstacle since the start of the step. The unknown along the normal is relative to it.
+    pub follows: f64,
+    pub carried: f64,
     /// Penetration from the displacement at the start and the gap at the end of the step, and step length.
     pub context: NodeContext,
     /// `u_nu - gap` in m, with both values at the start of the step.
@@ -111,6 +117,9 @@ impl<const D: usize> Point<D> {
             unknown: Unknown::Velocity,
             place: [0.0; D],
             reach: 0.0,
+            moved: 0.0,
+            follows: 0.0,
+            carried: 0.0,
             context: NodeContext::default(),
             penetration_before: 0.0,
             worn: [0.0; 2],
@@ -293,10 +302,19 @@ impl<const D: usize> Point<D> {
         }
     }
 
+    /// Sets the gap in m at the end of the step, where another motion of the obstacle changes it after the step was prepared.
+    pub(super) fn set_gap(&mut self, gap: f64) {
+        self.reach = gap;
+        self.context.penetration = self.moved + self.blend_offset - self.continued_wear - gap;
+        let before = self.penetration_before;
+        let before = if before.is_finite() { self.moved - before } else { self.moved + self.worn[0] };
+        self.growth = gap - before;
+    }
+
     /// The point of the law's graph for the unknown `along` the direction.
     #[inline]
     pub(super) fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
-        law.resolve_worn(scale * self.free_length * along, scale, self.context)
+        law.resolve_worn(scale * self.free_length * along + scale * self.carried, scale, self.context)
     }
 
     /// The magnitude of the normal velocity in m/s that would close the gap in the step; 0 for laws without a gap.

@@ -2,8 +2,7 @@
 
 use super::{
     Contact,
-    loaded_obstacle::LoadedObstacle,
-    point::{Point, Unknown, Vectors::Body},
+    point::{Unknown, Vectors::Body},
     tangential_point::ROUNDING,
 };
 use crate::{
@@ -32,6 +31,7 @@ impl<const D: usize> Contact<D> {
             let gap = self.gap.of_moved(time, &after, &point.normal, along - worn)?;
             let before = self.gap.of_moved(time - length, &before, &point.normal, along - worn)?;
             point.reach = gap;
+            point.moved = along - worn;
             point.context = NodeContext {
                 penetration: along - gap - worn,
                 step_length: length,
@@ -44,24 +44,8 @@ impl<const D: usize> Contact<D> {
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
-        self.set_arms(time);
+        self.follow_obstacle(true);
         self.set_obstacle_velocities(Rate::euler(time, length))
-    }
-
-    /// Sets the places at which the rays along the normals meet an obstacle that a moment turns, relative to its centre; zero where
-    /// they do not meet it.
-    fn set_arms(&mut self, time: f64) {
-        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.turns()) else { return };
-        let centre = self.gap.centre(time);
-        let arm = |point: &Point<D>| {
-            if point.reach == f64::INFINITY {
-                return [0.0; D];
-            }
-            let seen = obstacle.seen_after(&point.place);
-            add_scaled(&add_scaled(&seen, point.reach, &point.normal), -1.0, &centre)
-        };
-        self.arms.clear();
-        self.arms.extend(self.points.iter().map(arm));
     }
 
     /// Starts the histories of friction from this blend of earlier ones, as whose length the laws see the step.
@@ -93,11 +77,12 @@ impl<const D: usize> Contact<D> {
 
     /// To be called after [`Contact::prepare`]: lets pressures of laws with a potential be their means over the step, which conserve
     /// energy.
-    pub fn conserve_energy(&mut self) {
+    pub fn conserve_energy(&mut self) -> Result<()> {
         for point in &mut self.points {
             point.context.mean_from =
                 Some(point.penetration_before).filter(|penetration| penetration.is_finite());
         }
+        self.place_obstacle()
     }
 
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
@@ -125,25 +110,28 @@ impl<const D: usize> Contact<D> {
     /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that fix one tangent
     /// of a point along this motion and leave another free: the direction of sliding depends on both, but only the free one is an
     /// unknown. Where supports fix all tangents, friction has no effect.
-    fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {
+    pub(super) fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {
+        self.rate = rate;
+        self.set_arms();
         let may_move = self.surface_may_move();
         let Some(friction) = self.friction.as_mut().filter(|_| may_move) else {
             return Ok(());
         };
         let obstacle = self.obstacle.as_ref();
-        let (points, mut motion) = (&self.points, self.gap.motion::<D>(rate)?);
-        motion.turn(&obstacle.map_or([0.0; 3], LoadedObstacle::angular_velocity));
-        let velocity = |point: &Point<D>| {
+        let (points, motion) = (&self.points, self.gap.motion::<D>(rate)?);
+        let velocity = |at: usize| {
+            let point = &points[at];
             let seen = obstacle.map_or(point.place, |obstacle| obstacle.seen_after(&point.place));
             let prescribed = motion.velocity_along(&seen, &point.normal, point.reach);
-            add_scaled(&prescribed, 1.0, &obstacle.map_or([0.0; D], LoadedObstacle::velocity))
+            let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
+            add_scaled(&prescribed, 1.0, &obstacle.map_or([0.0; D], |obstacle| obstacle.velocity_at(&arm)))
         };
         friction.obstacle_velocities.clear();
         for point in &friction.points {
-            friction.obstacle_velocities.push(point.part(&velocity(&points[point.at])));
+            friction.obstacle_velocities.push(point.part(&velocity(point.at)));
         }
         for (at, tangent) in &friction.held {
-            let (point, velocity) = (&points[*at], velocity(&points[*at]));
+            let (point, velocity) = (&points[*at], velocity(*at));
             let along = dot(tangent, &velocity);
             if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
                 return Err(Error::Refused(format!(

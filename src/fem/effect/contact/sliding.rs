@@ -55,6 +55,12 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Sets the velocity in m/s for each Pa of traction by which points with friction yield in addition to their law: with a large one
+    /// they are almost free, with a small one they almost stick, and with 0 they obey the law.
+    pub fn set_give(&mut self, give: f64) {
+        self.friction.iter_mut().for_each(|friction| friction.give = give);
+    }
+
     /// `c` in the parameter of the friction graph in Pa s/m; 0 without friction.
     pub fn friction_scale(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, |friction| friction.scale)

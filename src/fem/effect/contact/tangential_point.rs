@@ -2,7 +2,7 @@
 
 use super::point::Vectors::{self, Body, Newton};
 use crate::{
-    laws::contact::SlidingContext,
+    laws::contact::{FrictionLaw, SlidingContext, Slip},
     linear_algebra::tensor::{Vector, dot, norm},
 };
 
@@ -20,6 +20,8 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Orthonormal; `count` of them are used.
     pub tangents: [Vector<D>; D],
     pub count: usize,
+    /// Whether its unknown is relative to the obstacle.
+    pub follows: bool,
     /// The current step, as the law sees it.
     pub context: SlidingContext,
     /// What the law keeps, if it has a history: after the last step, and before it.
@@ -71,6 +73,25 @@ impl<const D: usize> TangentialPoint<D> {
         if size > ROUNDING {
             let along = along.map(|x| x / size);
             (self.tangents, self.count) = span_without(&self.tangents[..self.count], &[along]);
+        }
+    }
+
+    /// The point with `c v + q = s` of the graph of its law in series with a viscous element, whose velocity is `give` times the
+    /// traction: `v = V(q) + give q` and thus `s / (1 + c give) = c' V + q`, `c' = c / (1 + c give)`. It has no jump at rest.
+    pub(super) fn resolve(&self, law: &FrictionLaw, [c, give]: [f64; 2], s: f64) -> Slip {
+        let share = 1.0 + c * give;
+        let found = law.resolve(s / share, c / share, self.pressure, self.context);
+        if give == 0.0 {
+            return found;
+        }
+        let softer = 1.0 + give * found.slope;
+        let slope = if found.derivative == 0.0 { 1.0 / give } else { found.slope / softer };
+        Slip {
+            speed: found.speed + give * found.traction,
+            traction: found.traction,
+            derivative: 1.0 / (c + slope),
+            slope,
+            coefficient: found.coefficient / softer,
         }
     }
 

@@ -45,7 +45,9 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         if !skew {
             continue;
         }
-        let is_sharp = places.iter().any(|&(number, _)| contacts[number].law.has_vertical_parts());
+        let is_sharp = places.iter().any(|&(number, _)| {
+            contacts[number].law.has_vertical_parts() || contacts[number].obstacle.is_some()
+        });
         if is_sharp || with_friction.contains(&node) {
             let directions: Vec<Vector<D>> = places.iter().map(direction).collect();
             let Some(dual) = dual_basis(&directions, INDEPENDENT) else {

@@ -1,0 +1,217 @@
+//! A contact whose obstacle a force moves or a moment turns, in the equations of Newton's method.
+//!
+//! The velocities `w` of these motions are unknowns beside those of the nodes. The unknowns of the points are relative to the obstacle:
+//! along the normal `n` of the body to `q . n (w - w_0)`, where `q` is the velocity of the obstacle's material at `w = 1` and `w_0` that from
+//! which the step starts, and along the tangents to `q w`. Velocities of nodes at fixed unknowns change by `N w`, and the resultant of
+//! nodal contact forces `C` is `N . C` ([`Contact::add_motion`]): a row and a column of a symmetric system. Tractions at fixed unknowns do
+//! not change with `w` where the normals of body and obstacle are parallel; elsewhere the gap changes by a different amount, and pressures
+//! have moments about the centre of a round obstacle. Both are small, exact in residuals, and left out of derivatives.
+
+use super::{
+    Contact,
+    loaded_obstacle::LoadedMotion,
+    point::{Point, Unknown, Vectors::Newton},
+};
+use crate::{
+    error::Result,
+    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
+    parallel::session::Session,
+};
+
+impl<const D: usize> Contact<D> {
+    /// The motions of its obstacle that forces drive: along its direction, and about its axis.
+    pub fn driven(&self) -> [Option<&LoadedMotion>; 2] {
+        self.obstacle.as_ref().map_or([None; 2], |obstacle| obstacle.motions())
+    }
+
+    /// The motion with this number, to be changed.
+    pub fn driven_mut(&mut self, number: usize) -> Option<&mut LoadedMotion> {
+        self.obstacle.as_mut()?.motions_mut().into_iter().nth(number)?
+    }
+
+    /// Sets the velocities of the obstacle to those from which the step starts.
+    pub fn restart_obstacle(&mut self) -> Result<()> {
+        (0..2).for_each(|number| self.driven_mut(number).into_iter().for_each(LoadedMotion::restart));
+        self.place_obstacle()
+    }
+
+    /// Evaluates gaps and velocities of the obstacle after its velocities have been set.
+    pub fn place_obstacle(&mut self) -> Result<()> {
+        let Some(obstacle) = &self.obstacle else { return Ok(()) };
+        if !self.law.depends_on_displacement() {
+            return Ok(());
+        }
+        let [change, _] = obstacle.changes();
+        for point in self.points.iter_mut().filter(|_| obstacle.moves()) {
+            let seen = obstacle.seen_after(&point.place);
+            point.set_gap(self.gap.of_moved(self.rate.time, &seen, &point.normal, point.moved)?);
+            point.carried = point.follows * change;
+        }
+        self.set_obstacle_velocities(self.rate)
+    }
+
+    /// Sets whether the unknowns are relative to the motion of the obstacle: not if they are apart in the whole step.
+    pub fn follow_obstacle(&mut self, follows: bool) {
+        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.moves()) else { return };
+        let ([direction, _], [change, _]) = (obstacle.velocities_at(&[0.0; D]), obstacle.changes());
+        self.follows = follows;
+        for point in &mut self.points {
+            let along = direction.map_or(0.0, |direction| dot(&point.normal, &direction));
+            point.follows = if follows && point.can_touch() { along } else { 0.0 };
+            point.carried = point.follows * change;
+        }
+    }
+
+    /// Lets the unknowns along the tangents follow the obstacle at points that touch, or are no farther from it than the deepest point is
+    /// in it, at these velocities of Newton's method; all of them where friction needs no pressure. Elsewhere they would carry the motion
+    /// of the obstacle to and fro, only to lose digits. Collective.
+    pub fn follow_along_tangents(&mut self, session: &Session, velocity: &[f64]) {
+        let depths: Vec<f64> = self.points.iter().map(|point| self.depth(point, velocity)).collect();
+        let [deepest] = session.largest([depths.iter().fold(0.0, |most, depth| larger(most, *depth))]);
+        let points = &self.points;
+        if let Some(friction) = &mut self.friction {
+            for point in &mut friction.points {
+                let touches = points[point.at].pressure != 0.0 || depths[point.at] >= -deepest;
+                point.follows = touches || !friction.law.follows_pressure();
+            }
+        }
+    }
+
+    /// Lets the unknowns follow the obstacle at points that have come under pressure; returns whether they did not at some point on this
+    /// rank.
+    pub fn follow_along_new_tangents(&mut self) -> bool {
+        let points = &self.points;
+        let mut is_new = false;
+        for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
+            if !point.follows && points[point.at].pressure != 0.0 {
+                (point.follows, is_new) = (true, true);
+            }
+        }
+        is_new
+    }
+
+    /// Whether the unknowns are relative to the motion of the obstacle.
+    pub fn follows_obstacle(&self) -> bool {
+        self.follows
+    }
+
+    /// Whether points on this rank have tractions.
+    pub fn has_tractions(&self) -> bool {
+        let friction = self.friction.iter().flat_map(|friction| &friction.points);
+        self.points.iter().any(|point| point.pressure != 0.0) || { friction }
+            .any(|point| point.traction != [0.0; D])
+    }
+
+    /// x
+    pub fn show(&self) -> String {
+        let w: Vec<f64> = self.driven().into_iter().flatten().map(|m| m.velocity()).collect();
+        let f: String = self.friction.iter().flat_map(|f| &f.points).filter(|p| p.pressure > 0.0).map(|p| format!(" {:.2}{}", p.traction[0] / p.pressure, if p.tangent.sticks {"s"} else {"."})).collect();
+        format!("{w:?} {f}")
+    }
+
+    /// Whether points on this rank would touch the obstacle where it is, at these velocities of Newton's method.
+    pub fn would_touch(&self, velocity: &[f64]) -> bool {
+        self.points
+            .iter()
+            .any(|point| point.unknown == Unknown::Parameter && self.depth(point, velocity) >= 0.0)
+    }
+
+    /// The penetration in m of a point at the end of the step.
+    fn depth(&self, point: &Point<D>, velocity: &[f64]) -> f64 {
+        point.context.penetration + point.context.step_length * point.normal_component(Newton, velocity)
+    }
+
+    /// Sets the places at which the rays along the normals meet an obstacle that a moment turns, relative to its centre; zero where they
+    /// do not meet it. Where laws take means over the step, those in its middle.
+    pub(super) fn set_arms(&mut self) {
+        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.turns()) else { return };
+        let [[start, _], _] = self.rate.before;
+        let [centre, before] = [self.rate.time, start].map(|time| self.gap.centre(time));
+        let arms = self.points.iter().map(|point| {
+            if point.reach == f64::INFINITY {
+                return [0.0; D];
+            }
+            let arm = |seen: Vector<D>, reach, centre| {
+                add_scaled(&add_scaled(&seen, reach, &point.normal), -1.0, centre)
+            };
+            let after = arm(obstacle.seen_after(&point.place), point.reach, &centre);
+            if point.context.mean_from.is_none() {
+                return after;
+            }
+            let start = arm(obstacle.seen_before(&point.place), point.reach - point.growth, &before);
+            std::array::from_fn(|i| 0.5 * (start[i] + after[i]))
+        });
+        self.arms.clear();
+        self.arms.extend(arms);
+    }
+
+    /// The velocity of the obstacle's material at a point for a motion at 1 m/s (1 rad/s).
+    fn carrying(&self, number: usize, at: usize) -> Vector<D> {
+        let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
+        let velocities = self.obstacle.as_ref().map(|obstacle| obstacle.velocities_at(&arm)[number]);
+        velocities.flatten().unwrap_or([0.0; D])
+    }
+
+    /// Adds the change of nodal velocities, a vector of Newton's method, with the velocity of a motion at fixed unknowns.
+    pub fn add_motion(&self, number: usize, nodal: &mut [f64]) {
+        if !self.follows {
+            return;
+        }
+        let parameters = self.points.iter().filter(|point| point.unknown == Unknown::Parameter);
+        for point in parameters.filter(|_| number == 0) {
+            point.add_along(Newton, point.follows / point.free_length, nodal);
+        }
+        let tangential = self.friction.iter().flat_map(|friction| &friction.points);
+        for point in tangential.filter(|point| point.follows) {
+            point.add(Newton, 1.0, &point.part(&self.carrying(number, point.at)), nodal);
+        }
+    }
+
+    /// The resultants of the tractions on the obstacle for its motions, in N and N m, of points on this rank at these velocities, a vector
+    /// of Newton's method with ghosts; 0 for motions that it does not have.
+    pub fn resultants(&self, velocity: &[f64]) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (number, sum) in
+            sums.iter_mut().enumerate().filter(|(number, _)| self.driven()[*number].is_some())
+        {
+            for (at, point) in self.points.iter().enumerate() {
+                let pressure = point.pressure_at(&self.law, Newton, velocity);
+                *sum += point.weight * pressure * dot(&point.normal, &self.carrying(number, at));
+            }
+            for point in self.friction.iter().flat_map(|friction| &friction.points) {
+                *sum += point.weight * dot(&point.traction, &self.carrying(number, point.at));
+            }
+        }
+        sums
+    }
+
+    /// A measure of how firmly points on this rank hold a motion at the last linearisation, in m^(D-1); 0 where nothing touches.
+    pub fn grip(&self, number: usize) -> f64 {
+        let square = |value: f64| value * value;
+        let normal = self.points.iter().enumerate().filter(|(_, point)| point.unknown == Unknown::Parameter);
+        let normal = normal.map(|(at, point)| {
+            let along = dot(&point.normal, &self.carrying(number, at));
+            point.weight * (1.0 - point.theta).abs() * if number == 0 { square(along) } else { 0.0 }
+        });
+        let sliding = self.friction.iter().flat_map(|friction| &friction.points).map(|point| {
+            let share = point.tangent.theta.iter().map(|theta| (1.0 - theta).abs()).sum::<f64>();
+            point.weight * share * square(norm(&point.part(&self.carrying(number, point.at))))
+        });
+        normal.sum::<f64>() + sliding.sum::<f64>()
+    }
+
+    /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it touches a point on this rank in the step, at these
+    /// velocities of Newton's method; infinite if it does not come nearer.
+    pub fn change_to_touch(&self, velocity: &[f64], sign: f64) -> f64 {
+        let change = |point: &Point<D>| {
+            let approach = -sign * point.follows * point.context.step_length;
+            let depth = self.depth(point, velocity);
+            if approach > 0.0 && depth.is_finite() { (-depth / approach).max(0.0) } else { f64::INFINITY }
+        };
+        self.points
+            .iter()
+            .filter(|point| point.unknown == Unknown::Parameter)
+            .map(change)
+            .fold(f64::INFINITY, f64::min)
+    }
+}

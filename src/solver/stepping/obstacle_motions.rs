@@ -1,0 +1,445 @@
+//! The motions of obstacles that forces drive, as unknowns of Newton's method.
+//!
+//! With the unknowns of nodes relative to their obstacles (`fem/effect/contact/driven.rs`) a step is
+//!
+//! ```text
+//! r = K v + C(x) - b = 0,   v = V(x) + N w
+//! f = m (w - w~) / k' - F - N . C(x) = 0
+//! ```
+//!
+//! for the velocities `w` of the motions: a row and a column each beside those of the nodes. `f` is evaluated in the sum `f + N . r`, in
+//! which the contact forces cancel: with `s = m / k' + N . K N` it is `s w + N . K V(x)` but for known terms, symmetric with the rest, and
+//! not small where a light obstacle rests on a stiff body. Of each residual `w` is eliminated by this sum, and so it is of the linear
+//! equations of a Newton iteration, whose matrix is `K - K N s^-1 N . K` and the slopes of the laws. The nodal residual is then the only
+//! one; where it vanishes, so does `f`.
+//!
+//! An obstacle without mass that touches nothing has no equation for its velocity. It is moved until its force presses it against the body.
+
+use crate::{
+    error::{Error, Result},
+    fem::effect::{Contact, LoadedMotion},
+    linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
+};
+use std::fmt::Write;
+
+/// Evaluations of the velocities of one residual.
+pub(super) const EVALUATIONS: usize = 6;
+/// An evaluation that leaves more than this share of the unbalanced forces has met their rounding errors.
+const LEAST_DECREASE: f64 = 0.5;
+/// Share of the tolerance of nodal forces to which velocities are evaluated.
+const SHARE: f64 = 0.01;
+/// Share of the terms of an equation that is their rounding error.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// The unbalanced force on an obstacle relative to the largest of its terms, as a multiple of the tolerance of steps, above which its
+/// motion is not solved.
+const OBSTACLE_SHARE: f64 = 10.0;
+
+/// The motions of all contacts.
+#[derive(Default)]
+pub struct ObstacleMotions {
+    motions: Vec<Motion>,
+    /// `s` by rows.
+    slopes: Vec<f64>,
+    /// The residual norm in N at which the nodal equations count as solved.
+    tolerance: f64,
+    /// A contact that has touched although its unknowns do not follow the obstacle.
+    touched: Option<usize>,
+    /// One that has parted although they do, and whether this is still to be acted on.
+    parted: Option<usize>,
+    may_part: bool,
+    /// For each motion the last `f + N . r`, the last `f` and the largest of its terms, and the largest of the first relative to the accuracy.
+    values: Vec<f64>,
+    unbalanced: Vec<[f64; 2]>,
+    largest: f64,
+    work: Vec<f64>,
+}
+
+/// One motion.
+struct Motion {
+    /// The numbers of the contact and of the motion of its obstacle.
+    place: [usize; 2],
+    /// `N`, and `K N` with the derivatives of forces of cells.
+    velocities: DistributedVector,
+    forces: DistributedVector,
+    /// The norm of `N`.
+    size: f64,
+    /// `m / k'`.
+    inertia: f64,
+    /// The change of its velocity in the next iteration, if nothing holds it.
+    approach: Option<f64>,
+}
+
+impl ObstacleMotions {
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.motions.is_empty()
+    }
+
+    /// Starts the solution of equations to this residual norm in N from velocities `start`: sets the columns for the contacts as they
+    /// are; `multiply` is the product with `K`. Collective.
+    pub(super) fn start<const D: usize>(
+        &mut self,
+        session: &Session,
+        contacts: &mut [Contact<D>],
+        start: &DistributedVector,
+        tolerance: f64,
+        multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
+    ) -> Result<()> {
+        (self.tolerance, self.may_part) = (tolerance, true);
+        if contacts.iter().any(|contact| contact.obstacle.is_some()) {
+            find_contacts(session, contacts, start)?;
+        }
+        self.set_columns(session, contacts, start, multiply)
+    }
+
+    /// Lets the unknowns of a contact follow its obstacle if they have touched unexpectedly, and no longer if they have parted; returns
+    /// whether there is such a contact. Collective.
+    pub(super) fn follow_new_contacts<const D: usize>(
+        &mut self,
+        session: &Session,
+        contacts: &mut [Contact<D>],
+        start: &DistributedVector,
+        multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
+    ) -> Result<bool> {
+        if let Some(contact) = self.parted.take() {
+            self.may_part = false;
+            contacts[contact].follow_obstacle(false);
+            for number in 0..2 {
+                let Some(motion) = contacts[contact].driven_mut(number) else { continue };
+                let free = motion.velocity() + motion.change_to_free();
+                if free.is_finite() {
+                    motion.set_velocity(free);
+                }
+            }
+            session.agree(contacts[contact].place_obstacle())?;
+        } else if let Some(contact) = self.touched.take() {
+            contacts[contact].follow_obstacle(true);
+        } else {
+            return Ok(false);
+        }
+        self.set_columns(session, contacts, start, multiply)?;
+        Ok(true)
+    }
+
+    fn set_columns<const D: usize>(
+        &mut self,
+        session: &Session,
+        contacts: &[Contact<D>],
+        like: &DistributedVector,
+        multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
+    ) -> Result<()> {
+        (self.touched, self.parted) = (None, None);
+        let driven = contacts.iter().enumerate().flat_map(|(contact, laws)| {
+            laws.driven().into_iter().enumerate().filter_map(move |(number, motion)| {
+                motion.map(|motion| ([contact, number], motion.inertia()))
+            })
+        });
+        for (at, (place, inertia)) in driven.enumerate() {
+            if at == self.motions.len() {
+                let (velocities, forces) = (like.like()?, like.like()?);
+                self.motions.push(Motion { place, velocities, forces, size: 0.0, inertia, approach: None });
+            }
+            let motion = &mut self.motions[at];
+            (motion.place, motion.inertia, motion.approach) = (place, inertia, None);
+            let [contact, number] = place;
+            motion.velocities.fill(0.0)?;
+            contacts[contact].add_motion(number, &mut motion.velocities.owned_mut()?);
+            motion.size = motion.velocities.norm()?;
+        }
+        if self.is_empty() {
+            return Ok(());
+        }
+        self.linearise(session, multiply)
+    }
+
+    /// Sets `K N` and the slopes; `multiply` is the product with `K` and the derivatives of forces of cells. Collective.
+    pub(super) fn linearise(
+        &mut self,
+        session: &Session,
+        mut multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
+    ) -> Result<()> {
+        let count = self.motions.len();
+        self.motions.iter_mut().try_for_each(|motion| multiply(&motion.velocities, &mut motion.forces))?;
+        self.work.clear();
+        for (row, column) in (0..count * count).map(|at| (at / count, at % count)) {
+            self.work.push(own_dot(&self.motions[row].velocities, &self.motions[column].forces)?);
+        }
+        self.slopes = session.sum_of_lists(&self.work);
+        (0..count).for_each(|at| self.slopes[at * count + at] += self.motions[at].inertia);
+        Ok(())
+    }
+
+    /// Evaluates the equations of the motions at a nodal residual `r` in N, whose velocities have ghosts where contacts need them, and
+    /// changes their velocities accordingly; returns whether the residual is to be evaluated anew. Collective.
+    pub(super) fn update<const D: usize>(
+        &mut self,
+        session: &Session,
+        contacts: &mut [Contact<D>],
+        (velocity, residual): (&[f64], &DistributedVector),
+        evaluation: usize,
+    ) -> Result<bool> {
+        let count = self.motions.len();
+        self.work.clear();
+        for Motion { place: [contact, number], .. } in &self.motions {
+            self.work.push(contacts[*contact].resultants(velocity)[*number]);
+        }
+        for motion in &self.motions {
+            self.work.push(own_dot(&motion.velocities, residual)?);
+        }
+        for Motion { place: [contact, _], .. } in &self.motions {
+            let laws = &mut contacts[*contact];
+            let is_new = laws.follow_along_new_tangents() || (!laws.follows_obstacle() && laws.has_tractions());
+            self.work.push(f64::from(u8::from(is_new)));
+        }
+        let sums = session.sum_of_lists(&self.work);
+        if let Some(at) = sums[2 * count..].iter().position(|touching| *touching > 0.0) {
+            self.touched = Some(self.motions[at].place[0]);
+            return Err(Error::Failed(NO_CONTACT.into()));
+        }
+        (self.values.clear(), self.unbalanced.clear());
+        let mut largest = 0.0;
+        for (at, Motion { place: [contact, number], size, .. }) in self.motions.iter().enumerate() {
+            let Some(motion) = contacts[*contact].driven_mut(*number) else { continue };
+            let [open, terms] = motion.unbalanced(sums[at]);
+            let value = open + sums[count + at];
+            let enough = f64::max(SHARE * self.tolerance * size, ROUNDING * terms);
+            self.values.push(value);
+            self.unbalanced.push([open, terms]);
+            largest = if value == 0.0 { largest } else { f64::max(largest, value.abs() / enough) };
+            if !value.is_finite() {
+                largest = f64::NAN;
+            }
+        }
+        let is_slow = evaluation > 0 && largest > LEAST_DECREASE * self.largest;
+        self.largest = largest;
+        if largest <= 1.0 || !largest.is_finite() || is_slow || evaluation + 1 == EVALUATIONS {
+            return Ok(false);
+        }
+        self.solve(|_| true);
+        let mut placed = Ok(());
+        for (Motion { place: [contact, number], .. }, change) in self.motions.iter().zip(&self.values) {
+            if let Some(motion) = contacts[*contact].driven_mut(*number) {
+                motion.set_velocity(motion.velocity() - change);
+            }
+        }
+        for contact in contacts.iter_mut() {
+            placed = placed.and_then(|()| contact.place_obstacle());
+        }
+        session.agree(placed)?;
+        Ok(true)
+    }
+
+    /// Replaces the values by `s^-1` times them for these motions, and by 0 for all others.
+    fn solve(&mut self, is_in: impl Fn(&Motion) -> bool) {
+        let count = self.motions.len();
+        self.work.clone_from(&self.slopes);
+        for (at, _) in self.motions.iter().enumerate().filter(|(_, motion)| !is_in(motion)) {
+            for other in 0..count {
+                self.work[at * count + other] = f64::from(u8::from(other == at));
+                if other != at {
+                    self.work[other * count + at] = 0.0;
+                }
+            }
+            self.values[at] = 0.0;
+        }
+        solve_dense(&mut self.work, &mut self.values);
+    }
+
+    /// Finds the motions that nothing holds, at velocities of nodes and derivatives of laws of the last linearisation, and how they are to
+    /// move; fails if they cannot come into contact. Collective.
+    pub(super) fn find_loose<const D: usize>(
+        &mut self,
+        session: &Session,
+        contacts: &[Contact<D>],
+        velocity: &[f64],
+    ) -> Result<()> {
+        for (at, motion) in self.motions.iter_mut().enumerate() {
+            motion.approach = None;
+            let [contact, number] = motion.place;
+            let laws = &contacts[contact];
+            let [grip, area] = session.sum([laws.grip(number), laws.area()]);
+            if grip > 0.0 {
+                continue;
+            }
+            let driving = laws.driven()[number].map_or(0.0, |motion| motion.driving());
+            let [open, _] = self.unbalanced.get(at).copied().unwrap_or([-driving, 0.0]);
+            if open == 0.0 {
+                motion.approach = Some(0.0);
+                continue;
+            }
+            let (sign, open) = (-open.signum(), open.abs());
+            let nearest = if number == 0 { laws.change_to_touch(velocity, sign) } else { f64::INFINITY };
+            let nearest = -session.largest([-nearest])[0];
+            let change = if motion.inertia * nearest < open {
+                nearest + (open - motion.inertia * nearest) / (motion.inertia + laws.scale * area)
+            } else {
+                // Relative to a distant obstacle, velocities of the body would be rounding errors.
+                if number == 0 && self.may_part && laws.follows_obstacle() {
+                    self.parted = Some(contact);
+                    return Err(Error::Failed(NO_CONTACT.into()));
+                }
+                open / motion.inertia
+            };
+            if !change.is_finite() {
+                return Err(Error::Failed(NO_CONTACT.into()));
+            }
+            motion.approach = Some(sign * change);
+        }
+        Ok(())
+    }
+
+    /// Adds to a right-hand side of the linear equations what the motions that nothing holds contribute.
+    pub(super) fn add_approach(&self, forces: &mut DistributedVector) -> Result<()> {
+        for motion in &self.motions {
+            if let Some(change) = motion.approach.filter(|change| *change != 0.0) {
+                forces.add_scaled(change, &motion.forces)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds to the forces `K z` of a change `z` of the velocities relative to obstacles those of the change `w` that follows. Collective.
+    pub(super) fn add_changes(&mut self, session: &Session, forces: &mut DistributedVector) -> Result<()> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        self.work.clear();
+        for motion in &self.motions {
+            self.work.push(own_dot(&motion.velocities, forces)?);
+        }
+        self.values = session.sum_of_lists(&self.work);
+        self.solve(|motion| motion.approach.is_none());
+        for (motion, change) in self.motions.iter().zip(&self.values) {
+            if *change != 0.0 {
+                forces.add_scaled(-change, &motion.forces)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The velocities of all motions.
+    pub(super) fn velocities<const D: usize>(&self, contacts: &[Contact<D>]) -> Vec<f64> {
+        let velocity = |[contact, number]: [usize; 2]| contacts[contact].driven()[number].map_or(0.0, LoadedMotion::velocity);
+        self.motions.iter().map(|motion| velocity(motion.place)).collect()
+    }
+
+    /// Sets what [`velocities`](Self::velocities) gave.
+    pub(super) fn set_velocities<const D: usize>(&self, contacts: &mut [Contact<D>], velocities: &[f64]) -> Result<()> {
+        for (Motion { place: [contact, number], .. }, velocity) in self.motions.iter().zip(velocities) {
+            contacts[*contact].driven_mut(*number).into_iter().for_each(|motion| motion.set_velocity(*velocity));
+        }
+        contacts.iter_mut().try_for_each(Contact::place_obstacle)
+    }
+
+    /// The norm in m/s of the velocities by which nodes follow obstacles since the start of the step: velocities are rounded as differences
+    /// from them.
+    pub(super) fn speed<const D: usize>(&self, contacts: &[Contact<D>]) -> f64 {
+        let change =
+            |[contact, number]: [usize; 2]| contacts[contact].driven()[number].map_or(0.0, |m| m.change());
+        self.motions.iter().map(|motion| motion.size * change(motion.place).abs()).sum()
+    }
+
+    /// Subtracts from velocities those of the obstacles that they follow, since the start of the step.
+    pub(super) fn subtract<const D: usize>(
+        &self,
+        contacts: &[Contact<D>],
+        velocity: &mut DistributedVector,
+    ) -> Result<()> {
+        for Motion { place: [contact, number], velocities, .. } in &self.motions {
+            if let Some(motion) = contacts[*contact].driven()[*number] {
+                velocity.add_scaled(-motion.change(), velocities)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The reason why the motions are not solved, given the norm of the nodal residual in N and the relative tolerance of steps.
+    pub(super) fn failure(&self, residual: f64, relative: f64) -> Option<String> {
+        let is_open = |([open, terms], motion): (&[f64; 2], &Motion)| {
+            let share = f64::max(relative * terms, motion.size * residual.max(self.tolerance));
+            !(open.abs() <= OBSTACLE_SHARE * share)
+        };
+        if !self.unbalanced.iter().zip(&self.motions).any(is_open) {
+            return None;
+        }
+        let mut text = NO_BALANCE.to_owned();
+        for (at, [open, _]) in self.unbalanced.iter().enumerate() {
+            let _ = write!(text, "{}{open:.1e}", if at == 0 { ": " } else { ", " });
+        }
+        Some(text + " N or N m remain")
+    }
+}
+
+const NO_BALANCE: &str = "no motion of the obstacles balances their forces and moments";
+const NO_CONTACT: &str = "no motion of the obstacles balances their forces and moments: an obstacle without mass touches nothing that holds \
+     it; let the forces press the obstacles against the body, or give them a mass; an obstacle that a moment turns may need a \
+     moment_of_inertia";
+
+/// Lets the unknowns of the contacts follow their obstacles, except those that are apart at the velocities from which a step starts.
+/// Collective.
+fn find_contacts<const D: usize>(
+    session: &Session,
+    contacts: &mut [Contact<D>],
+    start: &DistributedVector,
+) -> Result<()> {
+    let velocity = start.owned()?;
+    for contact in contacts.iter_mut().filter(|contact| contact.obstacle.is_some()) {
+        let mut touches = contact.has_tractions() || contact.would_touch(&velocity);
+        let [along, _] = contact.driven();
+        if let Some(change) = along.map(LoadedMotion::change_to_free) {
+            touches |= contact.change_to_touch(&velocity, change.signum()) <= change.abs();
+        }
+        contact.follow_obstacle(session.total(usize::from(touches)) > 0);
+        contact.follow_along_tangents(session, &velocity);
+    }
+    Ok(())
+}
+
+/// The part of a scalar product on this rank.
+fn own_dot(one: &DistributedVector, other: &DistributedVector) -> Result<f64> {
+    Ok(one.owned()?.iter().zip(&*other.owned()?).map(|(a, b)| a * b).sum())
+}
+
+/// Replaces the right-hand side by the solution of equations with this matrix, given by rows; by 0 where a row has no entries.
+fn solve_dense(matrix: &mut [f64], right_hand_side: &mut [f64]) {
+    let count = right_hand_side.len();
+    for step in 0..count {
+        let row = (step..count).fold(step, |best, row| {
+            if matrix[row * count + step].abs() > matrix[best * count + step].abs() { row } else { best }
+        });
+        if matrix[row * count + step] == 0.0 {
+            matrix[step * count..][..count].fill(0.0);
+            continue;
+        }
+        (0..count).for_each(|column| matrix.swap(row * count + column, step * count + column));
+        right_hand_side.swap(row, step);
+        for below in step + 1..count {
+            let factor = matrix[below * count + step] / matrix[step * count + step];
+            (step..count)
+                .for_each(|column| matrix[below * count + column] -= factor * matrix[step * count + column]);
+            right_hand_side[below] -= factor * right_hand_side[step];
+        }
+    }
+    for step in (0..count).rev() {
+        let pivot = matrix[step * count + step];
+        let known: f64 =
+            (step + 1..count).map(|column| matrix[step * count + column] * right_hand_side[column]).sum();
+        right_hand_side[step] = if pivot == 0.0 { 0.0 } else { (right_hand_side[step] - known) / pivot };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_systems_are_solved_with_pivots_and_empty_rows() {
+        let mut value = [5.0, 2.0, 7.0];
+        solve_dense(&mut [0.0, 2.0, 1.0, 1.0, 0.0, 0.0, 3.0, 0.0, -1.0], &mut value);
+        assert!(value.iter().zip([2.0, 3.0, -1.0]).all(|(found, right)| (found - right).abs() < 1e-12), "{value:?}");
+        let mut value = [3.0, 4.0];
+        solve_dense(&mut [0.0, 0.0, 0.0, 2.0], &mut value);
+        assert_eq!(value, [0.0, 2.0], "a motion without an equation keeps its velocity");
+    }
+}
