@@ -191,7 +191,7 @@ fn pressed(session: &Session, degrees: f64, laws: [&str; 2], order: usize) -> Ve
 }
 
 /// The scenario `contact_edges`: rigid walls and friction at an edge of any angle.
-pub fn edges(session: &Session) {
+fn edges(session: &Session) {
     let rigid = "normal.unilateral = {}";
     let stiff = "normal.compliance = { stiffness = 1e8 }";
     let springs = "normal.compliance = { stiffness = 500 }";
@@ -244,16 +244,16 @@ pub fn edges(session: &Session) {
 
 #[test]
 fn friction_and_rigid_walls_act_at_edges_of_any_angle() {
-    run_on(&[1, 2], "contact_edges");
+    run_on(&[1, 2], |world| edges(&world.session));
 }
 
 /// The scenario `half_models`.
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     compare::<2, 4>(session, &bowl(crossed([3, 2])), &["left"]);
     compare::<3, 6>(session, &bowl(brick([2, 2, 2])), &["left", "front"]);
 }
 
 #[test]
 fn half_and_quarter_models_with_friction_on_a_curved_boundary_are_the_whole_body() {
-    run_on(&[1, 2, 3], "half_models");
+    run_on(&[1, 2, 3], |world| all(&world.session));
 }
