@@ -408,3 +408,38 @@ fn adaptive_steps_of_the_default_tolerance_follow_stick_slip() {
         assert!((found - expected).abs() < 0.02 * size, "{found} instead of {expected} in a range of {size}");
     }
 }
+
+#[test]
+fn the_state_of_friction_follows_a_varying_velocity_with_the_second_order_of_the_schemes() {
+    for scheme in ["bdf2", "midpoint"] {
+        let displacement = |steps: u32| {
+            let case = Case::of("sliding_block")
+                .set("mesh", "{ rectangle = { size = [0.1, 0.02], cells = [4, 2] } }")
+                .set(
+                    "material",
+                    "{ hypothesis = 'plane_strain', elasticity = { youngs_modulus = 1e6, poisson_ratio = 0.0 }, \
+                     viscosity = { volumetric = 300.0, shear = 300.0 } }",
+                )
+                .without("initial")
+                .without("body_force")
+                .set("support", "[{ on = ['top'], fix = 'all' }]")
+                .set(
+                    "contact",
+                    "[{ on = ['bottom'], normal.unilateral = {}, friction.rate_and_state = { reference = 0.6, \
+                     velocity = 0.5, direct = 0.02, evolution = 0.1, distance = 0.3 }, obstacle.plane = { \
+                     point = ['0.5*t + 0.05*sin(5*t)', '4e-6*(1 - cos(3*t))'], normal = [0, 1] } }]",
+                )
+                .set("output.probe", "[{ name = 'centre', point = [0.05, 0] }]")
+                .set("time", &format!("{{ scheme = '{scheme}', end = 1.0, step = {} }}", 1.0 / f64::from(steps)));
+            let case = if scheme == "midpoint" {
+                case.set("material.density", "1000.0").set("contact.0.redistribute_mass", "true")
+            } else {
+                case
+            };
+            centre(&case.run(1)).last("displacement_x")
+        };
+        let [long, middle, short] = [100, 200, 400].map(displacement);
+        let order = ((long - middle) / (middle - short)).abs().log2();
+        assert!((order - 2.0).abs() < 0.3, "{scheme}: {order}, {long} {middle} {short} m");
+    }
+}
