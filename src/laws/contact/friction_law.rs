@@ -122,7 +122,50 @@ pub trait FrictionBound {
             coefficient: if pressure > 0.0 { self.coefficient(speed) } else { 0.0 },
         }
     }
+
+    /// The point of the graph of the free part `v` of a sliding velocity whose other part, across to it, has this given speed in m/s: with
+    /// `V = hypot(v, held)`, `c v + g(V) v / V = s`, for an `s` that is not negative and a `c` above the steepest decrease.
+    fn resolve_beside(&self, s: f64, c: f64, pressure: f64, held: f64) -> Slip {
+        if held == 0.0 {
+            return self.resolve(s, c, pressure);
+        }
+        let at = |speed: f64| {
+            let whole = speed.hypot(held);
+            let (bound, along, across) = (self.bound(whole, pressure), speed / whole, held / whole);
+            [bound * along, self.slope(whole, pressure) * along * along + bound / whole * across * across]
+        };
+        let mut speed = s / (c + self.bound(held, pressure) / held);
+        let [mut low, mut high] = [0.0, s / c];
+        for _ in 0..ITERATIONS {
+            let [traction, slope] = at(speed);
+            let open = c * speed + traction - s;
+            if open > 0.0 {
+                high = speed;
+            } else {
+                low = speed;
+            }
+            let newton = speed - open / (c + slope);
+            let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
+            let change = (next - speed).abs();
+            speed = next;
+            if change <= 2.0 * f64::EPSILON * next {
+                break;
+            }
+        }
+        let [traction, slope] = at(speed);
+        let derivative = 1.0 / (c + slope);
+        if c * derivative < STICKS {
+            return Slip { speed, traction, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
+        }
+        let whole = speed.hypot(held);
+        let coefficient = if pressure > 0.0 { self.coefficient(whole) * speed / whole } else { 0.0 };
+        Slip { speed, traction, derivative, slope, coefficient }
+    }
 }
+
+/// A point whose velocity follows the parameter by less than this share of `1 / c` counts as sticking: it creeps so slowly that the change
+/// of its velocity has no effect on Newton's method, while its slope would only spoil the condition of the matrix.
+pub(super) const STICKS: f64 = 1e-8;
 
 /// The root of `c v + g(v) = s`, whose left side is increasing and convex, by Newton's method with bisection where it leaves the
 /// bracket.
@@ -178,6 +221,7 @@ macro_rules! friction_laws {
                 history_measure(history: f64) -> f64;
                 own_faults() -> Vec<crate::laws::law::LawFault>;
                 resolve(s: f64, c: f64, pressure: f64) -> Slip;
+                resolve_beside(s: f64, c: f64, pressure: f64, held: f64) -> Slip;
             }
 
             /// See [`FrictionBound::start_step`].

@@ -30,7 +30,7 @@
 //! `1 + max(0, ln(theta_0 / k)) + 1/e` for the slip law.
 
 use crate::laws::{
-    contact::friction_law::{FrictionBound, FrictionHistory, Slip},
+    contact::friction_law::{FrictionBound, FrictionHistory, STICKS, Slip},
     law::LawFault,
     step::Blend,
 };
@@ -97,9 +97,6 @@ pub struct StateStep {
 const ITERATIONS: usize = 200;
 /// The logarithm of the smallest velocity.
 const LEAST: f64 = -700.0;
-/// A point whose velocity follows the parameter by less than this share of `1 / c` counts as sticking: it creeps so slowly that the change
-/// of its velocity has no effect on Newton's method, while its slope would only spoil the condition of the matrix.
-const STICKS: f64 = 1e-8;
 /// Share of the tolerance of adaptive steps for the state. Stick-slip lives on a balance of a growth per cycle that is a few per cent with a
 /// loss that the error of the state causes in each step: with this share, the default tolerance gives the range of friction to 1 %
 /// and the period to 2 % under `implicit_euler`.
