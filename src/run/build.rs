@@ -80,8 +80,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         let State { displacement, velocity, .. } = &mut state;
         let started = motion.start_displacement(&mut displacement.owned_mut()?);
         let step = job.time.step;
-        session
-            .agree(started.and(motion.start_velocity(step, |_, _| None, &mut velocity.owned_mut()?)))?;
+        session.agree(started.and(motion.start_velocity(step, |_, _| None, &mut velocity.owned_mut()?)))?;
     }
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;

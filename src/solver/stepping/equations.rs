@@ -82,7 +82,8 @@ impl Floor {
 const MANY_ITERATIONS: usize = 15;
 
 /// The message of linear equations that neither CG nor GMRES solve.
-const NO_DIRECTION: &str = "the linearised equations are indefinite or singular, and GMRES does not solve them";
+const NO_DIRECTION: &str =
+    "the linearised equations are indefinite or singular, and GMRES does not solve them";
 
 /// The residual decreased to less than this share of the last one unless it stagnates.
 const STAGNATION: f64 = 0.5;

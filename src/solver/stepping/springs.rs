@@ -77,7 +77,11 @@ impl Springs {
         let total = body.mesh.total_nodes as f64;
         let first = body.mesh.first_node;
         // Where contact nodes have no mass, their rows do not show the inertia of the body.
-        let inertia = if body.redistributed_mass.is_some() { sum_of_blocks::<D>(session, &rows) } else { vec![0.0; D * D] };
+        let inertia = if body.redistributed_mass.is_some() {
+            sum_of_blocks::<D>(session, &rows)
+        } else {
+            vec![0.0; D * D]
+        };
         let stiffness = |&(node, motion): &(usize, [f64; D])| {
             let range = rows.offsets[node]..rows.offsets[node + 1];
             let (mut own, mut together) = (0.0, 0.0);
