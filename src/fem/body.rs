@@ -11,8 +11,8 @@ use crate::{
     fem::{
         effect::{
             Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
-            HistoryStore, KINETIC, Load, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, RedistributedMass,
-            STORED_IN_CONTACT, SUPPORT_REACTION, Step, StressError, SupportMotion, SurfaceEffect,
+            HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, Quantity,
+            RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect,
             SurfaceForce, Term,
         },
         space::{Batch, CellMatrix, Geometry, Held, Needs, Nodal, assemble, facet_points},
@@ -27,7 +27,7 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-use std::{cell::RefCell, collections::BTreeSet};
+use std::cell::RefCell;
 
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
@@ -576,57 +576,41 @@ impl<const D: usize, const S: usize> Body<D, S> {
     fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
         self.effects.iter_mut().for_each(|effect| effect.visit_histories(visit));
         self.surface_effects.iter_mut().for_each(|effect| effect.visit_histories(visit));
+        self.contacts.iter_mut().for_each(|contact| contact.visit_histories(visit));
+        visit(&mut self.elastic_support);
     }
 
     /// The converged histories of cells, as means over their points.
     pub fn cell_histories(&self) -> impl Iterator<Item = History<'_>> {
         let shares = self.point_shares();
         let stores = self.effects.iter().flat_map(|effect| effect.histories());
-        stores.map(move |store| store.history().means(&shares))
+        stores.filter_map(|store| store.values(Moment::Last)).map(move |history| history.means(&shares))
     }
 
-    /// The converged histories of nodes.
+    /// The converged histories of nodes, without constant ones.
     pub fn node_histories(&self) -> impl Iterator<Item = History<'_>> {
-        let of_effects = self.surface_effects.iter().flat_map(|effect| effect.histories());
-        of_effects.map(|store| store.history()).chain(self.contact_histories(false))
+        one_for_each_quantity(self.surface_stores().filter_map(|store| store.values(Moment::Last)))
     }
 
-    /// The histories that friction and wear keep at nodes, one for each name.
-    fn contact_histories(&self, all: bool) -> impl Iterator<Item = History<'_>> {
-        let names: BTreeSet<_> =
-            self.contacts.iter().flat_map(|contact| contact.history_names(all)).collect();
-        names.into_iter().map(|name| {
-            let mut values = vec![0.0; self.mesh.owned];
-            let mut bytes = 0;
-            for (node, value) in self.contacts.iter().flat_map(|contact| contact.history(name)) {
-                values[node] = value;
-                bytes += size_of::<f64>();
-            }
-            History { name, width: 1, points: 1, values: values.into(), bytes }
-        })
+    fn surface_stores(&self) -> impl Iterator<Item = &dyn HistoryStore> {
+        let of_effects = self.surface_effects.iter().flat_map(|effect| effect.histories());
+        of_effects.chain(self.contacts.iter().flat_map(Contact::histories))
     }
 
     /// The histories of cells at all their points: the converged ones and, where they are kept, those before the last step.
     pub fn all_cell_histories(&self) -> impl Iterator<Item = History<'_>> {
-        self.effects.iter().flat_map(|effect| all_of(effect.histories()))
+        self.effects.iter().flat_map(|effect| effect.histories()).flat_map(both)
     }
 
     /// The histories of nodes, likewise.
     pub fn all_node_histories(&self) -> impl Iterator<Item = History<'_>> {
-        self.surface_effects
-            .iter()
-            .flat_map(|effect| all_of(effect.histories()))
-            .chain(self.contact_histories(true))
-            .chain(self.elastic_support.reaction_history())
+        let stores = self.surface_stores().chain([&self.elastic_support as &dyn HistoryStore]);
+        one_for_each_quantity(stores.flat_map(both))
     }
 
-    /// Restores the saved values of the history of this name.
-    pub fn restore_history(&mut self, name: &str, values: &[f64]) {
-        self.visit_histories(&mut |history| history.restore(name, values));
-        self.contacts.iter_mut().for_each(|contact| contact.restore_history(name, values));
-        if name == SUPPORT_REACTION {
-            self.elastic_support.reactions = values.to_vec();
-        }
+    /// Restores the saved values of a quantity.
+    pub fn restore_history(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        self.visit_histories(&mut |history| history.restore(quantity, moment, values));
     }
 
     /// Directions other than axes in which supports hold this rank's nodes or resist their motion, each with its node.
@@ -750,10 +734,21 @@ impl Called {
     }
 }
 
-/// Histories in the order in which checkpoints hold them: the converged ones, then those before the last step.
-fn all_of<'a>(stores: Vec<&'a dyn HistoryStore>) -> impl Iterator<Item = History<'a>> {
-    let earlier: Vec<_> = stores.iter().filter_map(|store| store.earlier_history()).collect();
-    stores.into_iter().map(|store| store.history()).chain(earlier)
+/// The values after the last step and, where they are kept, before it.
+fn both(store: &dyn HistoryStore) -> impl Iterator<Item = History<'_>> {
+    [Moment::Last, Moment::Earlier].into_iter().filter_map(|moment| store.values(moment))
+}
+
+/// Joins histories of the same quantity, which several contacts keep at their nodes.
+fn one_for_each_quantity<'a>(all: impl Iterator<Item = History<'a>>) -> impl Iterator<Item = History<'a>> {
+    let mut joined: Vec<History<'a>> = Vec::new();
+    for history in all {
+        match joined.iter_mut().find(|other| other.name() == history.name()) {
+            Some(other) => other.join(history),
+            None => joined.push(history),
+        }
+    }
+    joined.into_iter()
 }
 
 /// Calls a function with the fields of the converged state.

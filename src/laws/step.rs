@@ -11,6 +11,39 @@ pub struct Step {
     pub previous_length: f64,
 }
 
+/// A quantity that is kept from one step to the next, by its names in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Quantity([&'static str; 2]);
+
+/// Which values of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moment {
+    /// Those after the last step.
+    Last,
+    /// Those before it.
+    Earlier,
+}
+
+impl Quantity {
+    /// A quantity with these names of its values after the last step and before it.
+    pub const fn named(names: [&'static str; 2]) -> Self {
+        Self(names)
+    }
+
+    /// The name of its values in checkpoints and field files.
+    pub const fn name(self, moment: Moment) -> &'static str {
+        self.0[moment as usize]
+    }
+}
+
+/// The quantity of this name.
+macro_rules! quantity {
+    ($name:literal) => {
+        $crate::laws::step::Quantity::named([$name, concat!("previous_", $name)])
+    };
+}
+pub(crate) use quantity;
+
 /// The start of an implicit step, which equals a step of implicit Euler of length `k'` from a blend of the last two states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blend {

@@ -6,8 +6,9 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, LoadedObstacle,
-            Resistances, SupportMotion, Supports, Traction, choose_unknowns, effects, surface_effects,
+            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, LoadedObstacle, Moment,
+            Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
+            surface_effects,
         },
         space::{
             Geometry, Held, SurfacePoint, cell_rule, facets, place_in_cell, surface_means, surface_points,
@@ -97,7 +98,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.keep_earlier();
     }
     if !initial_stress.is_empty() {
-        body.restore_history("viscoplastic_history", initial_stress.as_flattened());
+        body.restore_history(STRESS_OF_FLOW, Moment::Last, initial_stress.as_flattened());
     }
     Ok((body, state))
 }

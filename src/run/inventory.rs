@@ -29,7 +29,7 @@ impl Inventory {
         let mut history_bytes = BTreeMap::new();
         for history in body.all_cell_histories().chain(body.all_node_histories()) {
             let bytes = session.total(history.bytes);
-            history_bytes.insert(history.name.to_owned(), bytes as u64);
+            history_bytes.insert(history.name().to_owned(), bytes as u64);
         }
         let points: usize = body.contacts.iter().map(|c| c.point_count()).sum();
         let with_friction: usize = body.contacts.iter().map(|c| c.friction_point_count()).sum();

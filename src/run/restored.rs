@@ -6,7 +6,11 @@ use super::{
 };
 use crate::{
     error::{Error, Exit, Result},
-    fem::{body::Body, effect::SUPPORT_REACTION, state::State},
+    fem::{
+        body::Body,
+        effect::{Moment, SUPPORT_REACTION},
+        state::State,
+    },
     io::output::{
         checkpoint::{self, Identity},
         checkpoint_folder::{checkpoint_path, list},
@@ -124,7 +128,7 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         body.elastic_support.reactions = vec![0.0; body.mesh.owned * D];
     }
     let mut found = checkpoint::transfer(session, &file, &physics, body, state)?;
-    found.at_rest.retain(|name| name != SUPPORT_REACTION);
+    found.at_rest.retain(|name| name != SUPPORT_REACTION.name(Moment::Last));
     let handover = take_over(session, &found.physics, body, state)?;
     let moved = moved_before(session, &found.physics, &body.mesh, &state.velocity)?;
     let before: Vec<f64> = session.agree(state.velocity.owned())?.to_vec();

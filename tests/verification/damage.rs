@@ -43,7 +43,7 @@ fn job<const D: usize>(hypothesis: &str, damage: &str, steps: usize) -> String {
 /// The damage of all cells here.
 fn damage<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64> {
     let histories = run.body.cell_histories();
-    histories.filter(|h| h.name == "damage").flat_map(|h| h.values.into_owned()).collect()
+    histories.filter(|h| h.name() == "damage").flat_map(|h| h.values.into_owned()).collect()
 }
 
 fn held<const D: usize, const S: usize>(session: &Session, hypothesis: &str, mesh: &GlobalMesh<D>) {

@@ -40,8 +40,8 @@ impl Draw {
     }
 }
 
-/// A viscoplastic law; Drucker and Prager's needs three normal stresses.
-fn viscoplasticity(draw: &mut Draw, plane_stress: bool) -> String {
+/// A viscoplastic law.
+fn viscoplasticity(draw: &mut Draw) -> String {
     let (relaxation, bound) = (draw.between(1.0, 10.0), draw.between(0.0, 0.5));
     let metric = draw.one_of(&["elasticity", "compliance", "frobenius"]);
     let perzyna = |bound: f64, more: &str| {
@@ -50,9 +50,8 @@ fn viscoplasticity(draw: &mut Draw, plane_stress: bool) -> String {
         )
     };
     let laws = ["linear", "power", "hardening", "maxwell", "creep", "drucker_prager"];
-    // Those at the end most often: plane stress lacks the last one.
-    let last = if plane_stress { 4 } else { 5 };
-    match laws[(draw.0 as usize % 7).min(last)] {
+    // The last one most often.
+    match laws[(draw.0 as usize % 7).min(5)] {
         "power" => perzyna(bound + 0.2, ", exponent = 1.5"),
         "hardening" => perzyna(bound, &format!(", hardening_modulus = {}", draw.between(0.5, 10.0))),
         "maxwell" => format!(
@@ -71,7 +70,7 @@ fn viscoplasticity(draw: &mut Draw, plane_stress: bool) -> String {
     }
 }
 
-fn material(draw: &mut Draw, dynamic: bool, is_viscous: bool, plane_stress: bool) -> String {
+fn material(draw: &mut Draw, dynamic: bool, is_viscous: bool) -> String {
     let mut text = String::new();
     if dynamic {
         text += &format!("density = {}\n", draw.between(0.5, 5.0));
@@ -86,7 +85,7 @@ fn material(draw: &mut Draw, dynamic: bool, is_viscous: bool, plane_stress: bool
         text += &format!("viscosity = {{ volumetric = {volumetric}, shear = {shear} }}\n");
     }
     if elastic && draw.between(0.0, 1.0) < 0.7 {
-        text += &format!("viscoplasticity.{}\n", viscoplasticity(draw, plane_stress));
+        text += &format!("viscoplasticity.{}\n", viscoplasticity(draw));
     }
     text
 }
@@ -201,7 +200,7 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
         job += &format!("hypothesis = \"{hypothesis}\"\n");
     }
     // Nothing else may resist where the boundary has no mass.
-    job += &material(draw, dynamic, is_midpoint, hypothesis == "plane_stress");
+    job += &material(draw, dynamic, is_midpoint);
     let weak = &mut Draw(number + 5000, 0);
     if job.contains("elasticity") && !is_midpoint && weak.flip() {
         let (threshold, viscosity) = (weak.between(0.0, 2e-3), weak.between(1e-4, 2e-3));

@@ -312,6 +312,7 @@ fn plane(session: &Session) {
     check::<2, 3>(session, "plane_stress", Law::Perzyna { metric: "compliance", exponent: 3 }, mesh);
     check::<2, 3>(session, "plane_stress", Law::Hardening { metric: "compliance" }, mesh);
     check::<2, 4>(session, "plane_strain", Law::Perzyna { metric: "elasticity", exponent: 2 }, mesh);
+    check::<2, 3>(session, "plane_stress", Law::DruckerPrager, mesh);
     check::<2, 4>(session, "plane_strain", Law::DruckerPrager, mesh);
 }
 

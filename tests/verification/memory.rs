@@ -41,7 +41,7 @@ fn job<const D: usize>(sides: &[&str], [rate, time]: [f64; 2]) -> String {
 fn pressures<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64> {
     let mut found = Vec::new();
     for history in run.body.node_histories() {
-        assert_eq!((history.name, history.width), ("memory_pressure", 1));
+        assert_eq!((history.name(), history.width), ("memory_pressure", 1));
         for (node, value) in history.values.iter().enumerate() {
             if run.body.mesh.nodes[node][D - 1].abs() < 1e-12 {
                 found.push(*value);

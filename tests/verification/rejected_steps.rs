@@ -21,7 +21,7 @@ fn all<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<(&'static 
     let fields = fields.map(|(name, field)| (name, field.owned().expect("values").to_vec()));
     let inside = run.body.cell_histories();
     let surface = run.body.node_histories();
-    let kept = inside.chain(surface).map(|history| (history.name, history.values.into_owned()));
+    let kept = inside.chain(surface).map(|history| (history.name(), history.values.into_owned()));
     fields.into_iter().chain(kept).collect()
 }
 

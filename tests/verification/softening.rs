@@ -84,7 +84,7 @@ fn derivatives(session: &Session, softening: &Softening, scheme: &str) {
 fn values(run: &Simulation<2, 4>, name: &str) -> Vec<f64> {
     let of_cells = run.body.cell_histories();
     let of_nodes = run.body.node_histories();
-    let all = of_cells.chain(of_nodes).filter(|h| h.name == name);
+    let all = of_cells.chain(of_nodes).filter(|h| h.name() == name);
     all.flat_map(|h| h.values.into_owned()).filter(|value| *value != 0.0).collect()
 }
 

@@ -172,7 +172,6 @@ fn contradictions(session: &Session) {
     }
 }
 
-/// The scenario `supports`.
 fn all(session: &Session) {
     in_dimension::<2, 4>(session, &crossed([4, 3]));
     in_dimension::<3, 6>(session, &brick([3, 2, 3]));

@@ -105,7 +105,7 @@ fn creep(session: &Session, scheme: &str, bounds: [f64; 2]) {
 fn history(run: &Simulation<2, 4>, name: &str) -> Vec<f64> {
     let of_cells = run.body.cell_histories();
     let of_nodes = run.body.node_histories();
-    of_cells.chain(of_nodes).filter(|h| h.name == name).flat_map(|h| h.values.into_owned()).collect()
+    of_cells.chain(of_nodes).filter(|h| h.name() == name).flat_map(|h| h.values.into_owned()).collect()
 }
 
 /// A fixed stretched block: damage `1 - exp(-r t)`, where `r` is the release rate above the threshold divided by the viscosity.

@@ -2,7 +2,7 @@
 
 use super::Body;
 use crate::fem::{
-    effect::{Effect, Phases},
+    effect::{Effect, Moment, Phases},
     space::{Needs, Simplex},
 };
 
@@ -62,8 +62,9 @@ impl Moved {
     /// Bytes of an effect's histories; [`History::bytes`](crate::fem::effect::History::bytes) includes the trial values.
     fn bytes<const D: usize, const S: usize>(self, effect: &dyn Effect<D, S>) -> usize {
         let stores = effect.histories();
-        let both: usize = stores.iter().map(|store| store.history().bytes).sum();
-        let earlier = stores.iter().filter_map(|store| store.earlier_history());
+        let both: usize =
+            stores.iter().filter_map(|store| store.values(Moment::Last)).map(|history| history.bytes).sum();
+        let earlier = stores.iter().filter_map(|store| store.values(Moment::Earlier));
         match self {
             Self::Nothing => 0,
             Self::Converged => both / 2,

@@ -1,6 +1,6 @@
 use super::{
     Curvature, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Role, Step, StressError,
-    SurfaceEffect, SurfaceForce, Tangents, evolution::Evolution, node_history::NodeHistory,
+    SurfaceEffect, SurfaceForce, Tangents, evolution::Evolution, node_history::NodeHistory, quantity,
 };
 use crate::{
     fem::space::{Nodal, SurfacePoint},
@@ -79,7 +79,7 @@ impl<const D: usize> Adhesion<D> {
             contacts,
             counts,
             points,
-            bonding: NodeHistory::new(["bonding", "previous_bonding"], nodes, owned, 1.0),
+            bonding: NodeHistory::new(quantity!("bonding"), nodes, owned, 1.0),
             slopes: Vec::new(),
         }
     }

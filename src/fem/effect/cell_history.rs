@@ -1,4 +1,4 @@
-use super::{Evaluation, History, HistoryStore};
+use super::{Evaluation, History, HistoryStore, Moment, Quantity};
 use crate::{
     fem::space::{CellRun, Geometry},
     linear_algebra::simd::Pack,
@@ -9,8 +9,7 @@ use std::borrow::Cow;
 /// storage.
 #[derive(Debug)]
 pub(super) struct CellHistory<const W: usize> {
-    name: &'static str,
-    earlier_name: &'static str,
+    quantity: Quantity,
     /// Whether the values before the last step are needed only by laws evaluated at the end of steps.
     is_earlier_for_end: bool,
     runs: Vec<CellRun>,
@@ -25,10 +24,9 @@ pub(super) struct CellHistory<const W: usize> {
 }
 
 impl<const W: usize> CellHistory<W> {
-    /// Zeros for the cells of the materials for which `keeps` holds. The names are those of the converged values and of the values
-    /// before the last step.
+    /// Zeros for the cells of the materials for which `keeps` holds.
     pub(super) fn new<const D: usize>(
-        [name, earlier_name]: [&'static str; 2],
+        quantity: Quantity,
         geometry: &Geometry<D>,
         keeps: impl Fn(usize) -> bool,
     ) -> Self {
@@ -42,8 +40,7 @@ impl<const W: usize> CellHistory<W> {
         let places = batches.map(place).collect();
         let zeros = vec![Pack::ZERO; kept as usize];
         Self {
-            name,
-            earlier_name,
+            quantity,
             is_earlier_for_end: false,
             runs: runs.clone(),
             points,
@@ -118,7 +115,7 @@ impl<const W: usize> CellHistory<W> {
         self.places.get(run).copied().flatten().map(|place| place as usize)
     }
 
-    fn written(&self, name: &'static str, values: &[Pack<W>], copies: usize) -> History<'_> {
+    fn written(&self, moment: Moment, values: &[Pack<W>], copies: usize) -> History<'_> {
         let cells = self.runs.last().map_or(0, |run| run.first + run.count);
         let mut all = vec![[0.0; W]; cells * self.points];
         let mut kept = 0;
@@ -130,7 +127,8 @@ impl<const W: usize> CellHistory<W> {
         }
         let bytes = copies * kept * size_of::<[f64; W]>();
         History {
-            name,
+            quantity: self.quantity,
+            moment,
             width: W * self.points,
             points: self.points,
             values: Cow::Owned(all.into_flattened()),
@@ -147,12 +145,11 @@ impl<const W: usize> CellHistory<W> {
 }
 
 impl<const W: usize> HistoryStore for CellHistory<W> {
-    fn history(&self) -> History<'_> {
-        self.written(self.name, &self.converged, 2)
-    }
-
-    fn earlier_history(&self) -> Option<History<'_>> {
-        self.earlier.as_ref().map(|values| self.written(self.earlier_name, values, 1))
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        Some(match moment {
+            Moment::Last => self.written(moment, &self.converged, 2),
+            Moment::Earlier => self.written(moment, self.earlier.as_ref()?, 1),
+        })
     }
 
     fn keep_earlier(&mut self, at: Evaluation) {
@@ -176,11 +173,12 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
         }
     }
 
-    fn restore(&mut self, name: &str, values: &[f64]) {
-        let target = match &mut self.earlier {
-            _ if name == self.name => &mut self.converged,
-            Some(earlier) if name == self.earlier_name => earlier,
-            _ => return,
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        let target = match (moment, &mut self.earlier) {
+            _ if quantity != self.quantity => return,
+            (Moment::Last, _) => &mut self.converged,
+            (Moment::Earlier, Some(earlier)) => earlier,
+            (Moment::Earlier, None) => return,
         };
         let (values, _) = values.as_chunks::<W>();
         let batches = self.runs.iter().flat_map(|run| (0..self.points).map(move |point| (run, point)));
@@ -196,7 +194,9 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{fem::space::samples::quadratic, mesh::Mesh};
+    use crate::{fem::space::samples::quadratic, laws::step::quantity, mesh::Mesh};
+
+    const H: Quantity = quantity!("h");
 
     /// Two cells of a material, one of another, two of the first.
     fn cells(order: usize) -> Geometry<2> {
@@ -210,7 +210,7 @@ mod tests {
     }
 
     fn history(order: usize) -> CellHistory<2> {
-        CellHistory::new(["h", "before"], &cells(order), |material| material == 0)
+        CellHistory::new(H, &cells(order), |material| material == 0)
     }
 
     #[test]
@@ -220,14 +220,14 @@ mod tests {
         history.both_mut(2).expect("values").1.set(1, [7.0, 8.0]);
         history.set_trial(1, 0, [9.0, 9.0]);
         history.commit();
-        let written = history.history();
+        let written = history.values(Moment::Last).expect("kept");
         assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
         assert_eq!(written.bytes, 2 * 4 * 2 * 8);
         let values = written.values.into_owned();
         let mut other = self::history(1);
-        other.restore("another", &values);
+        other.restore(quantity!("another"), Moment::Last, &values);
         assert_eq!(other.converged(2).expect("values").lane(1), [0.0, 0.0]);
-        other.restore("h", &values);
+        other.restore(H, Moment::Last, &values);
         assert_eq!(other.converged(2).expect("values").lane(1), [7.0, 8.0]);
         assert_eq!(other.last_change(2, 1), [0.0; 2], "not kept");
         other.keep_earlier(Evaluation::Converged);
@@ -244,7 +244,7 @@ mod tests {
         history.both_mut(7).expect("values").1.set(1, [7.0, 8.0]);
         assert!(history.both_mut(4).is_none(), "the other material");
         history.commit();
-        let written = history.history();
+        let written = history.values(Moment::Last).expect("kept");
         assert_eq!((written.width, written.points, written.bytes), (6, 3, 2 * 12 * 2 * 8));
         let values = written.values.to_vec();
         assert_eq!(values[24..], [0.0, 0.0, 7.0, 8.0, 0.0, 0.0]);
@@ -252,8 +252,8 @@ mod tests {
         let means = written.means(&[0.25, 0.5, 0.25].repeat(5));
         assert_eq!((means.width, &means.values[8..]), (2, &[3.5, 4.0][..]));
         let mut other = self::history(2);
-        other.restore("h", &values);
+        other.restore(H, Moment::Last, &values);
         assert_eq!(other.converged(7), history.converged(7));
-        assert_eq!(*other.history().values, values);
+        assert_eq!(*other.values(Moment::Last).expect("kept").values, values);
     }
 }

@@ -1,6 +1,6 @@
 use super::{
     Blend, CONTACT, Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect,
-    SurfaceForce, Tangents, node_history::NodeHistory,
+    SurfaceForce, Tangents, node_history::NodeHistory, quantity,
 };
 use crate::{
     error::{Error, Result},
@@ -48,12 +48,7 @@ impl<const D: usize> ContactMemory<D> {
         Ok(Self {
             points,
             contacts,
-            pressure: NodeHistory::new(
-                ["memory_pressure", "previous_memory_pressure"],
-                nodes,
-                mesh.owned,
-                0.0,
-            ),
+            pressure: NodeHistory::new(quantity!("memory_pressure"), nodes, mesh.owned, 0.0),
             before: Vec::new(),
             slopes: Vec::new(),
         })

@@ -1,6 +1,6 @@
 use super::{
     Curvature, Effect, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Phases, Role, Step,
-    StressError, cell_history::CellHistory, evolution::Evolution,
+    StressError, cell_history::CellHistory, evolution::Evolution, quantity,
 };
 use crate::{
     fem::space::{Batch, Geometry, Needs},
@@ -32,8 +32,7 @@ pub struct Damage {
 impl Damage {
     /// Undamaged cells, for the cells whose material has a law.
     pub fn new<const D: usize>(laws: ByMaterial<Elastic<material::Damage>>, geometry: &Geometry<D>) -> Self {
-        let names = ["damage", "previous_damage"];
-        let damage = CellHistory::new(names, geometry, |material| laws.get(material).is_some());
+        let damage = CellHistory::new(quantity!("damage"), geometry, |material| laws.get(material).is_some());
         Self { laws, damage }
     }
 

@@ -1,6 +1,9 @@
 //! Supports that give way: springs and dashpots at the nodes of boundaries.
 
-use super::{ELASTIC, Energy, Evaluation, Form, History, NUMERICAL, Step, StressError, VISCOUS};
+use super::{
+    ELASTIC, Energy, Evaluation, Form, History, HistoryStore, Moment, NUMERICAL, Quantity, Step, StressError,
+    VISCOUS, quantity,
+};
 use crate::{
     fem::space::{Held, Nodal, SurfacePoint},
     linear_algebra::{
@@ -54,7 +57,7 @@ pub struct ElasticSupport<const D: usize> {
 }
 
 /// The history of nodes that holds [`ElasticSupport::reactions`].
-pub const SUPPORT_REACTION: &str = "support_reaction";
+pub const SUPPORT_REACTION: Quantity = quantity!("support_reaction");
 
 impl Resistances {
     /// The product with a vector at a point with this normal.
@@ -183,13 +186,6 @@ impl<const D: usize> ElasticSupport<D> {
         }
     }
 
-    /// The reactions as a history of nodes.
-    pub fn reaction_history(&self) -> Option<History<'_>> {
-        let values = &self.reactions;
-        let (name, bytes) = (SUPPORT_REACTION, size_of_val(&values[..]));
-        self.has_reactions.then(|| History { name, width: D, points: 1, values: values.into(), bytes })
-    }
-
     /// Adds its energies after the commit.
     ///
     /// With the force `-S u_{n-1}` its work is `-k v_n . S u_{n-1} = -d(1/2 u . S u) + 1/2 k^2 v_n . S v_n`.
@@ -249,6 +245,22 @@ impl<const D: usize> ElasticSupport<D> {
             }
         }
         all
+    }
+}
+
+/// The reactions of an earlier stage, which stay the same.
+impl<const D: usize> HistoryStore for ElasticSupport<D> {
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        let (values, quantity) = (&self.reactions, SUPPORT_REACTION);
+        let bytes = size_of_val(&values[..]);
+        let is_kept = self.has_reactions && moment == Moment::Last;
+        is_kept.then(|| History { quantity, moment, width: D, points: 1, values: values.into(), bytes })
+    }
+
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        if (quantity, moment) == (SUPPORT_REACTION, Moment::Last) {
+            self.reactions = values.to_vec();
+        }
     }
 }
 

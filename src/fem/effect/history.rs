@@ -1,13 +1,15 @@
 //! What effects keep from one step to the next.
 
-use crate::laws::step::Evaluation;
+use crate::laws::step::{Evaluation, Moment, Quantity};
 use std::borrow::Cow;
 
 /// Values that an effect keeps for cells or nodes, as files hold them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct History<'a> {
-    /// Name in checkpoints and field files.
-    pub name: &'static str,
+    /// What the values are.
+    pub quantity: Quantity,
+    /// After which step.
+    pub moment: Moment,
     /// Values a cell or node: those of all points of a cell, point by point.
     pub width: usize,
     /// Points in a cell; 1 of nodes.
@@ -20,6 +22,32 @@ pub struct History<'a> {
 }
 
 impl History<'_> {
+    /// A number at each of these of the nodes that a rank owns, `owned` in all.
+    pub fn of_nodes(
+        (quantity, moment): (Quantity, Moment),
+        owned: usize,
+        values: impl Iterator<Item = (usize, f64)>,
+    ) -> Self {
+        let (mut all, mut bytes) = (vec![0.0; owned], 0);
+        for (node, value) in values {
+            all[node] = value;
+            bytes += size_of::<f64>();
+        }
+        Self { quantity, moment, width: 1, points: 1, values: all.into(), bytes }
+    }
+
+    /// Name in checkpoints and field files.
+    pub fn name(&self) -> &'static str {
+        self.quantity.name(self.moment)
+    }
+
+    /// Adds the same values at other nodes; where both are kept, those.
+    pub fn join(&mut self, other: Self) {
+        self.bytes += other.bytes;
+        let pairs = self.values.to_mut().iter_mut().zip(other.values.iter());
+        pairs.filter(|(_, value)| **value != 0.0).for_each(|(sum, value)| *sum = *value);
+    }
+
     /// The means over the points of each cell, given the shares of each point in the volume of its cell, cell by cell.
     pub fn means(self, shares: &[f64]) -> Self {
         if self.points == 1 {
@@ -37,23 +65,20 @@ impl History<'_> {
     }
 }
 
-/// Storage of a history: converged values, trial values and, on request, the values before the last step.
+/// Storage of a history. The defaults are those of values that their owner advances when a step is committed.
 pub trait HistoryStore {
-    /// The converged values.
-    fn history(&self) -> History<'_>;
+    /// The values after the last step or before it, if they are kept.
+    fn values(&self, moment: Moment) -> Option<History<'_>>;
 
-    /// The values before the last step, if they are kept.
-    fn earlier_history(&self) -> Option<History<'_>>;
+    /// Replaces the values of this quantity, if they are kept, by others, laid out as in [`History::values`].
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]);
 
     /// Keeps the values before the last step from now on, if step errors or laws evaluated at this state need them.
-    fn keep_earlier(&mut self, at: Evaluation);
+    fn keep_earlier(&mut self, _at: Evaluation) {}
 
     /// Makes the trial values the converged ones.
-    fn commit(&mut self);
+    fn commit(&mut self) {}
 
     /// Adds to the converged values the change in the step just committed once more; not where earlier values are kept.
-    fn extrapolate(&mut self);
-
-    /// Replaces the converged values, or those before the last step, if `name` is theirs; laid out as in [`History::values`].
-    fn restore(&mut self, name: &str, values: &[f64]);
+    fn extrapolate(&mut self) {}
 }

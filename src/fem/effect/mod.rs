@@ -44,7 +44,8 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
 };
 
-pub use crate::laws::step::{Blend, Evaluation, Step};
+use crate::laws::step::quantity;
+pub use crate::laws::step::{Blend, Evaluation, Moment, Quantity, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
@@ -70,7 +71,7 @@ pub use support::{SupportMotion, Supports};
 pub use surface::{SurfaceEffect, SurfaceForce};
 pub use tangents::Tangents;
 pub use term::{ElasticLaw, FlowProperties, Form, Term};
-pub use viscoplastic_flow::{VISCOPLASTIC, ViscoplasticFlow};
+pub use viscoplastic_flow::{STRESS_OF_FLOW, VISCOPLASTIC, ViscoplasticFlow};
 pub use viscous_stress::{VISCOUS, ViscousStress};
 
 /// All energies in the order of the columns of `history.csv`. New ones are added at the end.

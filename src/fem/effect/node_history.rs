@@ -1,11 +1,9 @@
-use super::{Evaluation, History, HistoryStore};
-use std::borrow::Cow;
+use super::{Evaluation, History, HistoryStore, Moment, Quantity};
 
 /// Converged and trial values of some of the nodes that a rank owns, one a node. Other nodes take no storage.
 #[derive(Debug)]
 pub(super) struct NodeHistory {
-    name: &'static str,
-    earlier_name: &'static str,
+    quantity: Quantity,
     nodes: Vec<u32>,
     owned: usize,
     pub(super) converged: Vec<f64>,
@@ -15,16 +13,10 @@ pub(super) struct NodeHistory {
 }
 
 impl NodeHistory {
-    /// The same value at each of `nodes`, of which the rank owns `owned` in all. The names are those of the converged values and of the
-    /// values before the last step.
-    pub(super) fn new(
-        [name, earlier_name]: [&'static str; 2],
-        nodes: Vec<u32>,
-        owned: usize,
-        value: f64,
-    ) -> Self {
+    /// The same value at each of `nodes`, of which the rank owns `owned` in all.
+    pub(super) fn new(quantity: Quantity, nodes: Vec<u32>, owned: usize, value: f64) -> Self {
         let converged = vec![value; nodes.len()];
-        Self { name, earlier_name, nodes, owned, trial: converged.clone(), converged, earlier: None }
+        Self { quantity, nodes, owned, trial: converged.clone(), converged, earlier: None }
     }
 
     /// The change of the value of a node, by its position, in the last step; 0 where earlier values are not kept.
@@ -38,21 +30,17 @@ impl NodeHistory {
         let values = self.trial.iter().zip(&self.converged).zip(earlier);
         values.map(|((now, before), earlier)| [*now, *before, *earlier])
     }
-
-    fn written(&self, name: &'static str, values: &[f64], copies: usize) -> History<'_> {
-        let mut all = vec![0.0; self.owned];
-        self.nodes.iter().zip(values).for_each(|(&node, value)| all[node as usize] = *value);
-        History { name, width: 1, points: 1, values: Cow::Owned(all), bytes: copies * size_of_val(values) }
-    }
 }
 
 impl HistoryStore for NodeHistory {
-    fn history(&self) -> History<'_> {
-        self.written(self.name, &self.converged, 2)
-    }
-
-    fn earlier_history(&self) -> Option<History<'_>> {
-        self.earlier.as_ref().map(|values| self.written(self.earlier_name, values, 1))
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        let (values, copies) = match moment {
+            Moment::Last => (&self.converged, 2),
+            Moment::Earlier => (self.earlier.as_ref()?, 1),
+        };
+        let values = self.nodes.iter().zip(values).map(|(node, value)| (*node as usize, *value));
+        let written = History::of_nodes((self.quantity, moment), self.owned, values);
+        Some(History { bytes: copies * written.bytes, ..written })
     }
 
     fn keep_earlier(&mut self, _: Evaluation) {
@@ -71,11 +59,12 @@ impl HistoryStore for NodeHistory {
         self.converged.iter_mut().zip(&self.trial).for_each(|(value, before)| *value += *value - before);
     }
 
-    fn restore(&mut self, name: &str, values: &[f64]) {
-        let target = match &mut self.earlier {
-            _ if name == self.name => &mut self.converged,
-            Some(earlier) if name == self.earlier_name => earlier,
-            _ => return,
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        let target = match (moment, &mut self.earlier) {
+            _ if quantity != self.quantity => return,
+            (Moment::Last, _) => &mut self.converged,
+            (Moment::Earlier, Some(earlier)) => earlier,
+            (Moment::Earlier, None) => return,
         };
         let saved = self.nodes.iter().map(|&node| values[node as usize]);
         target.iter_mut().zip(saved).for_each(|(value, saved)| *value = saved);
@@ -85,26 +74,29 @@ impl HistoryStore for NodeHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laws::step::quantity;
+
+    const H: Quantity = quantity!("h");
 
     #[test]
     fn values_are_kept_at_some_nodes_and_written_for_all() {
-        let mut history = NodeHistory::new(["h", "previous_h"], vec![1, 3], 5, 1.0);
+        let mut history = NodeHistory::new(H, vec![1, 3], 5, 1.0);
         history.trial = vec![0.5, 0.25];
         history.commit();
-        let written = history.history();
+        let written = history.values(Moment::Last).expect("kept");
         assert_eq!((&*written.values, written.bytes), (&[0.0, 0.5, 0.0, 0.25, 0.0][..], 32));
         let values = written.values.into_owned();
-        let mut other = NodeHistory::new(["h", "previous_h"], vec![1, 3], 5, 1.0);
-        other.restore("another", &values);
+        let mut other = NodeHistory::new(H, vec![1, 3], 5, 1.0);
+        other.restore(quantity!("another"), Moment::Last, &values);
         assert_eq!(other.converged, [1.0, 1.0]);
-        other.restore("h", &values);
+        other.restore(H, Moment::Last, &values);
         assert_eq!(other.converged, [0.5, 0.25]);
-        assert_eq!((other.last_three().count(), other.earlier_history()), (0, None));
+        assert_eq!((other.last_three().count(), other.values(Moment::Earlier)), (0, None));
     }
 
     #[test]
     fn values_before_the_last_step_are_kept_on_request_and_come_back() {
-        let mut history = NodeHistory::new(["h", "previous_h"], vec![0, 2], 3, 1.0);
+        let mut history = NodeHistory::new(H, vec![0, 2], 3, 1.0);
         history.keep_earlier(Evaluation::Converged);
         for values in [[2.0, 3.0], [4.0, 5.0]] {
             history.trial.copy_from_slice(&values);
@@ -112,13 +104,13 @@ mod tests {
         }
         history.trial = vec![6.0, 7.0];
         assert_eq!(history.last_three().collect::<Vec<_>>(), [[6.0, 4.0, 2.0], [7.0, 5.0, 3.0]]);
-        let written = history.earlier_history().expect("kept");
-        assert_eq!((written.name, written.bytes), ("previous_h", 16));
+        let written = history.values(Moment::Earlier).expect("kept");
+        assert_eq!((written.name(), written.bytes), ("previous_h", 16));
         assert_eq!(*written.values, [2.0, 0.0, 3.0]);
         let values = written.values.into_owned();
-        let mut other = NodeHistory::new(["h", "previous_h"], vec![0, 2], 3, 1.0);
+        let mut other = NodeHistory::new(H, vec![0, 2], 3, 1.0);
         other.keep_earlier(Evaluation::Converged);
-        other.restore("previous_h", &values);
+        other.restore(H, Moment::Earlier, &values);
         assert_eq!(other.last_three().collect::<Vec<_>>(), [[1.0, 1.0, 2.0], [1.0, 1.0, 3.0]]);
     }
 }

@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Exit, Result},
     fem::{
         body::Body,
-        effect::{Closeness, History, LoadedMotion},
+        effect::{Closeness, History, LoadedMotion, Moment, Quantity},
         state::State,
     },
     job::differing_keys,
@@ -169,8 +169,8 @@ pub fn save<const D: usize, const S: usize>(
     let of_nodes: Vec<History> = body.all_node_histories().collect();
     for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
         let table = |h| {
-            let History { name, width, values, .. }: &History = h;
-            Table { name, set, width: *width, values }
+            let History { width, values, .. }: &History = h;
+            Table { name: h.name(), set, width: *width, values }
         };
         tables.extend(histories.iter().map(table));
     }
@@ -206,15 +206,17 @@ pub fn restore<const D: usize, const S: usize>(
         fill(previous, &values[0])?;
     }
     let cells = cell_ids(body);
-    let kept = |history: History<'_>| (history.name, history.width);
-    let of_cells: Vec<(&str, usize)> = body.all_cell_histories().map(kept).collect();
-    let of_nodes: Vec<(&str, usize)> = body.all_node_histories().map(kept).collect();
+    let [of_cells, of_nodes] = kept_by(body);
     let [total_cells, total_nodes] = [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64);
     for (set, total, kept, ids) in
         [("cells", total_cells, &of_cells, &cells), ("nodes", total_nodes, &of_nodes, &nodes)]
     {
-        let values = checkpoint.read(set, total, kept, ids)?;
-        kept.iter().zip(&values).for_each(|((name, _), values)| body.restore_history(name, values));
+        let tables: Vec<_> =
+            kept.iter().map(|(quantity, moment, width)| (quantity.name(*moment), *width)).collect();
+        let values = checkpoint.read(set, total, &tables, ids)?;
+        for ((quantity, moment, _), values) in kept.iter().zip(&values) {
+            body.restore_history(*quantity, *moment, values);
+        }
     }
     let saved = [
         (&header.obstacles, &header.obstacle_stiffness, &header.obstacle_resultants),
@@ -286,23 +288,21 @@ pub fn transfer<const D: usize, const S: usize>(
         fill(traction, &values[0])?;
         body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&values[0]));
     }
-    let kept = |history: History<'_>| (history.name, history.width);
-    let own_cells: Vec<(&str, usize)> = body.all_cell_histories().map(kept).collect();
-    let own_nodes: Vec<(&str, usize)> = body.all_node_histories().map(kept).collect();
+    let [own_cells, own_nodes] = kept_by(body);
     let mut at_rest = Vec::new();
     for (set, total, own, there, ids) in [
         ("cells", total_cells, own_cells, &of_cells, &cells),
         ("nodes", total_nodes, own_nodes, &of_nodes, &nodes),
     ] {
-        for (name, width) in own {
+        for (quantity, moment, width) in own {
             // At the start of a run the previous values equal the current ones.
-            let current = name.strip_prefix("previous_").unwrap_or(name);
+            let current = quantity.name(Moment::Last);
             if there.iter().any(|table| table == current) {
-                known.extend([current, name]);
+                known.extend([current, quantity.name(moment)]);
                 let values = checkpoint.read(set, total, &[(current, width)], ids)?;
-                body.restore_history(name, &values[0]);
-            } else if name == current {
-                at_rest.push(name.to_owned());
+                body.restore_history(quantity, moment, &values[0]);
+            } else if moment == Moment::Last {
+                at_rest.push(current.to_owned());
             }
         }
     }
@@ -375,6 +375,12 @@ fn loaded_motions<const D: usize, const S: usize>(
 ) -> impl Iterator<Item = &mut LoadedMotion> {
     let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
     obstacles.filter_map(move |obstacle| obstacle.motions_mut().into_iter().nth(number)?)
+}
+
+/// What a body keeps in its cells and at its nodes, with the numbers of values of a cell or node.
+fn kept_by<const D: usize, const S: usize>(body: &Body<D, S>) -> [Vec<(Quantity, Moment, usize)>; 2] {
+    let kept = |history: History<'_>| (history.quantity, history.moment, history.width);
+    [body.all_cell_histories().map(kept).collect(), body.all_node_histories().map(kept).collect()]
 }
 
 /// The table of contact tractions at nodes.

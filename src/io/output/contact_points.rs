@@ -4,7 +4,7 @@ use super::output_field::Converged;
 use crate::{
     error::Result,
     fem::{
-        effect::{Contact, PointState},
+        effect::{Contact, Moment, PointState, Quantity},
         space::corner_means,
     },
     linear_algebra::tensor::{Vector, dot, larger},
@@ -64,10 +64,13 @@ pub(super) fn largest<const D: usize>(of_node: &[(usize, PointState<D>)]) -> &Po
 /// largest of the means of the faces there. Collective.
 pub(super) fn fill_corners<const D: usize, const S: usize>(
     at: Converged<'_, D, S>,
-    name: &str,
+    quantity: Quantity,
     values: &mut [f64],
 ) -> Result<()> {
-    let keeps = |contact: &&Contact<D>| contact.history_names(false).any(|other| other == name);
+    let keeps = |contact: &&Contact<D>| {
+        let kept = contact.histories().filter_map(|store| store.values(Moment::Last));
+        kept.into_iter().any(|history| history.quantity == quantity)
+    };
     let facets: Vec<u32> =
         at.body.contacts.iter().filter(keeps).flat_map(|contact| contact.facets()).copied().collect();
     let of_midside = |node: u32, _: &Vector<D>| Some([values[node as usize]]);

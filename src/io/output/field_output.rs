@@ -94,15 +94,15 @@ impl<const D: usize> FieldOutput<D> {
         let of_cells: Vec<History> = at.body.cell_histories().collect();
         for history in &of_cells {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
-            fields.push(Field { name: history.name, place: Place::Cell, shape, values: &history.values });
+            fields.push(Field { name: history.name(), place: Place::Cell, shape, values: &history.values });
         }
         let mut of_nodes: Vec<History> = at.body.node_histories().collect();
         for history in of_nodes.iter_mut().filter(|_| acts_at_midsides(&at.body.mesh)) {
-            fill_corners(at, history.name, history.values.to_mut())?;
+            fill_corners(at, history.quantity, history.values.to_mut())?;
         }
         for history in &of_nodes {
             let shape = if history.width == D { Shape::Vector } else { Shape::Scalar };
-            fields.push(Field { name: history.name, place: Place::Node, shape, values: &history.values });
+            fields.push(Field { name: history.name(), place: Place::Node, shape, values: &history.values });
         }
         Ok(self.file.write_step(at.state.time, &fields)?)
     }

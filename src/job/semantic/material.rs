@@ -37,7 +37,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
                 );
             }
         }
-        for (name, _) in Viscoplasticity::NAMES {
+        for name in Viscoplasticity::NAMES {
             let law: Option<Viscoplasticity<Scalar>> =
                 root.read_choice(&format!("{path}.viscoplasticity"), name);
             // Expressions are checked in each cell.
@@ -114,12 +114,6 @@ pub(super) fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
             findings.fault(&format!("{path}.viscosity.{}", fault.key), fault.message, fault.help);
         }
         if hypothesis == Some(Hypothesis::PlaneStress) {
-            for (name, refusal) in Viscoplasticity::NAMES {
-                let law = format!("{path}.viscoplasticity.{name}");
-                if let Some([message, help]) = refusal.filter(|_| root.find(&law).is_some()) {
-                    findings.fault(&law, message, help);
-                }
-            }
             continue;
         }
         if root.read("mesh.order") == Some(2) {

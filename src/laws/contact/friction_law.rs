@@ -6,7 +6,10 @@
 //! is a parameter of the graph ([`FrictionBound::resolve`]), and also of the vector graph: the law is radial, so that the vectors
 //! `s`, velocity and traction have the same direction.
 
-use crate::laws::{law::LawFault, step::Blend};
+use crate::laws::{
+    law::LawFault,
+    step::{Blend, Quantity},
+};
 
 /// The point of a friction graph with a given parameter `s = c v + q`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,13 +26,31 @@ pub struct Slip {
     pub coefficient: f64,
 }
 
-/// A number at each point that a friction law keeps.
+/// The data of a step at a point of the contact boundary: the state of the point at its start, as far as friction depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SlidingContext {
+    /// The history of the point from which the step starts: that after the last step, or the blend of a two-step scheme.
+    pub history: f64,
+    /// Length of the step in s, or that of the blend.
+    pub step_length: f64,
+    /// Whether the history follows a two-step scheme.
+    pub is_blended: bool,
+    /// The speed in m/s of the part of the sliding velocity that supports hold.
+    pub held: f64,
+}
+
+impl SlidingContext {
+    /// The same beside a held part of the sliding velocity with this speed in m/s.
+    pub fn beside(self, held: f64) -> Self {
+        Self { held, ..self }
+    }
+}
+
+/// A number at each point on which a friction law depends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionHistory {
-    /// Its name in field files and checkpoints.
-    pub name: &'static str,
-    /// The name of its value before the last step in checkpoints.
-    pub earlier_name: &'static str,
+    /// What it is.
+    pub quantity: Quantity,
     /// Its value at the start of the run.
     pub initial: f64,
     /// Share of the tolerance of adaptive steps that its error may take.
@@ -43,15 +64,15 @@ const ITERATIONS: usize = 100;
 /// the same at any velocity.
 pub trait FrictionBound {
     /// Friction traction per contact pressure at a sliding velocity; 0 for laws independent of the pressure.
-    fn coefficient(&self, speed: f64) -> f64;
+    fn coefficient(&self, speed: f64, at: SlidingContext) -> f64;
 
     /// Largest friction traction in Pa at a sliding velocity in m/s and a contact pressure in Pa.
-    fn bound(&self, speed: f64, pressure: f64) -> f64 {
-        self.coefficient(speed) * pressure.max(0.0)
+    fn bound(&self, speed: f64, pressure: f64, at: SlidingContext) -> f64 {
+        self.coefficient(speed, at) * pressure.max(0.0)
     }
 
     /// Derivative of the bound by the sliding velocity, in Pa s/m.
-    fn slope(&self, _speed: f64, _pressure: f64) -> f64 {
+    fn slope(&self, _speed: f64, _pressure: f64, _at: SlidingContext) -> f64 {
         0.0
     }
 
@@ -67,12 +88,12 @@ pub trait FrictionBound {
 
     /// The steepest decrease of the coefficient with the sliding velocity, in s/m. Multiplied by the contact pressure, it is the
     /// relaxed monotonicity constant.
-    fn steepest_decrease(&self) -> f64 {
+    fn steepest_decrease(&self, _at: SlidingContext) -> f64 {
         0.0
     }
 
     /// The characteristic velocity in m/s of the change of the coefficient; 0 for a constant coefficient.
-    fn corner_velocity(&self) -> f64 {
+    fn corner_velocity(&self, _at: SlidingContext) -> f64 {
         0.0
     }
 
@@ -81,8 +102,11 @@ pub trait FrictionBound {
         None
     }
 
-    /// Starts a step from this blend of the histories after the last step and before it.
-    fn start_step(&mut self, _histories: [f64; 2], _blend: Blend) {}
+    /// A step from this blend of the histories after the last step and before it.
+    fn context(&self, [recent, earlier]: [f64; 2], blend: Blend) -> SlidingContext {
+        let history = blend.of(recent, earlier);
+        SlidingContext { history, step_length: blend.length, is_blended: blend.earlier != 0.0, held: 0.0 }
+    }
 
     /// The history after a step that starts from this blend of the histories after the last step and before it, at this sliding velocity
     /// in m/s at its end.
@@ -102,41 +126,91 @@ pub trait FrictionBound {
 
     /// The point of the graph with `c v + q = s`, for an `s` that is not negative and a `c` above the steepest decrease at this
     /// pressure.
-    fn resolve(&self, s: f64, c: f64, pressure: f64) -> Slip {
-        let at_rest = self.bound(0.0, pressure);
+    fn resolve(&self, s: f64, c: f64, pressure: f64, at: SlidingContext) -> Slip {
+        let at_rest = self.bound(0.0, pressure, at);
         if at_rest > 0.0 && s <= at_rest {
             return Slip { speed: 0.0, traction: s, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
         }
-        let speed = if self.steepest_decrease() == 0.0 {
+        let speed = if self.steepest_decrease(at) == 0.0 {
             (s - at_rest) / c
         } else {
-            sliding_speed(self, s, c, pressure)
+            sliding_speed(self, s, c, pressure, at)
         };
-        let slope = self.slope(speed, pressure);
+        let slope = self.slope(speed, pressure, at);
         Slip {
             speed,
             // Without a bound the traction is exactly zero.
             traction: if at_rest > 0.0 { s - c * speed } else { 0.0 },
             derivative: 1.0 / (c + slope),
             slope,
-            coefficient: if pressure > 0.0 { self.coefficient(speed) } else { 0.0 },
+            coefficient: if pressure > 0.0 { self.coefficient(speed, at) } else { 0.0 },
         }
+    }
+
+    /// The point of the graph of the free part `v` of a sliding velocity whose other part, across to it, is held: with
+    /// `V = hypot(v, held)`, `c v + g(V) v / V = s`, for an `s` that is not negative and a `c` above the steepest decrease.
+    fn resolve_beside(&self, s: f64, c: f64, pressure: f64, at: SlidingContext) -> Slip {
+        let held = at.held;
+        if held == 0.0 {
+            return self.resolve(s, c, pressure, at);
+        }
+        let graph = |speed: f64| {
+            let whole = speed.hypot(held);
+            let (bound, along, across) = (self.bound(whole, pressure, at), speed / whole, held / whole);
+            [bound * along, self.slope(whole, pressure, at) * along * along + bound / whole * across * across]
+        };
+        let mut speed = s / (c + self.bound(held, pressure, at) / held);
+        let [mut low, mut high] = [0.0, s / c];
+        for _ in 0..ITERATIONS {
+            let [traction, slope] = graph(speed);
+            let open = c * speed + traction - s;
+            if open > 0.0 {
+                high = speed;
+            } else {
+                low = speed;
+            }
+            let newton = speed - open / (c + slope);
+            let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
+            let change = (next - speed).abs();
+            speed = next;
+            if change <= 2.0 * f64::EPSILON * next {
+                break;
+            }
+        }
+        let [traction, slope] = graph(speed);
+        let derivative = 1.0 / (c + slope);
+        if c * derivative < STICKS {
+            return Slip { speed, traction, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
+        }
+        let whole = speed.hypot(held);
+        let coefficient = if pressure > 0.0 { self.coefficient(whole, at) * speed / whole } else { 0.0 };
+        Slip { speed, traction, derivative, slope, coefficient }
     }
 }
 
+/// A point whose velocity follows the parameter by less than this share of `1 / c` counts as sticking: it creeps so slowly that the change
+/// of its velocity has no effect on Newton's method, while its slope would only spoil the condition of the matrix.
+pub(super) const STICKS: f64 = 1e-8;
+
 /// The root of `c v + g(v) = s`, whose left side is increasing and convex, by Newton's method with bisection where it leaves the
 /// bracket.
-fn sliding_speed<L: FrictionBound + ?Sized>(law: &L, s: f64, c: f64, pressure: f64) -> f64 {
+fn sliding_speed<L: FrictionBound + ?Sized>(
+    law: &L,
+    s: f64,
+    c: f64,
+    pressure: f64,
+    context: SlidingContext,
+) -> f64 {
     let (mut low, mut high) = (0.0, s / c);
     let mut at = high;
     for _ in 0..ITERATIONS {
-        let open = c * at + law.bound(at, pressure) - s;
+        let open = c * at + law.bound(at, pressure, context) - s;
         if open > 0.0 {
             high = at;
         } else {
             low = at;
         }
-        let newton = at - open / (c + law.slope(at, pressure));
+        let newton = at - open / (c + law.slope(at, pressure, context));
         let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
         if (next - at).abs() <= 2.0 * f64::EPSILON * high {
             return next;
@@ -166,30 +240,30 @@ macro_rules! friction_laws {
 
         impl FrictionLaw {
             crate::laws::law::calls! { each_friction_law FrictionLaw FrictionBound:
-                coefficient(speed: f64) -> f64;
-                bound(speed: f64, pressure: f64) -> f64;
-                slope(speed: f64, pressure: f64) -> f64;
+                coefficient(speed: f64, at: SlidingContext) -> f64;
+                bound(speed: f64, pressure: f64, at: SlidingContext) -> f64;
+                slope(speed: f64, pressure: f64, at: SlidingContext) -> f64;
                 jumps_at_rest() -> bool;
                 follows_pressure() -> bool;
-                steepest_decrease() -> f64;
-                corner_velocity() -> f64;
+                steepest_decrease(at: SlidingContext) -> f64;
+                corner_velocity(at: SlidingContext) -> f64;
                 history() -> Option<FrictionHistory>;
+                context(histories: [f64; 2], blend: Blend) -> SlidingContext;
                 history_after(histories: [f64; 2], blend: Blend, speed: f64) -> f64;
                 history_measure(history: f64) -> f64;
                 own_faults() -> Vec<crate::laws::law::LawFault>;
-                resolve(s: f64, c: f64, pressure: f64) -> Slip;
+                resolve(s: f64, c: f64, pressure: f64, at: SlidingContext) -> Slip;
+                resolve_beside(s: f64, c: f64, pressure: f64, at: SlidingContext) -> Slip;
             }
 
-            /// See [`FrictionBound::start_step`].
-            #[inline]
-            pub fn start_step(&mut self, histories: [f64; 2], blend: Blend) {
-                each_friction_law!(FrictionLaw, self, law => FrictionBound::start_step(law, histories, blend));
+            /// The history of a point at the start of the run, twice: that before it is the same.
+            pub fn first_histories(&self) -> [f64; 2] {
+                [self.history().map_or(0.0, |history| history.initial); 2]
             }
 
-            /// The law in a first step of this length in s.
-            pub fn in_step(mut self, length: f64) -> Self {
-                self.start_step([self.history().map_or(0.0, |history| history.initial); 2], Blend::euler(length));
-                self
+            /// See [`FrictionBound::steepest_decrease`], in a first step of this length in s.
+            pub fn first_decrease(&self, length: f64) -> f64 {
+                self.steepest_decrease(self.context(self.first_histories(), Blend::euler(length)))
             }
 
             /// Its table in the job, relative to that of the contact.

@@ -25,8 +25,8 @@ pub use tresca::Tresca;
 pub use unilateral::{Bound, Unilateral};
 
 use super::{
-    friction_law::{FrictionBound, FrictionHistory, Slip, friction_laws},
-    normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response, normal_laws},
+    friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip, friction_laws},
+    normal_law::{NodeContext, NormalParameters, Resolved, Response, normal_laws},
 };
 use crate::{
     error::Result,
@@ -202,6 +202,8 @@ mod tests {
         }
     }
 
+    const FIRST: SlidingContext = SlidingContext { history: 0.0, step_length: 0.0, is_blended: false };
+
     fn any_law() -> impl Strategy<Value = FrictionLaw> {
         let weakening =
             (0.0f64..1.0, 0.0f64..1.0, 0.01f64..2.0).prop_map(|(dynamic, more, decay_velocity)| {
@@ -214,19 +216,54 @@ mod tests {
         ]
     }
 
+    #[test]
+    fn beside_a_held_part_of_4_a_free_part_of_3_has_three_fifths_of_the_bound() {
+        let coulomb = FrictionLaw::Coulomb(Coulomb { coefficient: 0.5 });
+        let found = coulomb.resolve_beside(9.0, 2.0, 10.0, FIRST.beside(4.0));
+        assert!((found.speed - 3.0).abs() < 1e-14 && (found.traction - 3.0).abs() < 1e-14, "{found:?}");
+        // The slope of 5 v / hypot(v, 4).
+        assert!((found.slope - 5.0 * 16.0 / 125.0).abs() < 1e-14 && (found.coefficient - 0.3).abs() < 1e-15);
+        assert_eq!(coulomb.resolve_beside(4.0, 2.0, 10.0, FIRST), coulomb.resolve(4.0, 2.0, 10.0, FIRST));
+        let rest = coulomb.resolve_beside(0.0, 2.0, 10.0, FIRST.beside(4.0));
+        assert_eq!((rest.speed, rest.traction, rest.slope), (0.0, 0.0, 1.25));
+    }
+
     proptest! {
         #[test]
         fn laws_conform(law in any_law(), pressure in -1.0f64..5.0, speed in 0.001f64..3.0, other in 0.0f64..3.0) {
             let h = 1e-6;
-            let by_value = (law.bound(speed + h, pressure) - law.bound(speed - h, pressure)) / (2.0 * h);
-            prop_assert!((by_value - law.slope(speed, pressure)).abs() < 1e-4 * (1.0 + law.steepest_decrease()));
-            let rise = (law.bound(speed, pressure) - law.bound(other, pressure)) * (speed - other);
-            let fall = law.steepest_decrease() * pressure.max(0.0);
+            let by_value = (law.bound(speed + h, pressure, FIRST) - law.bound(speed - h, pressure, FIRST)) / (2.0 * h);
+            prop_assert!((by_value - law.slope(speed, pressure, FIRST)).abs() < 1e-4 * (1.0 + law.steepest_decrease(FIRST)));
+            let rise = (law.bound(speed, pressure, FIRST) - law.bound(other, pressure, FIRST)) * (speed - other);
+            let fall = law.steepest_decrease(FIRST) * pressure.max(0.0);
             prop_assert!(rise <= 1e-15 && rise >= -fall * (speed - other) * (speed - other) - 1e-12);
             if law.follows_pressure() && pressure.abs() > 1e-5 {
-                let by_pressure = (law.bound(speed, pressure + h) - law.bound(speed, pressure - h)) / (2.0 * h);
-                let known = if pressure > 0.0 { law.coefficient(speed) } else { 0.0 };
+                let by_pressure = (law.bound(speed, pressure + h, FIRST) - law.bound(speed, pressure - h, FIRST)) / (2.0 * h);
+                let known = if pressure > 0.0 { law.coefficient(speed, FIRST) } else { 0.0 };
                 prop_assert!((by_pressure - known).abs() < 1e-7);
+            }
+        }
+
+        #[test]
+        fn beside_a_held_part_of_the_sliding_velocity_the_law_is_the_same_radial_graph(
+            law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0, held in -6.0f64..1.0,
+        ) {
+            let held = 10f64.powf(held);
+            let c = more * law.steepest_decrease(FIRST) * pressure.max(0.0) + 0.1;
+            let found = law.resolve_beside(s, c, pressure, FIRST.beside(held));
+            prop_assert!((c * found.speed + found.traction - s).abs() < 1e-12 * (1.0 + s));
+            let whole = found.speed.hypot(held);
+            prop_assert!((found.traction - law.bound(whole, pressure, FIRST) * found.speed / whole).abs() < 1e-12 * (1.0 + s));
+            let slope = 1.0 / found.derivative - c;
+            prop_assert!(found.derivative == 0.0 || (slope - found.slope).abs() < 1e-9 * (c + slope.abs()));
+            let h = 1e-6 * f64::min(s, held);
+            if h > 0.0 && found.derivative > 0.0 {
+                let beside = |s: f64, pressure: f64| law.resolve_beside(s, c, pressure, FIRST.beside(held));
+                let quotient = (beside(s + h, pressure).speed - beside(s - h, pressure).speed) / (2.0 * h);
+                prop_assert!((quotient - found.derivative).abs() < 1e-3 * (found.derivative + 1e-6 / c));
+                let share = found.speed / whole;
+                let known = if pressure > 0.0 { law.coefficient(whole, FIRST) * share } else { 0.0 };
+                prop_assert!((found.coefficient - known).abs() <= 1e-12 * known);
             }
         }
 
@@ -234,17 +271,17 @@ mod tests {
         fn the_resolvent_finds_every_point_of_the_graph(
             law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0,
         ) {
-            let c = more * law.steepest_decrease() * pressure.max(0.0) + 0.1;
-            let found = law.resolve(s, c, pressure);
+            let c = more * law.steepest_decrease(FIRST) * pressure.max(0.0) + 0.1;
+            let found = law.resolve(s, c, pressure, FIRST);
             prop_assert!((c * found.speed + found.traction - s).abs() < 1e-13 * (1.0 + s));
             if found.speed > 0.0 {
-                prop_assert!((found.traction - law.bound(found.speed, pressure)).abs() < 1e-12 * (1.0 + s));
+                prop_assert!((found.traction - law.bound(found.speed, pressure, FIRST)).abs() < 1e-12 * (1.0 + s));
             } else {
-                prop_assert!(found.traction <= law.bound(0.0, pressure));
+                prop_assert!(found.traction <= law.bound(0.0, pressure, FIRST));
             }
             let h = 1e-6 * (1.0 + s);
             if s > h {
-                let (above, below) = (law.resolve(s + h, c, pressure), law.resolve(s - h, c, pressure));
+                let (above, below) = (law.resolve(s + h, c, pressure, FIRST), law.resolve(s - h, c, pressure, FIRST));
                 if (above.derivative == 0.0) == (below.derivative == 0.0) {
                     let quotient = (above.speed - below.speed) / (2.0 * h);
                     prop_assert!((quotient - found.derivative).abs() < 1e-3 * (found.derivative + 1e-6 / c));

@@ -58,27 +58,6 @@ impl Resolved {
     }
 }
 
-/// The description of a branch of a law.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Branch {
-    /// S1, S2 and so on, or the meaning of the branch.
-    pub name: String,
-    /// Its range.
-    pub range: String,
-    /// Its slope.
-    pub slope: String,
-}
-
-impl Branch {
-    /// A branch with this description.
-    pub fn new(name: impl Into<String>, range: impl Into<String>, slope: impl Into<String>) -> Self {
-        Self { name: name.into(), range: range.into(), slope: slope.into() }
-    }
-}
-
-/// Number of points by which the curve of a law is drawn.
-const SAMPLES: usize = 120;
-
 /// A normal law that a job may choose.
 pub trait NormalParameters {
     /// The type that evaluates the law.
@@ -119,9 +98,6 @@ pub trait Response {
     /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the smallest
     /// `c1` and the smallest `c0` for this `c1`; otherwise the reason why there are none.
     fn growth_constants(&self) -> Result<[f64; 2], &'static str>;
-
-    /// Descriptions of the branches, with numbers formatted by `number`.
-    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch>;
 
     /// The branch that contains a velocity; for laws without vertical parts.
     fn branch(&self, velocity: f64, node: NodeContext) -> usize {
@@ -174,12 +150,6 @@ pub trait Response {
     fn corners(&self) -> &[[f64; 2]] {
         &[[0.0; 2]]
     }
-
-    /// Points of the graph between these two velocities, or penetrations, and these two pressures.
-    fn outline(&self, [left, right]: [f64; 2], _pressures: [f64; 2]) -> Vec<[f64; 2]> {
-        let at = |n: usize| left + (right - left) * n as f64 / SAMPLES as f64;
-        (0..=SAMPLES).map(|n| [at(n), self.pressure(at(n), NodeContext::AT_THE_GAP)]).collect()
-    }
 }
 
 /// The choice of normal laws, defined by their list: the enum of the job, the enum that evaluates the law, and the dispatch to the
@@ -212,7 +182,6 @@ macro_rules! normal_laws {
                 pressure(velocity: f64, node: NodeContext) -> f64;
                 slope(velocity: f64, node: NodeContext) -> f64;
                 growth_constants() -> Result<[f64; 2], &'static str>;
-                branches(number: fn(f64) -> String) -> Vec<Branch>;
                 branch(velocity: f64, node: NodeContext) -> usize;
                 distance(velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64;
                 has_vertical_parts() -> bool;
@@ -223,7 +192,6 @@ macro_rules! normal_laws {
                 greatest_pressure() -> f64;
                 energy(penetration: f64) -> Option<f64>;
                 corners() -> &[[f64; 2]];
-                outline(along: [f64; 2], pressures: [f64; 2]) -> Vec<[f64; 2]>;
             }
         }
 

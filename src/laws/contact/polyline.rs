@@ -8,7 +8,7 @@
 //! For any `c` above the steepest decrease, `s = c v + p` increases along the graph. It is therefore a parameter of the graph:
 //! velocity and pressure are Lipschitz continuous functions of `s`, also where the graph is vertical ([`Polyline::resolve`]).
 
-use super::normal_law::{Branch, NodeContext, Resolved, Response};
+use super::normal_law::{NodeContext, Resolved, Response};
 use crate::{
     error::{Error, Result},
     laws::law::LawFault,
@@ -85,25 +85,6 @@ impl Polyline {
             }
         }
         faults
-    }
-
-    /// Descriptions of the branches, with the units of the abscissa and of slopes.
-    pub(super) fn branches_in(&self, [along, steep]: [&str; 2], number: fn(f64) -> String) -> Vec<Branch> {
-        let words = |branch: usize| {
-            let before = branch.checked_sub(1).map(|at| number(self.points[at][0]));
-            let after = self.points.get(branch).map(|[v, _]| number(*v));
-            let vertical = self.is_vertical(branch);
-            let range = match (before, after) {
-                (Some(v), _) if vertical => format!("at {v} {along}"),
-                (Some(v), Some(w)) => format!("{v} to {w} {along}"),
-                (Some(v), None) => format!("from {v} {along} on"),
-                (None, after) => format!("below {} {along}", after.unwrap_or_default()),
-            };
-            let slope =
-                if vertical { "vertical".into() } else { format!("{} {steep}", number(self.slopes[branch])) };
-            Branch::new(format!("S{}", branch + 1), range, slope)
-        };
-        (0..self.slopes.len()).map(words).collect()
     }
 
     /// The linear branch that contains the parameter `s = c v + p`, numbered as in [`branch`](Response::branch).
@@ -215,27 +196,8 @@ impl Response for Polyline {
         self.points.iter().fold(f64::NEG_INFINITY, |most, point| most.max(point[1]))
     }
 
-    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
-        self.branches_in(["m/s", "Pa s/m"], number)
-    }
-
     fn corners(&self) -> &[[f64; 2]] {
         &self.points
-    }
-
-    fn outline(&self, [left, right]: [f64; 2], [bottom, top]: [f64; 2]) -> Vec<[f64; 2]> {
-        let last = self.points.len();
-        let end = |branch: usize, v: f64, p: f64, corner: [f64; 2]| {
-            if self.is_vertical(branch) {
-                [corner[0], p]
-            } else {
-                [v, self.pressure(v, NodeContext::AT_THE_GAP)]
-            }
-        };
-        let mut line = vec![end(0, left, bottom, self.points[0])];
-        line.extend_from_slice(&self.points);
-        line.push(end(last, right, top, self.points[last - 1]));
-        line
     }
 }
 

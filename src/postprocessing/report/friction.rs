@@ -6,7 +6,10 @@ use super::{
     picture::Picture,
     scale::{extent, number},
 };
-use crate::{error::Result, laws::contact::FrictionLaw};
+use crate::{
+    error::Result,
+    laws::contact::{FrictionLaw, SlidingContext},
+};
 
 /// Number of points on a curved law that are joined by straight lines.
 const SAMPLES: usize = 120;
@@ -45,7 +48,9 @@ pub(super) fn picture(
         touching.iter().partition(|node| node.speed <= STICKING * fastest);
     let along = if fastest > 0.0 { 1.1 * fastest } else { 1.0 };
     let graph = (0..=SAMPLES).map(|n| along * n as f64 / SAMPLES as f64);
-    let line = std::iter::once([0.0, 0.0]).chain(graph.map(|v| [v, law.bound(v, 1.0)])).collect();
+    let line = std::iter::once([0.0, 0.0])
+        .chain(graph.map(|v| [v, law.bound(v, 1.0, SlidingContext::default())]))
+        .collect();
     let mut series = vec![Series { colour: GREY, ..Series::new(0, "", Look::Line, line) }];
     let mut counts = Vec::new();
     for (at, words, group) in [(1, "stick", &sticking), (2, "slip", &slipping)] {

@@ -4,9 +4,29 @@ use super::scale::{extent, number};
 use crate::{
     error::Result,
     job::Contact,
-    laws::contact::{Branch, NodeContext, NormalResponse},
+    laws::contact::{NodeContext, NormalResponse},
     run::normal_law,
 };
+
+/// Number of points by which the curve of a law is drawn.
+const SAMPLES: usize = 120;
+
+/// The description of a branch of a law.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Branch {
+    /// S1, S2 and so on, or the meaning of the branch.
+    pub name: String,
+    /// Its range.
+    pub range: String,
+    /// Its slope.
+    pub slope: String,
+}
+
+impl Branch {
+    fn new(name: impl Into<String>, range: impl Into<String>, slope: impl Into<String>) -> Self {
+        Self { name: name.into(), range: range.into(), slope: slope.into() }
+    }
+}
 
 /// A law whose pressure is a graph over one quantity at the node.
 #[derive(Debug, Clone)]
@@ -40,7 +60,65 @@ impl Law {
 
     /// Descriptions of its branches, from left to right.
     pub(super) fn branches(&self) -> Vec<Branch> {
-        self.law.branches(number)
+        match &self.law {
+            NormalResponse::Unilateral(_) if self.is_of_displacement => vec![
+                Branch::new("open", "below the gap", "no pressure"),
+                Branch::new("closed", "at the gap", "vertical"),
+            ],
+            NormalResponse::Compliance(law) => {
+                let [stiffness, exponent] = [law.stiffness, law.exponent].map(number);
+                let curve = format!("{stiffness} Pa × (penetration / m)^{exponent}");
+                vec![
+                    Branch::new("open", "below the gap", "no pressure"),
+                    Branch::new("closed", "beyond the gap", curve),
+                ]
+            }
+            NormalResponse::ExponentialDamper(law) => {
+                let [limit, velocity] = [law.limit, law.velocity].map(number);
+                let curve = format!("{limit} Pa × (1 − exp(−velocity / {velocity} m/s))");
+                vec![
+                    Branch::new("open", "below 0 m/s", "no pressure"),
+                    Branch::new("pressed", "from 0 m/s on", curve),
+                ]
+            }
+            _ => (0..=self.law.corners().len()).map(|branch| self.between_corners(branch)).collect(),
+        }
+    }
+
+    /// The description of the branch before this corner.
+    fn between_corners(&self, branch: usize) -> Branch {
+        let (along, steep) = if self.is_of_displacement { ("m", "Pa/m") } else { ("m/s", "Pa s/m") };
+        let [before, after] = self.ends(branch);
+        let slopes = self.slopes(branch);
+        let is_vertical = before == after || slopes[0].is_infinite();
+        let range = match (before.map(number), after.map(number)) {
+            (Some(v), _) if is_vertical => format!("at {v} {along}"),
+            (Some(v), Some(w)) => format!("{v} to {w} {along}"),
+            (Some(v), None) => format!("from {v} {along} on"),
+            (None, after) => format!("below {} {along}", after.unwrap_or_default()),
+        };
+        let slope = match slopes {
+            _ if is_vertical => "vertical".into(),
+            [one, other] if one != other => "curved".into(),
+            [slope, _] => format!("{} {steep}", number(slope)),
+        };
+        Branch::new(format!("S{}", branch + 1), range, slope)
+    }
+
+    /// Where the branch before this corner begins and ends.
+    fn ends(&self, branch: usize) -> [Option<f64>; 2] {
+        let corner = |at: Option<usize>| self.law.corners().get(at?).map(|corner| corner[0]);
+        [corner(branch.checked_sub(1)), corner(Some(branch))]
+    }
+
+    /// The slopes of the branch before this corner at two places.
+    fn slopes(&self, branch: usize) -> [f64; 2] {
+        let at = |share: f64| match self.ends(branch) {
+            [Some(left), Some(right)] => left + share * (right - left),
+            [Some(left), None] => left + share,
+            [None, right] => right.unwrap_or_default() - share,
+        };
+        [0.5, 0.75].map(|share| self.law.slope(at(share), NodeContext::AT_THE_GAP))
     }
 
     /// The branch of each of these nodes, given by abscissa and pressure.
@@ -65,7 +143,21 @@ impl Law {
             let room = if high > low { 0.1 * (high - low) } else { high.abs().max(1.0) };
             [low - room, high + room]
         };
-        self.law.outline(along(0), along(1))
+        let (corners, [left, right], [bottom, top]) = (self.law.corners(), along(0), along(1));
+        let pressure = |x: f64| self.law.pressure(x, NodeContext::AT_THE_GAP);
+        let is_straight = |branch| matches!(self.slopes(branch), [one, other] if one == other);
+        if !(0..=corners.len()).all(is_straight) {
+            let at = |n: usize| left + (right - left) * n as f64 / SAMPLES as f64;
+            return (0..=SAMPLES).map(|n| [at(n), pressure(at(n))]).collect();
+        }
+        let end = |x: f64, beyond: f64, corner: [f64; 2]| match pressure(x) {
+            pressure if pressure.is_finite() => [x, pressure],
+            _ => [corner[0], beyond],
+        };
+        let mut line = vec![end(left, bottom, corners[0])];
+        line.extend_from_slice(corners);
+        line.push(end(right, top, corners[corners.len() - 1]));
+        line
     }
 }
 

@@ -408,8 +408,7 @@ fn explain_failure<const D: usize, const S: usize>(
 
 /// Whether pressure or friction of a contact decrease with the motion.
 fn decreases<const D: usize>(contact: &Contact<D>) -> bool {
-    let friction = contact.friction();
-    contact.monotonicity_constant() > 0.0 || friction.is_some_and(|law| law.steepest_decrease() > 0.0)
+    contact.monotonicity_constant() > 0.0 || contact.has_decreasing_friction()
 }
 
 /// The reason why Newton's method failed, as a message.
@@ -420,11 +419,9 @@ fn explain(reason: &str, counts: &SolveCounts) -> String {
 
 /// Writes the steepest descent of each contact's friction at the pressures in its bounds, over all ranks. Collective.
 fn write_steepest_decreases<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
-    let steepest_decrease = |contact: &Contact<D>| match contact.friction() {
-        Some(law) if law.steepest_decrease() > 0.0 => {
-            session.largest([contact.steepest_friction_decrease()])[0]
-        }
-        _ => 0.0,
+    let steepest_decrease = |contact: &Contact<D>| match contact.has_decreasing_friction() {
+        true => session.largest([contact.steepest_friction_decrease()])[0],
+        false => 0.0,
     };
     out.clear();
     out.extend(contacts.iter().map(steepest_decrease));

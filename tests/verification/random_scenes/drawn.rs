@@ -220,11 +220,11 @@ pub fn scene<const D: usize>(number: u64, frame: Frame) -> Scene<D> {
     if D == 2 {
         draw.line(format!("hypothesis = \"{hypothesis}\""));
     }
-    let is_viscous = material(&mut draw, &content, "material", hypothesis == "plane_stress" && D == 2);
+    let is_viscous = material(&mut draw, &content, "material");
     let content = Content { is_viscous, ..content };
     if mesh.regions.len() > 1 {
         draw.line("[[region]]\nname = \"core\"\n[region.material]");
-        material(&mut draw, &content, "region.material", true);
+        material(&mut draw, &content, "region.material");
     }
     loads(&mut draw, &content);
     contacts(&mut draw, &content);
@@ -313,7 +313,7 @@ fn time<const D: usize>(draw: &mut Draw<D>, content: &Content) -> bool {
 }
 
 /// The keys of a material; says whether it is viscous.
-fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str, is_thin: bool) -> bool {
+fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str) -> bool {
     let pressure = draw.pressure();
     let viscosity = times(pressure, TIME);
     if content.is_dynamic {
@@ -335,7 +335,7 @@ fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str, 
         draw.key("shear", shear, viscosity);
     }
     if content.is_elastic && draw.chance(0.4) {
-        flow(draw, table, is_thin);
+        flow(draw, table);
     }
     let is_damaged = content.is_elastic && content.scheme != "midpoint" && draw.chance(0.15);
     if is_damaged && table == "material" {
@@ -347,11 +347,10 @@ fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str, 
     is_viscous
 }
 
-fn flow<const D: usize>(draw: &mut Draw<D>, table: &str, is_thin: bool) {
+fn flow<const D: usize>(draw: &mut Draw<D>, table: &str) {
     let pressure = draw.pressure();
     let viscosity = times(pressure, TIME);
     let law = draw.one_of(&["perzyna", "maxwell", "norton", "drucker_prager"]);
-    let law = if law == "drucker_prager" && is_thin { "perzyna" } else { law };
     draw.line(format!("[{table}.viscoplasticity.{law}]"));
     let (relaxation, bound) = (draw.between(1.0, 10.0), draw.between(0.05, 0.5));
     match law {

@@ -110,6 +110,8 @@ pub struct Contact<const D: usize> {
     size: f64,
     facets: Vec<u32>,
     points: Vec<Point<D>>,
+    /// Nodes that this rank owns.
+    owned: usize,
     friction: Option<Friction<D>>,
     /// Nodes at which points meet whose normals are not orthogonal, as lists of contacts and their points; each node is in the list of
     /// one of these contacts.
@@ -176,6 +178,7 @@ impl<const D: usize> Contact<D> {
             size: longest_side(session, &mesh.nodes),
             facets: facets.to_vec(),
             points,
+            owned: mesh.owned,
             friction: None,
             edges: Vec::new(),
             needs_ghosts,
@@ -201,8 +204,8 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &mut self.friction {
             friction.points.retain(|point| !given.contains(&point.at));
             friction.points.iter_mut().for_each(|point| point.at = after(point.at));
-            friction.held.retain(|(at, _)| !given.contains(at));
-            friction.held.iter_mut().for_each(|(at, _)| *at = after(*at));
+            friction.partly_held.retain(|(at, _)| !given.contains(at));
+            friction.partly_held.iter_mut().for_each(|(at, _)| *at = after(*at));
         }
         let mut number = 0..;
         self.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));
@@ -241,7 +244,7 @@ impl<const D: usize> Contact<D> {
             point.forces(point.pressure_at(&self.law, Body, velocity), |_, force| add(at, force));
         }
         for point in self.friction.iter().flat_map(|friction| &friction.points) {
-            add(point.at, point.traction.map(|q| -point.weight * q));
+            add(point.at, point.whole_traction().map(|q| -point.weight * q));
         }
         sums
     }
@@ -272,7 +275,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`
-    /// along the free normal, and `-sigma_tau`.
+    /// along the free normal, and `-sigma_tau` with what supports take up of it.
     pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
             point.add_traction(point.pressure_at(&self.law, Body, velocity), nodal);

@@ -11,7 +11,10 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{
-        effect::{Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES},
+        effect::{
+            Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, History, HistoryStore,
+            Moment, Quantity, quantity,
+        },
         space::Held,
     },
     laws::contact::{FrictionLaw, NodeContext, Wear},
@@ -38,9 +41,9 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map(|friction| friction.law)
     }
 
-    /// Points with friction on this rank.
+    /// Points with friction on this rank that can move along the boundary.
     pub fn friction_point_count(&self) -> usize {
-        self.friction.as_ref().map_or(0, |friction| friction.points.len())
+        self.friction.iter().flat_map(|friction| &friction.points).filter(|point| point.is_free()).count()
     }
 
     /// Sets `c` in the parameter `s = c v + q` of the friction graph, in Pa s/m, and whether its bound depends on the contact
@@ -96,6 +99,7 @@ impl<const D: usize> Contact<D> {
                 continue;
             }
             let parameter = friction.scale * norm(&sliding.along(Newton, values));
+            let held = norm(&sliding.held_sliding(Newton, values));
             let along = point.along(Newton, values);
             point.context.erosion = 0.0;
             for _ in 0..EROSION_ITERATIONS {
@@ -104,7 +108,9 @@ impl<const D: usize> Contact<D> {
                 } else {
                     sliding.pressure
                 };
-                let speed = sliding.law.resolve(parameter, friction.scale, pressure).speed;
+                let at = sliding.context.beside(held);
+                let free = friction.law.resolve_beside(parameter, friction.scale, pressure, at).speed;
+                let speed = if held == 0.0 { free } else { free.hypot(held) };
                 let erosion = wear.erosion(point.context.step_length * speed);
                 let change = erosion - point.context.erosion;
                 point.context.erosion = erosion;
@@ -138,10 +144,10 @@ impl<const D: usize> Contact<D> {
         let blend = self.blend_to_end(length);
         for (sliding, slip) in friction.sliding(Body, velocity) {
             let (speed, point) = (norm(&slip), &self.points[sliding.at]);
-            if let Some(history) = sliding.law.history() {
-                let after = sliding.law.history_after(sliding.history, blend, speed);
+            if let Some(history) = friction.law.history() {
+                let after = friction.law.history_after(sliding.history, blend, speed);
                 let values = [after, sliding.history[0], sliding.history[1], history.initial];
-                let [now, before, earlier, start] = values.map(|value| sliding.law.history_measure(value));
+                let [now, before, earlier, start] = values.map(|value| friction.law.history_measure(value));
                 let error = curvature.error([now, before, earlier]) / history.share;
                 out[0].add(sliding.weight, [error, now - start, NEGLIGIBLE_HISTORY]);
             }
@@ -155,40 +161,21 @@ impl<const D: usize> Contact<D> {
         out
     }
 
-    /// The names of the histories that friction and wear keep at nodes. Fields show the first ones; `all` has those, too, that only the
-    /// next step needs.
-    pub fn history_names(&self, all: bool) -> impl Iterator<Item = &'static str> {
-        let count = if all { 2 } else { 1 };
-        let friction = self.friction.iter().filter_map(|friction| names(&friction.law));
-        let worn = self.wear.iter().map(|_| WORN);
-        friction.chain(worn).flat_map(move |names| names.into_iter().take(count))
+    /// The histories that friction and wear keep at nodes.
+    pub fn histories(&self) -> impl Iterator<Item = &dyn HistoryStore> {
+        let friction = self.friction.iter().map(|friction| friction as &dyn HistoryStore);
+        friction.chain([self as &dyn HistoryStore])
     }
 
-    /// The history of this name at each of its nodes on this rank.
-    pub fn history(&self, name: &str) -> Vec<(usize, f64)> {
-        let Some(friction) = &self.friction else { return Vec::new() };
-        if let Some(at) = position_of_history(&friction.law, name) {
-            return friction.points.iter().map(|point| (point.node(), point.history[at])).collect();
-        }
-        let Some(at) = self.position_of_wear(name) else { return Vec::new() };
-        friction.points.iter().map(|sliding| (sliding.node(), self.points[sliding.at].worn[at])).collect()
+    /// Visits the same histories.
+    pub fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        self.friction.iter_mut().for_each(|friction| visit(friction));
+        visit(self);
     }
 
-    /// Sets the history of this name from values at the owned nodes of the body.
-    pub fn restore_history(&mut self, name: &str, nodal: &[f64]) {
-        if let Some(friction) = &mut self.friction
-            && let Some(at) = position_of_history(&friction.law, name)
-        {
-            friction.points.iter_mut().for_each(|point| point.history[at] = nodal[point.node()]);
-        }
-        if let Some(at) = self.position_of_wear(name) {
-            self.points.iter_mut().for_each(|point| point.worn[at] = nodal[point.node()]);
-        }
-    }
-
-    /// Which of the depths of wear has this name, if there is wear.
-    fn position_of_wear(&self, name: &str) -> Option<usize> {
-        WORN.iter().position(|worn| *worn == name).filter(|_| self.wear.is_some())
+    /// Whether the friction coefficient, or a bound without pressure, may decrease with the sliding velocity in the current step.
+    pub fn has_decreasing_friction(&self) -> bool {
+        self.friction.as_ref().is_some_and(|friction| friction.law.steepest_decrease(friction.context) > 0.0)
     }
 
     /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
@@ -205,7 +192,7 @@ impl<const D: usize> Contact<D> {
     /// before it. Friction that depends on an unbounded pressure counts as not decreasing; see
     /// [`decrease_per_pressure`](Self::decrease_per_pressure).
     pub fn monotonicity_constants(&self, step_length: f64) -> [f64; 2] {
-        let friction = self.friction().map_or(0.0, |law| law.in_step(step_length).steepest_decrease());
+        let friction = self.friction().map_or(0.0, |law| law.first_decrease(step_length));
         let most = self.law.greatest_pressure();
         let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
         [self.law.monotonicity_constant(step_length), tangential]
@@ -230,7 +217,7 @@ impl<const D: usize> Contact<D> {
     /// The steepest descent of the friction coefficient in s/m in a step of this length in s, where the pressure that multiplies it is
     /// unbounded.
     pub fn decrease_per_pressure(&self, step_length: f64) -> Option<f64> {
-        let fall = self.friction()?.in_step(step_length).steepest_decrease();
+        let fall = self.friction()?.first_decrease(step_length);
         (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 
@@ -280,14 +267,35 @@ impl Decrease {
     }
 }
 
-/// Names of the depths of wear: the present one, and that before the last step.
-const WORN: [&str; 2] = ["wear", "previous_wear"];
+/// The depth of wear.
+const WEAR: Quantity = quantity!("wear");
 
-/// The names of what a friction law keeps: the present value, and that before the last step.
-fn names(law: &FrictionLaw) -> Option<[&'static str; 2]> {
-    law.history().map(|history| [history.name, history.earlier_name])
+/// Wear, where there is friction.
+impl<const D: usize> HistoryStore for Contact<D> {
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        let friction = self.friction.as_ref().filter(|_| self.wear.is_some())?;
+        let worn = |at: usize| self.points[at].worn[moment as usize];
+        let values = friction.points.iter().map(|sliding| (sliding.node(), worn(sliding.at)));
+        Some(History::of_nodes((WEAR, moment), self.owned, values))
+    }
+
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        if quantity == WEAR && self.wear.is_some() {
+            self.points.iter_mut().for_each(|point| point.worn[moment as usize] = values[point.node()]);
+        }
+    }
 }
 
-fn position_of_history(law: &FrictionLaw, name: &str) -> Option<usize> {
-    names(law)?.iter().position(|known| *known == name)
+impl<const D: usize> HistoryStore for Friction<D> {
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        let kept = self.law.history()?.quantity;
+        let values = self.points.iter().map(|point| (point.node(), point.history[moment as usize]));
+        Some(History::of_nodes((kept, moment), self.owned, values))
+    }
+
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        if self.law.history().is_some_and(|history| history.quantity == quantity) {
+            self.points.iter_mut().for_each(|point| point.history[moment as usize] = values[point.node()]);
+        }
+    }
 }

@@ -6,7 +6,8 @@ impl<const D: usize> Contact<D> {
     /// The largest velocity in m/s at which a law on this rank has a kink; 0 where no law has one.
     pub fn largest_kink_velocity(&self) -> f64 {
         let normal = self.law.corners().iter().fold(0.0, |largest, p| f64::max(largest, p[0].abs()));
-        let sliding = self.friction().map_or(0.0, |friction| friction.corner_velocity());
+        let sliding =
+            self.friction.as_ref().map_or(0.0, |friction| friction.law.corner_velocity(friction.context));
         f64::max(normal, sliding)
     }
 

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
     use crate::{
         fem::{
-            effect::{Effect, Evaluation},
+            effect::{Effect, Evaluation, Moment},
             space::{
                 Geometry, Needs, Nodal,
                 samples::{number, row},
@@ -175,7 +175,11 @@ mod tests {
             Effect::<D, S>::visit_histories(&mut effect, &mut |history| history.commit());
         }
         let histories = Effect::<D, S>::histories(&effect);
-        let histories = histories.iter().flat_map(|store| store.history().values.into_owned()).collect();
+        let histories = histories
+            .iter()
+            .filter_map(|store| store.values(Moment::Last))
+            .flat_map(|history| history.values.into_owned())
+            .collect();
         (forces, histories, [outcome.energy[VISCOPLASTIC], outcome.energy[NUMERICAL]], flowing)
     }
 

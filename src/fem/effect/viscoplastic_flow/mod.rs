@@ -3,7 +3,7 @@ mod implicit;
 
 use super::{
     Curvature, ELASTIC, Effect, Energy, EnergyKind, Evaluation, FlowProperties, HistoryStore, Outcome,
-    Phases, Role, Step, StressError, Term, cell_history::CellHistory, isotropic,
+    Phases, Quantity, Role, Step, StressError, Term, cell_history::CellHistory, isotropic, quantity,
 };
 use crate::{
     fem::space::{Batch, Geometry, Integrity, Needs},
@@ -12,6 +12,9 @@ use crate::{
 
 /// Absorbed by viscoplastic flow: dissipated, or stored by hardening.
 pub const VISCOPLASTIC: EnergyKind = EnergyKind::new(3, Role::Dissipated, "viscoplastic_dissipation");
+
+/// The stress `H` that flow leaves.
+pub const STRESS_OF_FLOW: Quantity = quantity!("viscoplastic_history");
 
 /// Viscoplastic flow, by the stress `H` that it leaves in the elastic stress `E e(u) + H`, one tensor for each cell that flows, and the
 /// viscoplastic strain that hardening cells accumulate.
@@ -28,13 +31,12 @@ impl<const S: usize> ViscoplasticFlow<S> {
     pub fn new<const D: usize>(laws: ByMaterial<FlowLaw>, geometry: &Geometry<D>) -> Self {
         let flows = |material: usize| laws.get(material).is_some();
         let hardens = |material: usize| laws.get(material).is_some_and(FlowLaw::hardens);
-        let stress =
-            CellHistory::new(["viscoplastic_history", "previous_viscoplastic_history"], geometry, flows);
-        let names = ["equivalent_viscoplastic_strain", "previous_equivalent_viscoplastic_strain"];
+        let stress = CellHistory::new(STRESS_OF_FLOW, geometry, flows);
+        let strain = quantity!("equivalent_viscoplastic_strain");
         let accumulated = laws
             .laws()
             .any(FlowLaw::hardens)
-            .then(|| CellHistory::new(names, geometry, hardens).without_error());
+            .then(|| CellHistory::new(strain, geometry, hardens).without_error());
         let properties = FlowProperties {
             step_bound: laws.laws().map(|law| 2.0 / law.fastest_rate::<S>(1.0)).fold(f64::INFINITY, f64::min),
             has_power_law: laws.laws().any(FlowLaw::is_power_law),

@@ -6,7 +6,7 @@
 
 use crate::laws::contact::{
     discrete_gradient::{self, Potential},
-    normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response},
+    normal_law::{NodeContext, NormalParameters, Resolved, Response},
 };
 use crate::{
     error::Result,
@@ -163,14 +163,6 @@ impl Response for Compliance {
 
     fn energy(&self, penetration: f64) -> Option<f64> {
         Some(self.potential_at(penetration))
-    }
-
-    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
-        let slope = format!("{} Pa × (penetration / m)^{}", number(self.stiffness), number(self.exponent));
-        vec![
-            Branch::new("open", "below the gap", "no pressure"),
-            Branch::new("closed", "beyond the gap", slope),
-        ]
     }
 }
 

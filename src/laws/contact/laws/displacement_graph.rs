@@ -11,7 +11,7 @@
 
 use crate::laws::contact::{
     discrete_gradient::{self, Potential, Vertical},
-    normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response},
+    normal_law::{NodeContext, NormalParameters, Resolved, Response},
     polyline::Polyline,
 };
 use crate::{
@@ -222,16 +222,8 @@ impl Response for PenetrationLaw {
         Some(self.potential(penetration))
     }
 
-    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
-        self.graph.branches_in(["m", "Pa/m"], number)
-    }
-
     fn corners(&self) -> &[[f64; 2]] {
         self.graph.corners()
-    }
-
-    fn outline(&self, along: [f64; 2], pressures: [f64; 2]) -> Vec<[f64; 2]> {
-        self.graph.outline(along, pressures)
     }
 }
 

@@ -12,9 +12,9 @@
 //! steepest decrease is `k (static - dynamic) / distance p`. In a two-step scheme `s0` is its blend of the last two slips and `k` its length.
 
 use crate::laws::{
-    contact::friction_law::{FrictionBound, FrictionHistory},
+    contact::friction_law::{FrictionBound, FrictionHistory, SlidingContext},
     law::LawFault,
-    step::Blend,
+    step::{Blend, quantity},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -48,9 +48,6 @@ pub struct DistanceWeakening {
     /// The decrease of the coefficient.
     #[serde(default)]
     pub decay: Decay,
-    /// Slip in m from which the step starts, and length of the step in s.
-    #[serde(skip)]
-    pub step: [f64; 2],
 }
 
 impl DistanceWeakening {
@@ -65,37 +62,32 @@ impl DistanceWeakening {
             }
         }
     }
+}
 
-    fn slip_at(&self, speed: f64) -> f64 {
-        let [before, length] = self.step;
-        before + length * speed
-    }
+fn slip_at(speed: f64, at: SlidingContext) -> f64 {
+    at.history + at.step_length * speed
 }
 
 impl FrictionBound for DistanceWeakening {
-    fn coefficient(&self, speed: f64) -> f64 {
-        self.dynamic + (self.at_rest - self.dynamic) * self.remainder(self.slip_at(speed))[0]
+    fn coefficient(&self, speed: f64, at: SlidingContext) -> f64 {
+        self.dynamic + (self.at_rest - self.dynamic) * self.remainder(slip_at(speed, at))[0]
     }
 
-    fn slope(&self, speed: f64, pressure: f64) -> f64 {
-        let rate = self.step[1] * self.remainder(self.slip_at(speed))[1];
+    fn slope(&self, speed: f64, pressure: f64, at: SlidingContext) -> f64 {
+        let rate = at.step_length * self.remainder(slip_at(speed, at))[1];
         (self.at_rest - self.dynamic) * rate * pressure.max(0.0)
     }
 
-    fn steepest_decrease(&self) -> f64 {
-        self.step[1] * (self.at_rest - self.dynamic) / self.distance
+    fn steepest_decrease(&self, at: SlidingContext) -> f64 {
+        at.step_length * (self.at_rest - self.dynamic) / self.distance
     }
 
-    fn corner_velocity(&self) -> f64 {
-        if self.step[1] > 0.0 { self.distance / self.step[1] } else { 0.0 }
+    fn corner_velocity(&self, at: SlidingContext) -> f64 {
+        if at.step_length > 0.0 { self.distance / at.step_length } else { 0.0 }
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        Some(FrictionHistory { name: "slip", earlier_name: "previous_slip", initial: 0.0, share: 1.0 })
-    }
-
-    fn start_step(&mut self, [recent, earlier]: [f64; 2], blend: Blend) {
-        self.step = [blend.of(recent, earlier), blend.length];
+        Some(FrictionHistory { quantity: quantity!("slip"), initial: 0.0, share: 1.0 })
     }
 
     /// Where a point comes to rest its slip ends, whatever the blend of a two-step scheme continues.
@@ -121,34 +113,37 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn law(decay: Decay, slip: f64, length: f64) -> DistanceWeakening {
-        let mut law = DistanceWeakening { at_rest: 0.6, dynamic: 0.2, distance: 0.5, decay, step: [0.0; 2] };
-        law.start_step([slip; 2], Blend::euler(length));
-        law
+    fn law(decay: Decay) -> DistanceWeakening {
+        DistanceWeakening { at_rest: 0.6, dynamic: 0.2, distance: 0.5, decay }
+    }
+
+    fn after(slip: f64, length: f64) -> SlidingContext {
+        law(Decay::Linear).context([slip; 2], Blend::euler(length))
     }
 
     #[test]
     fn the_coefficient_falls_by_hand() {
         // 0.25 m of slip before the step, 0.1 s at 1 m/s: 0.35 m of 0.5 m.
-        let linear = law(Decay::Linear, 0.25, 0.1);
-        assert!((linear.bound(1.0, 10.0) - (2.0 + 4.0 * 0.3)).abs() < 1e-14);
-        assert!((linear.slope(1.0, 10.0) + 0.1 * 8.0).abs() < 1e-14);
-        assert_eq!((linear.bound(9.0, 10.0), linear.slope(9.0, 10.0)), (2.0, 0.0));
-        let exponential = law(Decay::Exponential, 0.5, 0.0);
-        assert!((exponential.bound(3.0, 10.0) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
-        for law in [linear, law(Decay::Exponential, 0.0, 0.1)] {
-            assert!((law.steepest_decrease() - 0.08).abs() < 1e-16);
+        let (linear, at) = (law(Decay::Linear), after(0.25, 0.1));
+        assert!((linear.bound(1.0, 10.0, at) - (2.0 + 4.0 * 0.3)).abs() < 1e-14);
+        assert!((linear.slope(1.0, 10.0, at) + 0.1 * 8.0).abs() < 1e-14);
+        assert_eq!((linear.bound(9.0, 10.0, at), linear.slope(9.0, 10.0, at)), (2.0, 0.0));
+        let exponential = law(Decay::Exponential);
+        assert!(
+            (exponential.bound(3.0, 10.0, after(0.5, 0.0)) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14
+        );
+        for law in [linear, exponential] {
+            assert!((law.steepest_decrease(after(0.0, 0.1)) - 0.08).abs() < 1e-16);
         }
-        assert_eq!(linear.bound(1.0, -3.0), 0.0);
+        assert_eq!(linear.bound(1.0, -3.0, at), 0.0);
     }
 
     #[test]
     fn a_two_step_scheme_continues_the_slip_until_a_point_comes_to_rest() {
         let blend = Blend { length: 0.2, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 };
-        let mut law = law(Decay::Linear, 0.0, 0.0);
-        law.start_step([0.3, 0.15], blend);
+        let law = law(Decay::Linear);
         // 0.35 m + 0.2 s 0.5 m/s = 0.45 m of 0.5 m.
-        assert!((law.coefficient(0.5) - 0.24).abs() < 1e-14);
+        assert!((law.coefficient(0.5, law.context([0.3, 0.15], blend)) - 0.24).abs() < 1e-14);
         assert!((law.history_after([0.3, 0.15], blend, 0.5) - 0.45).abs() < 1e-14);
         assert_eq!(law.history_after([0.3, 0.15], blend, 0.0), 0.3);
     }
@@ -158,14 +153,14 @@ mod tests {
         fn parameters_lead_to_points_of_the_graph(
             slip in 0.0f64..1.0, length in 0.001f64..1.0, pressure in 0.1f64..5.0, s in 0.0f64..20.0, linear in any::<bool>(),
         ) {
-            let law = law(if linear { Decay::Linear } else { Decay::Exponential }, slip, length);
-            let c = 1.3 * law.steepest_decrease() * pressure + 0.1;
-            let found = law.resolve(s, c, pressure);
+            let (law, at) = (law(if linear { Decay::Linear } else { Decay::Exponential }), after(slip, length));
+            let c = 1.3 * law.steepest_decrease(at) * pressure + 0.1;
+            let found = law.resolve(s, c, pressure, at);
             prop_assert!((c * found.speed + found.traction - s).abs() < 1e-13 * (1.0 + s));
             if found.speed > 0.0 {
-                prop_assert!((found.traction - law.bound(found.speed, pressure)).abs() < 1e-12 * (1.0 + s));
+                prop_assert!((found.traction - law.bound(found.speed, pressure, at)).abs() < 1e-12 * (1.0 + s));
             } else {
-                prop_assert!(found.traction <= law.bound(0.0, pressure));
+                prop_assert!(found.traction <= law.bound(0.0, pressure, at));
             }
         }
     }

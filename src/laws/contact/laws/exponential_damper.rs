@@ -5,7 +5,7 @@
 //! stress (Flows of materials with yield, J. Rheol. 31 (1987), 385-404). The pressure never decreases with the velocity. The law
 //! stores no energy: all its work is dissipated.
 
-use crate::laws::contact::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::laws::contact::normal_law::{NodeContext, NormalParameters, Resolved, Response};
 use crate::{error::Result, laws::law::increasing_root};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -83,15 +83,6 @@ impl Response for ExponentialDamper {
 
     fn greatest_pressure(&self) -> f64 {
         self.limit
-    }
-
-    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
-        let (limit, velocity) = (number(self.limit), number(self.velocity));
-        let curve = format!("{limit} Pa × (1 − exp(−velocity / {velocity} m/s))");
-        vec![
-            Branch::new("open", "below 0 m/s", "no pressure"),
-            Branch::new("pressed", "from 0 m/s on", curve),
-        ]
     }
 }
 

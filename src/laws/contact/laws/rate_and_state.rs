@@ -30,9 +30,9 @@
 //! `1 + max(0, ln(theta_0 / k)) + 1/e` for the slip law.
 
 use crate::laws::{
-    contact::friction_law::{FrictionBound, FrictionHistory, Slip},
+    contact::friction_law::{FrictionBound, FrictionHistory, STICKS, SlidingContext, Slip},
     law::LawFault,
-    step::Blend,
+    step::{Blend, quantity},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -77,29 +77,12 @@ pub struct RateAndState {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 10.0)]
     pub initial_state: Option<f64>,
-    /// The start of the step.
-    #[serde(skip)]
-    pub step: StateStep,
-}
-
-/// The start of a step for the state.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct StateStep {
-    /// The state in s from which the step starts.
-    before: f64,
-    /// Length of the step in s.
-    length: f64,
-    /// Whether the state follows a two-step scheme.
-    is_blended: bool,
 }
 
 /// Of the solution for the velocity.
 const ITERATIONS: usize = 200;
 /// The logarithm of the smallest velocity.
 const LEAST: f64 = -700.0;
-/// A point whose velocity follows the parameter by less than this share of `1 / c` counts as sticking: it creeps so slowly that the change
-/// of its velocity has no effect on Newton's method, while its slope would only spoil the condition of the matrix.
-const STICKS: f64 = 1e-8;
 /// Share of the tolerance of adaptive steps for the state. Stick-slip lives on a balance of a growth per cycle that is a few per cent with a
 /// loss that the error of the state causes in each step: with this share, the default tolerance gives the range of friction to 1 %
 /// and the period to 2 % under `implicit_euler`.
@@ -114,15 +97,9 @@ impl RateAndState {
         self.initial_state.unwrap_or(self.distance / self.velocity)
     }
 
-    /// The start of a step from a blend of the states after the last step and before it.
-    fn state_step([recent, earlier]: [f64; 2], blend: Blend) -> StateStep {
-        let (length, is_blended) = (blend.length, blend.earlier != 0.0);
-        let before = if is_blended { blend.of(recent.ln(), earlier.ln()).exp() } else { recent };
-        StateStep { before, length, is_blended }
-    }
-
     /// The logarithm of the state over 1 s at the end of a step with this velocity in m/s, and its derivative by the velocity.
-    fn log_state(&self, StateStep { before, length, is_blended }: StateStep, speed: f64) -> [f64; 2] {
+    fn log_state(&self, at: SlidingContext, speed: f64) -> [f64; 2] {
+        let SlidingContext { history: before, step_length: length, is_blended, .. } = at;
         let (rate, x) = (length / self.distance, length * speed / self.distance);
         let left = (-x).exp();
         match self.law {
@@ -159,8 +136,8 @@ impl RateAndState {
     }
 
     /// The coefficient at the end of a step with this velocity, and its derivative by the velocity in s/m.
-    fn at(&self, speed: f64) -> [f64; 2] {
-        let [log_state, log_slope] = self.log_state(self.step, speed);
+    fn at(&self, speed: f64, at: SlidingContext) -> [f64; 2] {
+        let [log_state, log_slope] = self.log_state(at, speed);
         let strength = self.reference + self.evolution * (log_state + (self.velocity / self.distance).ln());
         // asinh of a number that may be too large for an f64.
         let log_argument = (0.5 * speed / self.velocity).ln() + strength / self.direct;
@@ -180,20 +157,20 @@ impl RateAndState {
 }
 
 impl FrictionBound for RateAndState {
-    fn coefficient(&self, speed: f64) -> f64 {
-        self.at(speed)[0]
+    fn coefficient(&self, speed: f64, at: SlidingContext) -> f64 {
+        self.at(speed, at)[0]
     }
 
-    fn slope(&self, speed: f64, pressure: f64) -> f64 {
-        self.at(speed)[1] * pressure.max(0.0)
+    fn slope(&self, speed: f64, pressure: f64, at: SlidingContext) -> f64 {
+        self.at(speed, at)[1] * pressure.max(0.0)
     }
 
     fn jumps_at_rest(&self) -> bool {
         false
     }
 
-    fn steepest_decrease(&self) -> f64 {
-        let StateStep { before, length, .. } = self.step;
+    fn steepest_decrease(&self, at: SlidingContext) -> f64 {
+        let SlidingContext { history: before, step_length: length, .. } = at;
         let follows = match self.law {
             Evolution::Ageing => 1.0,
             Evolution::Slip if length > 0.0 => {
@@ -204,21 +181,27 @@ impl FrictionBound for RateAndState {
         self.evolution * follows * length / self.distance
     }
 
-    fn corner_velocity(&self) -> f64 {
+    fn corner_velocity(&self, _: SlidingContext) -> f64 {
         self.velocity
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        let [name, earlier_name] = ["friction_state", "previous_friction_state"];
-        Some(FrictionHistory { name, earlier_name, initial: self.first_state(), share: SHARE })
+        Some(FrictionHistory {
+            quantity: quantity!("friction_state"),
+            initial: self.first_state(),
+            share: SHARE,
+        })
     }
 
-    fn start_step(&mut self, histories: [f64; 2], blend: Blend) {
-        self.step = Self::state_step(histories, blend);
+    /// A two-step scheme blends the logarithms of the states.
+    fn context(&self, [recent, earlier]: [f64; 2], blend: Blend) -> SlidingContext {
+        let is_blended = blend.earlier != 0.0;
+        let history = if is_blended { blend.of(recent.ln(), earlier.ln()).exp() } else { recent };
+        SlidingContext { history, step_length: blend.length, is_blended, held: 0.0 }
     }
 
     fn history_after(&self, histories: [f64; 2], blend: Blend, speed: f64) -> f64 {
-        self.log_state(Self::state_step(histories, blend), speed)[0].exp()
+        self.log_state(self.context(histories, blend), speed)[0].exp()
     }
 
     fn history_measure(&self, state: f64) -> f64 {
@@ -238,10 +221,10 @@ impl FrictionBound for RateAndState {
     }
 
     /// The velocity is sought by its logarithm: it may be smaller than any rounding error of the parameter.
-    fn resolve(&self, s: f64, c: f64, pressure: f64) -> Slip {
+    fn resolve(&self, s: f64, c: f64, pressure: f64, context: SlidingContext) -> Slip {
         let pressure = pressure.max(0.0);
         let at = |speed: f64| {
-            let [coefficient, slope] = self.at(speed);
+            let [coefficient, slope] = self.at(speed, context);
             let slope = slope * pressure;
             let traction = if pressure > 0.0 { s - c * speed } else { 0.0 };
             let derivative = 1.0 / (c + slope);
@@ -254,11 +237,12 @@ impl FrictionBound for RateAndState {
             return at(s / c);
         }
         // The coefficient is at most its slope at rest times the velocity, and the state at most that of rest.
-        let [mut low, mut high] = [(s / (c + pressure * self.at(0.0)[1])).ln().max(LEAST), (s / c).ln()];
+        let [mut low, mut high] =
+            [(s / (c + pressure * self.at(0.0, context)[1])).ln().max(LEAST), (s / c).ln()];
         let mut now = high;
         for _ in 0..ITERATIONS {
             let speed = now.exp();
-            let [coefficient, slope] = self.at(speed);
+            let [coefficient, slope] = self.at(speed, context);
             let open = c * speed + pressure * coefficient - s;
             if open > 0.0 {
                 high = now;
@@ -299,8 +283,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn law(law: Evolution, state: f64, length: f64) -> RateAndState {
-        let mut law = RateAndState {
+    fn law(law: Evolution) -> RateAndState {
+        RateAndState {
             reference: 0.6,
             velocity: 1e-6,
             direct: 0.01,
@@ -308,37 +292,32 @@ mod tests {
             distance: 1e-5,
             law,
             initial_state: None,
-            step: StateStep::default(),
-        };
-        law.start_step([state; 2], Blend::euler(length));
-        law
+        }
+    }
+
+    fn after(history: f64, step_length: f64) -> SlidingContext {
+        SlidingContext { history, step_length, is_blended: false }
     }
 
     #[test]
     fn steady_sliding_and_a_jump_of_the_velocity_by_hand() {
         for evolution in [Evolution::Ageing, Evolution::Slip] {
             // No time passes: the state is that given.
-            let steady = law(evolution, 10.0, 0.0);
-            assert!((steady.first_state() - 10.0).abs() < 1e-14);
-            assert!((steady.coefficient(1e-6) - 0.6).abs() < 1e-12);
-            assert!((steady.coefficient(1e-5) - (0.6 + 0.01 * 10f64.ln())).abs() < 1e-12);
+            let (law, steady) = (law(evolution), after(10.0, 0.0));
+            assert!((law.first_state() - 10.0).abs() < 1e-14);
+            assert!((law.coefficient(1e-6, steady) - 0.6).abs() < 1e-12);
+            assert!((law.coefficient(1e-5, steady) - (0.6 + 0.01 * 10f64.ln())).abs() < 1e-12);
             // Long after the jump the state is distance / velocity = 1 s.
-            let after = law(evolution, 10.0, 100.0);
-            assert!((after.coefficient(1e-5) - (0.6 - 0.005 * 10f64.ln())).abs() < 1e-12);
-            assert!((after.history_after([10.0; 2], Blend::euler(100.0), 1e-5) - 1.0).abs() < 1e-12);
+            assert!((law.coefficient(1e-5, after(10.0, 100.0)) - (0.6 - 0.005 * 10f64.ln())).abs() < 1e-12);
+            assert!((law.history_after([10.0; 2], Blend::euler(100.0), 1e-5) - 1.0).abs() < 1e-12);
         }
         // At rest: ageing grows by the time, the slip law keeps the state.
-        assert!(
-            (law(Evolution::Ageing, 10.0, 3.0).history_after([10.0; 2], Blend::euler(3.0), 0.0) - 13.0).abs()
-                < 1e-14
-        );
-        assert!(
-            (law(Evolution::Slip, 10.0, 3.0).history_after([10.0; 2], Blend::euler(3.0), 0.0) - 10.0).abs()
-                < 1e-14
-        );
+        for (evolution, state) in [(Evolution::Ageing, 13.0), (Evolution::Slip, 10.0)] {
+            assert!((law(evolution).history_after([10.0; 2], Blend::euler(3.0), 0.0) - state).abs() < 1e-14);
+        }
         // One step, or two of half the length, at the same velocity.
         for evolution in [Evolution::Ageing, Evolution::Slip] {
-            let law = law(evolution, 4.0, 1.0);
+            let law = law(evolution);
             let after = |state: f64, length| law.history_after([state; 2], Blend::euler(length), 3e-6);
             assert!((after(4.0, 1.0) - after(after(4.0, 0.5), 0.5)).abs() < 1e-14);
         }
@@ -346,14 +325,14 @@ mod tests {
 
     #[test]
     fn small_arguments_are_as_exact_as_large_ones() {
-        let law = law(Evolution::Ageing, 2.0, 1.0);
-        let [below, above] = [0.9999e-8, 1.0001e-8].map(|speed| law.log_state(law.step, speed));
+        let law = law(Evolution::Ageing);
+        let [below, above] = [0.9999e-8, 1.0001e-8].map(|speed| law.log_state(after(2.0, 1.0), speed));
         assert!(
             (below[0] - above[0] + 2e-12 * 0.5 * (below[1] + above[1])).abs() < 1e-15,
             "{below:?} {above:?}"
         );
         assert!((below[1] / above[1] - 1.0).abs() < 1e-6, "{below:?} {above:?}");
-        assert_eq!(law.coefficient(0.0), 0.0);
+        assert_eq!(law.coefficient(0.0, after(2.0, 1.0)), 0.0);
     }
 
     #[test]
@@ -363,7 +342,7 @@ mod tests {
             .into_iter()
             .flat_map(|evolution| [[3.0, 2.9], [1e-4, 30.0], [2e9, 1e9]].map(|states| (evolution, states)))
         {
-            let law = law(evolution, 0.0, 0.0);
+            let law = law(evolution);
             let start = 4.0 / 3.0 * f64::ln(states[0]) - f64::ln(states[1]) / 3.0;
             for speed in [1e-20, 1e-9, 1e-6, 1e-4, 1e-2] {
                 let state = law.history_after(states, blend, speed);
@@ -386,19 +365,19 @@ mod tests {
             pressure in 0.1f64..5.0, more in 1.1f64..5.0,
         ) {
             let [state, length, speed] = [state, length, speed].map(|power: f64| 10f64.powf(power));
-            let mut law = law(if slips { Evolution::Slip } else { Evolution::Ageing }, state, length);
-            law.step.is_blended = blended;
+            let law = law(if slips { Evolution::Slip } else { Evolution::Ageing });
+            let at = SlidingContext { is_blended: blended, ..after(state, length) };
             let h = 1e-5 * speed;
-            let quotient = (law.coefficient(speed + h) - law.coefficient(speed - h)) / (2.0 * h);
-            let slope = law.slope(speed, 1.0);
+            let quotient = (law.coefficient(speed + h, at) - law.coefficient(speed - h, at)) / (2.0 * h);
+            let slope = law.slope(speed, 1.0, at);
             prop_assert!((quotient - slope).abs() <= 1e-5 * (0.02 / speed), "{quotient} {slope}");
-            prop_assert!(slope >= -law.steepest_decrease(), "{slope} below {}", law.steepest_decrease());
-            let c = more * law.steepest_decrease() * pressure + 0.1;
-            let s = c * speed + law.bound(speed, pressure);
-            let found = law.resolve(s, c, pressure);
-            prop_assert!((c * found.speed + law.bound(found.speed, pressure) - s).abs() < 1e-13 * (1.0 + s));
-            prop_assert!((found.traction - law.bound(found.speed, pressure)).abs() < 1e-12 * (1.0 + s));
-            let total = c + pressure * law.slope(found.speed, 1.0);
+            prop_assert!(slope >= -law.steepest_decrease(at), "{slope} below {}", law.steepest_decrease(at));
+            let c = more * law.steepest_decrease(at) * pressure + 0.1;
+            let s = c * speed + law.bound(speed, pressure, at);
+            let found = law.resolve(s, c, pressure, at);
+            prop_assert!((c * found.speed + law.bound(found.speed, pressure, at) - s).abs() < 1e-13 * (1.0 + s));
+            prop_assert!((found.traction - law.bound(found.speed, pressure, at)).abs() < 1e-12 * (1.0 + s));
+            let total = c + pressure * law.slope(found.speed, 1.0, at);
             if c / total < STICKS {
                 prop_assert_eq!([found.derivative, found.slope, found.coefficient], [0.0; 3]);
             } else {
@@ -409,12 +388,12 @@ mod tests {
 
     #[test]
     fn without_pressure_or_traction_there_is_no_friction() {
-        let law = law(Evolution::Ageing, 10.0, 1.0);
+        let (law, at) = (law(Evolution::Ageing), after(10.0, 1.0));
         for pressure in [0.0, -3.0] {
-            let found = law.resolve(6.0, 2.0, pressure);
+            let found = law.resolve(6.0, 2.0, pressure, at);
             assert_eq!((found.speed, found.traction, found.slope), (3.0, 0.0, 0.0));
         }
-        let rest = law.resolve(0.0, 2.0, 5.0);
+        let rest = law.resolve(0.0, 2.0, 5.0, at);
         assert_eq!((rest.speed, rest.traction), (0.0, 0.0));
         assert_eq!((rest.derivative, rest.slope), (0.0, 0.0), "it sticks: {rest:?}");
     }

@@ -3,7 +3,7 @@
 //! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact pressure. Its
 //! steepest decrease is `(static - dynamic) / decay_velocity p`.
 
-use crate::laws::contact::friction_law::FrictionBound;
+use crate::laws::contact::friction_law::{FrictionBound, SlidingContext};
 use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,19 +25,19 @@ pub struct SlipWeakening {
 }
 
 impl FrictionBound for SlipWeakening {
-    fn coefficient(&self, speed: f64) -> f64 {
+    fn coefficient(&self, speed: f64, _: SlidingContext) -> f64 {
         self.dynamic + (self.at_rest - self.dynamic) * (-speed / self.decay_velocity).exp()
     }
 
-    fn slope(&self, speed: f64, pressure: f64) -> f64 {
-        -self.steepest_decrease() * (-speed / self.decay_velocity).exp() * pressure.max(0.0)
+    fn slope(&self, speed: f64, pressure: f64, at: SlidingContext) -> f64 {
+        -self.steepest_decrease(at) * (-speed / self.decay_velocity).exp() * pressure.max(0.0)
     }
 
-    fn steepest_decrease(&self) -> f64 {
+    fn steepest_decrease(&self, _: SlidingContext) -> f64 {
         (self.at_rest - self.dynamic) / self.decay_velocity
     }
 
-    fn corner_velocity(&self) -> f64 {
+    fn corner_velocity(&self, _: SlidingContext) -> f64 {
         self.decay_velocity
     }
 
@@ -54,11 +54,14 @@ impl FrictionBound for SlipWeakening {
 mod tests {
     use super::*;
 
+    const FIRST: SlidingContext =
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
+
     #[test]
     fn the_coefficient_falls_by_hand() {
         let law = SlipWeakening { at_rest: 0.6, dynamic: 0.2, decay_velocity: 0.5 };
-        assert!((law.bound(0.0, 10.0) - 6.0).abs() < 1e-15);
-        assert!((law.bound(0.5, 10.0) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
-        assert!((law.steepest_decrease() - 0.8).abs() < 1e-15);
+        assert!((law.bound(0.0, 10.0, FIRST) - 6.0).abs() < 1e-15);
+        assert!((law.bound(0.5, 10.0, FIRST) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
+        assert!((law.steepest_decrease(FIRST) - 0.8).abs() < 1e-15);
     }
 }

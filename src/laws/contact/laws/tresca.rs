@@ -1,6 +1,6 @@
 //! Tresca friction: a given bound on the friction traction.
 
-use crate::laws::contact::friction_law::FrictionBound;
+use crate::laws::contact::friction_law::{FrictionBound, SlidingContext};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,11 +14,11 @@ pub struct Tresca {
 }
 
 impl FrictionBound for Tresca {
-    fn coefficient(&self, _speed: f64) -> f64 {
+    fn coefficient(&self, _speed: f64, _: SlidingContext) -> f64 {
         0.0
     }
 
-    fn bound(&self, _speed: f64, _pressure: f64) -> f64 {
+    fn bound(&self, _speed: f64, _pressure: f64, _: SlidingContext) -> f64 {
         self.bound
     }
 
@@ -31,11 +31,14 @@ impl FrictionBound for Tresca {
 mod tests {
     use super::*;
 
+    const FIRST: SlidingContext =
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
+
     #[test]
     fn the_bound_is_the_given_one_whatever_the_pressure() {
         let law = Tresca { bound: 3.0 };
-        assert_eq!(FrictionBound::bound(&law, 7.0, -1.0), 3.0);
-        let slides = law.resolve(7.0, 2.0, -1.0);
+        assert_eq!(FrictionBound::bound(&law, 7.0, -1.0, FIRST), 3.0);
+        let slides = law.resolve(7.0, 2.0, -1.0, FIRST);
         assert_eq!((slides.speed, slides.traction, slides.coefficient), (2.0, 3.0, 0.0));
     }
 }

@@ -3,7 +3,7 @@
 //! Within a step both are graphs over the normal velocity that are zero up to a velocity and vertical there: the velocity that
 //! closes the gap at the end of the step, or zero.
 
-use crate::laws::contact::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::laws::contact::normal_law::{NodeContext, NormalParameters, Resolved, Response};
 use crate::{
     error::Result,
     laws::{expression::Scalar, law::LawFault},
@@ -112,22 +112,6 @@ impl Response for Unilateral {
 
     fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
         Err("the growth constant is infinite because a contact law ends in a vertical ray")
-    }
-
-    fn branches(&self, _number: fn(f64) -> String) -> Vec<Branch> {
-        match self.bound {
-            Bound::Displacement => vec![
-                Branch::new("open", "below the gap", "no pressure"),
-                Branch::new("closed", "at the gap", "vertical"),
-            ],
-            Bound::Velocity => {
-                vec![Branch::new("S1", "below 0 m/s", "0 Pa s/m"), Branch::new("S2", "at 0 m/s", "vertical")]
-            }
-        }
-    }
-
-    fn outline(&self, [left, _]: [f64; 2], [_, top]: [f64; 2]) -> Vec<[f64; 2]> {
-        vec![[left, 0.0], [0.0, 0.0], [0.0, top]]
     }
 }
 

@@ -18,6 +18,7 @@
 use super::{
     flow::{Flow, InPlaces, Parameters},
     tangent::{Tangent, add_product, write_isotropic},
+    thickness::ThroughThickness,
 };
 use crate::{
     laws::material::{Elastic, Elasticity, Hypothesis, Isotropic},
@@ -61,15 +62,10 @@ impl<N> InPlaces<N> for DruckerPrager<N> {
 }
 
 impl Parameters for DruckerPrager {
-    type Flow = Elastic<Self>;
+    type Flow = ThroughThickness<Elastic<Self>>;
 
-    const NOT_IN_PLANE_STRESS: Option<[&'static str; 2]> = Some([
-        "Drucker and Prager's law is not available in plane stress",
-        "use hypothesis = \"plane_strain\", a 3D body or another law",
-    ]);
-
-    fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Elastic<Self> {
-        Elastic { parameters: *self, elasticity: elasticity.tensor(hypothesis) }
+    fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Self::Flow {
+        ThroughThickness::new(*self, elasticity, hypothesis)
     }
 
     fn keeps_volume(&self) -> bool {
@@ -223,7 +219,7 @@ mod tests {
     const LAW: DruckerPrager = DruckerPrager { relaxation: 100.0, friction_coefficient: 0.6, cohesion: 10.0 };
 
     fn law(hypothesis: Hypothesis) -> Elastic<DruckerPrager> {
-        LAW.prepare(&SOIL, hypothesis)
+        LAW.prepare(&SOIL, hypothesis).space
     }
 
     #[test]
@@ -256,7 +252,7 @@ mod tests {
 
     #[test]
     fn without_friction_it_is_perzynas_law() {
-        let cone = DruckerPrager { friction_coefficient: 0.0, ..LAW }.prepare(&SOIL, Hypothesis::Space);
+        let cone = DruckerPrager { friction_coefficient: 0.0, ..LAW }.prepare(&SOIL, Hypothesis::Space).space;
         let cylinder = Perzyna {
             relaxation: 100.0,
             yield_stress: 10.0 * 3f64.sqrt(),

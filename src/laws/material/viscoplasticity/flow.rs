@@ -17,9 +17,6 @@ pub trait Parameters {
     /// The type that evaluates the law.
     type Flow: Flow;
 
-    /// For laws that plane stress does not support: the reason, and what to do instead.
-    const NOT_IN_PLANE_STRESS: Option<[&'static str; 2]> = None;
-
     /// The law in a material of this elasticity.
     fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Self::Flow;
 
