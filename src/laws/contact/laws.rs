@@ -202,7 +202,8 @@ mod tests {
         }
     }
 
-    const FIRST: SlidingContext = SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
+    const FIRST: SlidingContext =
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
 
     fn any_law() -> impl Strategy<Value = FrictionLaw> {
         let weakening =
