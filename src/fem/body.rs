@@ -371,9 +371,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 
     /// The stress without viscosity at the end of a step that was solved and not yet committed, and the error that trial histories
-    /// make in it, of this rank, given the displacement at the end.
-    pub fn stress_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
-        let mut error = self.surface_error(curvature, displacement);
+    /// make in it, of this rank, given the displacement at the end and the [part of the surface](Self::surface_error).
+    pub fn stress_error(
+        &self,
+        curvature: Curvature,
+        displacement: &[f64],
+        surface: StressError,
+    ) -> StressError {
+        let mut error = surface;
         self.elastic_support.add_error(displacement, &mut error);
         let Some(needs) = self.needs(|p| p.error) else { return error };
         // Those that weaken before the others.

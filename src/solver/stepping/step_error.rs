@@ -88,7 +88,8 @@ impl ErrorWorkspace {
             let (start, length) =
                 flow_start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
             write(end, start.local()?.iter().zip(trial.iter()).map(|(u, v)| u + length * v));
-            [body.stress_error(curvature, end), body.surface_error(curvature, end)]
+            let surface = body.surface_error(curvature, end);
+            [body.stress_error(curvature, end, surface), surface]
         };
         let contact = contact_deviations(session, body, curvature, (&*end, &*trial), step);
         let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));

@@ -181,9 +181,13 @@ impl<const D: usize> Friction<D> {
                 point.pressure,
                 point.context.beside(held_speed),
             );
-            let whole_speed = found.speed.hypot(held_speed);
-            let per_speed = self.law.bound(whole_speed, point.pressure, point.context) / whole_speed;
-            point.held_traction = held.map(|w| if w == 0.0 { 0.0 } else { per_speed * w });
+            point.held_traction = if held_speed == 0.0 {
+                [0.0; D]
+            } else {
+                let whole_speed = found.speed.hypot(held_speed);
+                let per_speed = self.law.bound(whole_speed, point.pressure, point.context) / whole_speed;
+                held.map(|w| per_speed * w)
+            };
             let shares = if found.traction == 0.0 {
                 // Without traction the velocity is bitwise equal to the unknown.
                 [1.0, 0.0]
