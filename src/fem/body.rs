@@ -371,11 +371,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 
     /// The stress without viscosity at the end of a step that was solved and not yet committed, and the error that trial histories
-    /// make in it, of this rank, given the displacement at the end.
-    pub fn stress_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
-        let mut error = StressError::default();
+    /// make in it, of this rank, given the displacement at the end and the [part of the surface](Self::surface_error).
+    pub fn stress_error(
+        &self,
+        curvature: Curvature,
+        displacement: &[f64],
+        surface: StressError,
+    ) -> StressError {
+        let mut error = surface;
         self.elastic_support.add_error(displacement, &mut error);
-        self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, displacement, &mut error));
         let Some(needs) = self.needs(|p| p.error) else { return error };
         // Those that weaken before the others.
         let called = [true, false].map(|weakens| self.called(|p| p.error.is_some() && p.weakens == weakens));
@@ -388,6 +392,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 called.select(&self.effects).for_each(|e| e.add_error(curvature, batch, &mut error));
             }
         });
+        error
+    }
+
+    /// The part of bonds and contact memory in [`stress_error`](Self::stress_error).
+    pub fn surface_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
+        let mut error = StressError::default();
+        self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, displacement, &mut error));
         error
     }
 

@@ -24,6 +24,16 @@ pub enum Moment {
     Earlier,
 }
 
+impl Moment {
+    /// What belongs to this moment among the values after the last step and those before it, if they are kept.
+    pub fn of<T>(self, last: T, earlier: Option<T>) -> Option<T> {
+        match self {
+            Self::Last => Some(last),
+            Self::Earlier => earlier,
+        }
+    }
+}
+
 impl Quantity {
     /// A quantity with these names of its values after the last step and before it.
     pub const fn named(names: [&'static str; 2]) -> Self {

@@ -79,7 +79,8 @@ pub(super) fn body<const D: usize, const S: usize>(
     if let Some(motion) = &motion {
         let State { displacement, velocity, .. } = &mut state;
         let started = motion.start_displacement(&mut displacement.owned_mut()?);
-        session.agree(started.and(motion.start_velocity(job.time.step, &mut velocity.owned_mut()?)))?;
+        let step = job.time.step;
+        session.agree(started.and(motion.start_velocity(step, |_, _| None, &mut velocity.owned_mut()?)))?;
     }
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;

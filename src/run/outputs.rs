@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use crate::{
-    error::Result,
+    error::{Error, Result},
     fem::{body::Body, state::State},
     io::output::{
         checkpoint::{self, Header, Identity},
@@ -22,6 +22,7 @@ use crate::{
 };
 use std::{
     collections::BTreeMap,
+    os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -43,6 +44,8 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     keep: usize,
     /// Bytes of the growing files when the run opened them, on rank 0.
     before: u64,
+    /// The files that are extended, with what identifies them on their disk, on rank 0.
+    opened: Vec<(PathBuf, [u64; 2])>,
     /// Bytes of the checkpoints so far, on rank 0.
     checkpoints: u64,
     /// Time spent on writing.
@@ -98,6 +101,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             History::open(&folder, step)
         };
         let history = session.on_first(tables)?;
+        let opened = if session.is_first() { extended(&folder) } else { Vec::new() };
         let of_history = history.iter().flat_map(History::faults);
         of_history
             .chain(resultants.faults())
@@ -120,6 +124,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             profiled,
             keep,
             before,
+            opened,
             checkpoints,
             spent,
         })
@@ -164,6 +169,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         self.write_state(session, body, state, [fields, profiles])?;
         self.fields.write_out()?;
         session.agree(self.flush())?;
+        session.on_first(|| self.are_there())?;
         self.spent += start.elapsed();
         Ok(())
     }
@@ -212,8 +218,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         self.profiles.flush()
     }
 
-    /// Writes a checkpoint and removes the oldest. It does not depend on fields: if these can't be written, the checkpoint is,
-    /// and the failure of the fields is returned. Collective.
+    /// Writes a checkpoint and removes the oldest. It does not depend on fields: if these can't be written or files are lost, the
+    /// checkpoint is written, and the failure returned. Collective.
     pub(super) fn checkpoint(
         &mut self,
         session: &Session,
@@ -234,7 +240,20 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         })?;
         self.spent += start.elapsed();
         fields?;
+        session.on_first(|| self.are_there())?;
         Ok(path)
+    }
+
+    /// Fails if a file that is extended is no longer in its folder: what is written to it then is lost.
+    fn are_there(&self) -> Result<()> {
+        let lost = self.opened.iter().find(|(path, identity)| identity_of(path) != Some(*identity));
+        lost.map_or(Ok(()), |(path, _)| {
+            Err(Error::Failed(format!(
+                "{} was removed or replaced during the run, and what the run wrote to it is lost; continue with --restart, or repeat \
+                 the run with --force to have the whole file",
+                path.display()
+            )))
+        })
     }
 
     /// Bytes that this run wrote: the growth of tables and fields, and all checkpoints. On rank 0; 0 elsewhere.
@@ -251,7 +270,21 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
 
 /// Files that grow during a run.
 const GROWING: [&str; 6] =
-    ["history.csv", "resultants.csv", "probes.csv", "profiles.csv", "fields.vtkhdf", "fields.xdmf"];
+    ["history.csv", "resultants.csv", "probes.csv", "profiles.csv", "fields.vtkhdf", WRITTEN_ANEW];
+/// The one of them that is written anew each time.
+const WRITTEN_ANEW: &str = "fields.xdmf";
+
+/// The files of a folder that are extended.
+fn extended(folder: &Path) -> Vec<(PathBuf, [u64; 2])> {
+    let names = GROWING.iter().filter(|name| **name != WRITTEN_ANEW);
+    let paths = names.map(|name| folder.join(name));
+    paths.filter_map(|path| identity_of(&path).map(|identity| (path, identity))).collect()
+}
+
+/// The disk of a file and its number there, if it exists.
+fn identity_of(path: &Path) -> Option<[u64; 2]> {
+    std::fs::metadata(path).ok().map(|file| [file.dev(), file.ino()])
+}
 
 fn length_of_all(folder: &Path) -> u64 {
     GROWING.iter().map(|name| length(&folder.join(name))).sum()

@@ -6,7 +6,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{ELASTIC, Form, Step, Supports},
-        space::{SurfacePoint, surface_points},
+        space::{Held, SurfacePoint, surface_points},
         state::State,
     },
     job::Support,
@@ -14,6 +14,7 @@ use crate::{
         petsc::DistributedVector,
         tensor::{Vector, add_scaled, dot, larger, norm},
     },
+    mesh::Mesh,
     parallel::session::Session,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -230,6 +231,26 @@ pub(super) fn take_over<const D: usize, const S: usize>(
         body.elastic_support.has_reactions = true;
     }
     Ok(Handover { taken, released, loads })
+}
+
+/// The directions along which supports of the job with the keys `earlier` moved nodes. Collective.
+pub(super) fn moved_before<const D: usize>(
+    session: &Session,
+    earlier: &BTreeMap<String, String>,
+    mesh: &Mesh<D>,
+    layout: &DistributedVector,
+) -> Result<Held<D>> {
+    let supports = session.agree(boundaries_of(earlier, "support"))?;
+    let moves = |number: &usize| {
+        let is_motion = |key: &String| {
+            let of_support = key.strip_prefix(&format!("support.{number}."));
+            of_support.is_some_and(|key| key.starts_with("displacement") || key.starts_with("velocity"))
+        };
+        earlier.keys().any(is_motion)
+    };
+    let moved = supports.into_iter().enumerate().filter(|(number, _)| moves(number));
+    let moved: Vec<Support> = moved.map(|(_, support)| support).collect();
+    Ok(Supports::new(session, mesh, &moved, layout)?.held)
 }
 
 /// The nodal forces at the start state on owned nodes, zero in directions that are free in a balance without motion. Collective.

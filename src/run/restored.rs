@@ -2,7 +2,7 @@
 
 use super::{
     Start,
-    reactions::{imbalance, take_over},
+    reactions::{imbalance, moved_before, take_over},
 };
 use crate::{
     error::{Error, Exit, Result},
@@ -17,10 +17,14 @@ use crate::{
         history::Totals,
     },
     job::Loaded,
+    linear_algebra::tensor::{Vector, norm},
     parallel::{agreement::Agreed, session::Session},
 };
 use mpi::traits::{Communicator, Root};
 use std::path::{Path, PathBuf};
+
+/// A unit direction with a smaller free part is held.
+const ROUNDING: f64 = 1e-9;
 
 /// A checkpoint that was read.
 pub(super) struct Restored {
@@ -86,7 +90,9 @@ pub(super) struct StartState {
 }
 
 /// Reads the state that a job starts from, if it names one, into body and state. Components that supports
-/// hold keep the displacement and have the velocity of the supports. Collective.
+/// hold keep the displacement and have the velocity of the supports; where supports moved them before, their motion continues: the
+/// velocity of the state is the mean of the last step in some schemes, and that of the support at this time would be a jump.
+/// Collective.
 pub(super) fn transfer<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
@@ -124,13 +130,19 @@ pub(super) fn transfer<const D: usize, const S: usize>(
     let mut found = checkpoint::transfer(session, &file, &physics, body, state)?;
     found.at_rest.retain(|name| name != SUPPORT_REACTION.name(Moment::Last));
     let handover = take_over(session, &found.physics, body, state)?;
+    let moved = moved_before(session, &found.physics, &body.mesh, &state.velocity)?;
+    let before: Vec<f64> = session.agree(state.velocity.owned())?.to_vec();
     for field in [&mut state.velocity, &mut state.previous_velocity] {
         body.held.clear(&mut field.owned_mut()?);
         field.update_ghosts()?;
     }
     if let Some(motion) = &body.support_motion {
         let step = loaded.job.time.step;
-        session.agree(motion.start_velocity(step, &mut state.velocity.owned_mut()?))?;
+        let known = |node: usize, direction: &Vector<D>| {
+            let is_free = norm(&moved.free_part(node, direction)) > ROUNDING;
+            (!is_free).then(|| (0..D).map(|i| direction[i] * before[node * D + i]).sum())
+        };
+        session.agree(motion.start_velocity(step, known, &mut state.velocity.owned_mut()?))?;
         state.velocity.update_ghosts()?;
     }
     let mut words = format!("starting from {} (step {}, t = {} s)", file.display(), found.step, found.time);

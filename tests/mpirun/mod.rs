@@ -1,4 +1,4 @@
-//! Starts scenarios.
+//! Starts scenarios: words for the test `scenario` of this program, or a test with its path, and words for it.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -11,17 +11,19 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
     let words =
         format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{scenario} on {ranks} ranks:\n{words}");
+    assert!(words.contains("1 passed"), "{scenario} on {ranks} ranks has not run:\n{words}");
     assert!(!words.contains("HDF5-DIAG"), "HDF5 printed its error stack:\n{words}");
 }
 
 pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
+    let test = scenario.split(' ').next().filter(|test| test.contains("::")).unwrap_or("scenario");
     // Launchers that share this folder compete in creating and removing it.
     let own = tempfile::tempdir().expect("folder");
     Command::new("mpirun")
         .env("OMPI_MCA_orte_tmpdir_base", own.path())
         .args(["--oversubscribe", "--bind-to", "none", "--timeout", "300", "-n", &ranks.to_string()])
         .arg(std::env::current_exe().expect("this program"))
-        .args(["--ignored", "--exact", "scenario", "--nocapture", "--test-threads", "1"])
+        .args(["--include-ignored", "--exact", test, "--nocapture", "--test-threads", "1"])
         .env(SCENARIO, scenario)
         .env(FOLDER, folder)
         .env("OMP_NUM_THREADS", "1")

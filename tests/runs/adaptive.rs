@@ -126,3 +126,38 @@ fn a_stress_that_relaxes_to_a_small_share_keeps_its_accuracy_at_the_default_tole
         assert!((force / exact - 1.0).abs() < 0.01, "{scheme}: {force} instead of {exact}");
     }
 }
+
+#[test]
+fn bonds_break_as_accurately_in_a_body_under_a_large_stress_along_them() {
+    // A block is drawn off its base; without transverse strains, the tension along the base does not change the bonds.
+    let dissipated = |tension: f64| {
+        Case::of("sliding_block")
+            .set("mesh", "{ rectangle = { size = [0.02, 0.01], cells = [4, 2] } }")
+            .set(
+                "material",
+                "{ hypothesis = 'plane_strain', elasticity = { youngs_modulus = 1e10, poisson_ratio = 0.0 } }",
+            )
+            .without("initial")
+            .without("body_force")
+            .without("output")
+            .set("output.folder", "'out'")
+            .set("traction", &format!("[{{ on = ['right'], value = [{tension}, 0] }}]"))
+            .set(
+                "support",
+                "[{ on = ['left'], fix = ['x'] }, { on = ['top'], fix = ['y'], displacement = ['4e-5*t'] }]",
+            )
+            .set(
+                "contact",
+                "[{ on = ['bottom'], normal.unilateral = {}, \
+                 adhesion = { stiffness = 1e12, energy = 10.0, viscosity = 50.0 } }]",
+            )
+            .set("time", "{ scheme = 'implicit_euler', end = 1.0, step = 1e-3 }")
+            .set("time.adaptive", "{ smallest_step = 1e-6, largest_step = 0.1 }")
+            .run(1)
+            .table("history.csv")
+            .last("adhesion_dissipation")
+    };
+    let (without, with) = (dissipated(0.0), dissipated(1e9));
+    assert!((without / 2.375 - 1.0).abs() < 0.02, "{without} J, at a tolerance of 1e-6 2.375 J");
+    assert!((with / 2.375 - 1.0).abs() < 0.02, "{with} J under tension, {without} J without");
+}

@@ -260,7 +260,7 @@ fn rolling(in_space: bool) -> Case {
     }
     case.without("mesh.rectangle")
         .without("material.hypothesis")
-        .set("mesh.box", "{size = [0.1, 0.06, 0.02], cells = [20, 12, 2]}")
+        .set("mesh.box", "{size = [0.1, 0.06, 0.02], cells = [16, 10, 2]}")
         .set("contact.0.obstacle.sphere", "{centre = [0.04, 0.03, 0.119], radius = 0.1, axis = [0, 2, 0]}")
         .set("contact.0.obstacle_load.direction", "[1, 0, 0]")
         .set("contact.0.obstacle_load.moment_of_inertia", "0.04")

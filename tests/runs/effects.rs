@@ -196,12 +196,13 @@ fn contact_memory_is_kept_written_and_counted_where_it_is_called_for() {
         let bytes = if there { serde_json::json!(7 * 16) } else { serde_json::Value::Null };
         assert_eq!(summary["inventory"]["history_bytes"]["memory_pressure"], bytes);
         let fields = NumberFile::open(&results.path("fields.vtkhdf")).names("Fields");
-        assert_eq!(fields.iter().any(|name| name == "memory_pressure"), there);
+        assert_eq!(fields.iter().any(|name| name == "memory_pressure"), there, "{fields:?}");
         let tables = NumberFile::open(&results.path("checkpoint-4.h5")).checkpoint_tables();
         let saved = tables.into_iter().find(|(name, _)| name == "memory_pressure");
         assert_eq!(
             saved.as_ref().is_some_and(|(_, values)| values.iter().any(|pressure| *pressure > 0.0)),
-            there
+            there,
+            "{saved:?}"
         );
         assert!(results.number("max_energy_imbalance") < 1e-10, "{summary}");
     }

@@ -214,3 +214,38 @@ fn a_force_on_an_obstacle_that_is_not_finite_fails_on_all_ranks() {
         case.run_with(2, &[]).expect(1).says(words).says("correct the expression");
     }
 }
+
+#[test]
+fn files_that_vanish_during_a_run_are_an_error_and_the_run_continues_from_its_state() {
+    for (ranks, name) in [(1, "history.csv"), (2, "fields.vtkhdf")] {
+        let case = Case::square(6)
+            .set("time.step", "0.0009765625")
+            .set("time.end", "8")
+            .set("output.fields", "{every = 1000000}")
+            .set("checkpoint.every", "8");
+        let mut running = case.start(ranks);
+        running.wait_for("step   27/");
+        std::fs::remove_file(case.folder().join("out").join(name)).expect("removed");
+        let words = format!("{name} was removed or replaced during the run");
+        running.wait().expect(1).says(&words).says("--restart");
+        let steps = case.results().checkpoints()[0];
+        assert!((24..8192).contains(&steps), "the run ends early: {steps}");
+        let end = format!("time.end={}", (steps + 8) as f64 / 1024.0);
+        case.run_with(ranks, &["--restart", "--set", &end]).expect(0);
+        assert!(case.folder().join("out").join(name).exists());
+    }
+}
+
+#[test]
+fn a_step_of_a_body_with_inertia_does_not_fail_for_lack_of_supports() {
+    // Its contact nodes have no mass.
+    let case = Case::of("sliding_block")
+        .set("material.elasticity", "{ youngs_modulus = 1e6, poisson_ratio = 0.3 }")
+        .set("contact.0.redistribute_mass", "true")
+        .set("time.scheme", "'implicit_euler'")
+        .set("solver.max_newton_iterations", "1");
+    for ranks in [1, 2] {
+        let outcome = case.run_with(ranks, &["--force"]).expect(1).says("failed");
+        assert!(!outcome.stderr.contains("only contact and friction"), "{}", outcome.stderr);
+    }
+}

@@ -2,6 +2,7 @@
 
 use crate::{
     case::Case,
+    hdf5_file::NumberFile,
     launch,
     results::{Results, Table, assert_same_answer, relative_difference},
 };
@@ -406,5 +407,186 @@ fn adaptive_steps_of_the_default_tolerance_follow_stick_slip() {
     let size = expected[1] - expected[0];
     for (found, expected) in found.into_iter().zip(expected) {
         assert!((found - expected).abs() < 0.02 * size, "{found} instead of {expected} in a range of {size}");
+    }
+}
+
+#[test]
+fn the_state_of_friction_follows_a_varying_velocity_with_the_second_order_of_the_schemes() {
+    for scheme in ["bdf2", "midpoint"] {
+        let displacement = |steps: u32| {
+            let case = Case::of("sliding_block")
+                .set("mesh", "{ rectangle = { size = [0.1, 0.02], cells = [4, 2] } }")
+                .set(
+                    "material",
+                    "{ hypothesis = 'plane_strain', elasticity = { youngs_modulus = 1e6, poisson_ratio = 0.0 }, \
+                     viscosity = { volumetric = 300.0, shear = 300.0 } }",
+                )
+                .without("initial")
+                .without("body_force")
+                .set("support", "[{ on = ['top'], fix = 'all' }]")
+                .set(
+                    "contact",
+                    "[{ on = ['bottom'], normal.unilateral = {}, friction.rate_and_state = { reference = 0.6, \
+                     velocity = 0.5, direct = 0.02, evolution = 0.1, distance = 0.3 }, obstacle.plane = { \
+                     point = ['0.5*t + 0.05*sin(5*t)', '4e-6*(1 - cos(3*t))'], normal = [0, 1] } }]",
+                )
+                .set("output.probe", "[{ name = 'centre', point = [0.05, 0] }]")
+                .set("time", &format!("{{ scheme = '{scheme}', end = 1.0, step = {} }}", 1.0 / f64::from(steps)));
+            let case = if scheme == "midpoint" {
+                case.set("material.density", "1000.0").set("contact.0.redistribute_mass", "true")
+            } else {
+                case
+            };
+            centre(&case.run(1)).last("displacement_x")
+        };
+        let [long, middle, short] = [100, 200, 400].map(displacement);
+        let order = ((long - middle) / (middle - short)).abs().log2();
+        assert!((order - 2.0).abs() < 0.3, "{scheme}: {order}, {long} {middle} {short} m");
+    }
+}
+
+/// A brick under 1000 Pa, 120 N in total, on a plane. It is one cell wide, and its sides are held in these directions.
+/// Coulomb's coefficient is 0.5.
+fn held_brick(fix: &str) -> Case {
+    Case::of("oblique_sliding")
+        .without("material.density")
+        .without("material.viscosity")
+        .without("initial")
+        .without("body_force")
+        .set("material.elasticity", "{ youngs_modulus = 1e8, poisson_ratio = 0.2 }")
+        .set("mesh.box.cells", "[1, 3, 2]")
+        .set("support", &format!("[{{ on = ['left', 'right'], fix = {fix} }}]"))
+        .set("contact.0.friction", "{ coulomb = { coefficient = 0.5 } }")
+        .set("time", "{ scheme = 'implicit_euler', step = 0.1, end = 0.5 }")
+        .set("output.fields", "{ every = 1 }")
+}
+
+/// The last force in N of a source.
+fn force(results: &Results, source: &str) -> [f64; 3] {
+    let rows = results.table("resultants.csv").only("source", source);
+    ["force_x", "force_y", "force_z"].map(|name| rows.last(name))
+}
+
+#[track_caller]
+fn assert_forces(results: &Results, what: &str, expected: [(&str, [f64; 3]); 2]) {
+    for (source, expected) in expected {
+        let found = force(results, source);
+        let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-4, "{what}: {source} {found:?} N instead of {expected:?} N");
+    }
+}
+
+/// The power in W of friction and the work of everything else in the last step.
+fn powers(results: &Results) -> [f64; 2] {
+    ["contact_dissipation", "external_work"].map(|name| {
+        let sums = results.table("history.csv").numbers(name);
+        (sums[sums.len() - 1] - sums[sums.len() - 2]) / 0.1
+    })
+}
+
+/// The least and the largest last value of a field at the nodes of the bottom: those above it have none.
+fn last_range(results: &Results, field: &str) -> [f64; 2] {
+    let file = NumberFile::open(&results.path("fields.vtkhdf"));
+    let values = file.field(field, file.times().len() - 1);
+    let there = values.into_iter().filter(|value| *value != 0.0);
+    there.fold([f64::INFINITY, 0.0], |[low, high], value| [low.min(value), high.max(value)])
+}
+
+/// Supports hold the brick in x, and the plane slides at 3 m/s there. The traction in y is 48 N of the bound of 60 N, so that friction
+/// points along (3, 4): the brick moves in y with 4 m/s, and slides with 5 m/s.
+#[test]
+fn friction_sees_sliding_along_directions_that_a_support_holds() {
+    let pulled = |scheme: &str, friction: &str| {
+        held_brick("['x']")
+            .set("traction", "[{ on = ['top'], value = [0.0, 400.0, -1000.0] }]")
+            .set("contact.0.obstacle", "{ plane = { point = ['3*t', 0.0, 0.0], normal = [0, 0, 1] } }")
+            .set("contact.0.friction", friction)
+            .set("time.scheme", &format!("'{scheme}'"))
+    };
+    let weakening = "{ distance_weakening = { static = 0.5, dynamic = 0.5, distance = 1.0 } }";
+    let state = "{ rate_and_state = { reference = 0.5, velocity = 5.0, direct = 0.01, evolution = 0.02, distance = 1.0 } }";
+    for (scheme, friction) in [
+        ("implicit_euler", "{ coulomb = { coefficient = 0.5 } }"),
+        ("bdf2", "{ tresca = { bound = 500 } }"),
+        ("bdf2", weakening),
+        ("implicit_euler", weakening),
+        ("implicit_euler", state),
+    ] {
+        let make = || pulled(scheme, friction);
+        let alone = make().run_and_keep(1);
+        let results = alone.results();
+        let what = format!("{scheme} {friction}");
+        let expected = [("contact bottom", [36.0, -48.0, 120.0]), ("support left+right", [-36.0, 0.0, 0.0])];
+        assert_forces(&results, &what, expected);
+        let found = centre(&results).last("velocity_y");
+        assert!((found - 4.0).abs() < 1e-6, "{what}: {found} m/s");
+        for found in powers(&results) {
+            assert!((found / 300.0 - 1.0).abs() < 1e-6, "{what}: {found} W");
+        }
+        assert!(results.number("max_energy_imbalance") < 1e-10, "{what}");
+        let table = results.table("resultants.csv").only("source", "contact bottom");
+        assert!((table.last("slipping_area") - 0.12).abs() < 1e-9, "{what}");
+        let tractions = results.table("profiles.csv");
+        let [pressure, along, across] = ["contact_pressure", "friction_traction_x", "friction_traction_y"]
+            .map(|name| tractions.last(name));
+        let coefficient = if friction.contains("tresca") { 500.0 / pressure } else { 0.5 };
+        let off =
+            (along + 0.6 * coefficient * pressure).abs() + (across - 0.8 * coefficient * pressure).abs();
+        assert!(off < 1e-6 * pressure, "{what}: {along} {across} Pa at {pressure} Pa");
+        // In the first step the brick is deformed, so that it slides a little farther.
+        let history = if friction == weakening { Some(("slip", 2.5)) } else { None };
+        let history = if friction == state { Some(("friction_state", 0.2)) } else { history };
+        if let Some((name, expected)) = history {
+            for found in last_range(&results, name) {
+                assert!((found / expected - 1.0).abs() < 1e-4, "{what}: {name} {found}");
+            }
+        }
+        // The brick moves by 2 m and is deformed by 1 um: rounding errors of its forces are 1e-8 of the loads.
+        let shared = make().run_and_keep(2);
+        assert_same_answer(&results, &shared.results(), 1e-5, &what);
+    }
+}
+
+/// The brick is held in x and y, and the plane slides past, or the supports take it over a plane at rest.
+#[test]
+fn a_boundary_that_is_held_along_its_plane_rubs_and_wears() {
+    let make = |scheme: &str, plane: &str, support: &str| {
+        held_brick("['x', 'y']")
+            .set("traction", "[{ on = ['top'], value = [0.0, 0.0, -1000.0] }]")
+            .set("contact.0.obstacle", &format!("{{ plane = {{ point = {plane}, normal = [0, 0, 1] }} }}"))
+            .set("contact.0.wear", "{ coefficient = 1e-16 }")
+            .set("support.0.displacement", support)
+            .set("time.scheme", &format!("'{scheme}'"))
+    };
+    let moves = "['3*t', '4*t', 0.0]";
+    for (scheme, plane, support) in [
+        ("implicit_euler", moves, "[0.0, 0.0]"),
+        ("bdf2", moves, "[0.0, 0.0]"),
+        ("implicit_euler", "[0.0, 0.0, 0.0]", "['-3*t', '-4*t']"),
+        ("bdf2", "['t', '2*t', 0.0]", "['-2*t', '-2*t']"),
+    ] {
+        let what = format!("{scheme}, plane {plane}, support {support}");
+        let alone = make(scheme, plane, support).run_and_keep(1);
+        let results = alone.results();
+        let expected = [("contact bottom", [36.0, 48.0, 120.0]), ("support left+right", [-36.0, -48.0, 0.0])];
+        assert_forces(&results, &what, expected);
+        for found in powers(&results) {
+            assert!((found / 300.0 - 1.0).abs() < 1e-6, "{what}: {found} W");
+        }
+        assert!(results.number("max_energy_imbalance") < 1e-10, "{what}");
+        let [least, _] = last_range(&results, "wear");
+        let pressures = results.table("profiles.csv").numbers("contact_pressure");
+        let lowest = pressures[pressures.len() - 8..].iter().fold(f64::INFINITY, |low, p| low.min(*p));
+        let expected = 1e-16 * lowest * 5.0 * 0.5;
+        assert!((least / expected - 1.0).abs() < 1e-4, "{what}: {least} m instead of {expected} m");
+        let shared = make(scheme, plane, support).run_and_keep(2);
+        assert_same_answer(&results, &shared.results(), 1e-7, &what);
+    }
+    let straight = make("bdf2", moves, "[0.0, 0.0]").run_and_keep(1);
+    let stopped = make("bdf2", moves, "[0.0, 0.0]").set("checkpoint.every", "2");
+    stopped.run_with(1, &["--set", "time.end=0.2"]).expect(0);
+    stopped.run_with(1, &["--restart"]).expect(0);
+    for name in ["probes.csv", "history.csv", "profiles.csv", "resultants.csv"] {
+        assert_eq!(straight.results().text(name), stopped.results().text(name), "{name}");
     }
 }

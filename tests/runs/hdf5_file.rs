@@ -41,6 +41,8 @@ impl NumberFile {
             "contact_status",
             "branch",
             "sliding_velocity",
+            "slip",
+            "friction_state",
             "wear",
         ]
         .contains(&name);

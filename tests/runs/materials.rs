@@ -101,7 +101,8 @@ fn accumulated_strain_is_kept_where_the_material_hardens_only() {
         assert_eq!(fields.names("Fields").iter().any(|field| field == STRAIN), hardens, "{name}");
         if hardens {
             let strain = fields.field(STRAIN, fields.times().len() - 1);
-            assert!(strain.iter().all(|value| *value >= 0.0) && strain.iter().any(|value| *value > 0.0));
+            let is_kept = strain.iter().all(|value| *value >= 0.0) && strain.iter().any(|value| *value > 0.0);
+            assert!(is_kept, "{name}: {strain:?}");
         }
     }
 }

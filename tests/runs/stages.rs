@@ -60,6 +60,27 @@ fn two_stages_are_the_run_without_a_break_on_any_ranks() {
 }
 
 #[test]
+fn a_motion_of_supports_continues_in_a_stage() {
+    // The velocity of the last step of the first stage is the mean of this step, not that of the support at its end.
+    let moved = |end: f64, before: f64| {
+        let way = format!("['0.01*(1 - cos(5*(t + {before})))', '0.02*sin(3*(t + {before}))']");
+        first("implicit_euler")
+            .without("support")
+            .set("support", &format!("[{{ on = ['left'], fix = 'all', displacement = {way} }}]"))
+            .set("time.end", &end.to_string())
+    };
+    let straight = moved(1.0, 0.0);
+    let expected = last(&straight.run(1));
+    let first = moved(0.5, 0.0).run_and_keep(1);
+    let second = moved(0.5, 0.5).without("initial").set("initial.from", &format!("{:?}", out(&first)));
+    for ranks in [1, 3] {
+        second.run_with(ranks, &["--force"]).expect(0);
+        let difference = relative_difference(&expected, &last(&second.results()));
+        assert!(difference < 1e-9, "{ranks} ranks: {difference:e}");
+    }
+}
+
+#[test]
 fn what_a_stage_lacks_is_dropped_and_what_it_adds_starts_at_rest() {
     let first = first("lagged_euler").run_and_keep(1);
     let second = second("bdf2", &out(&first))

@@ -184,7 +184,7 @@ fn no_number(session: &Session) {
     assert_eq!(run.state.step, 1);
 }
 
-pub fn errors(session: &Session) {
+fn errors(session: &Session) {
     by_hand(session);
     ["implicit_euler", "bdf2"].into_iter().for_each(|scheme| strained_by_hand(session, scheme));
     ["lagged_euler", "implicit_euler", "bdf2"]
@@ -198,5 +198,5 @@ pub fn errors(session: &Session) {
 
 #[test]
 fn the_error_of_a_step_is_that_by_hand_and_rejected_steps_leave_no_trace() {
-    run_on(&[1, 2], "adaptive_errors");
+    run_on(&[1, 2], |world| errors(&world.session));
 }

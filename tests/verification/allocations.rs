@@ -97,11 +97,11 @@ fn whole_run(session: &Session, steps: u32) -> u64 {
 
 #[test]
 fn steps_allocate_nothing() {
-    crate::run_on(&[1], "allocations");
+    crate::run_on(&[1], |world| count(&world.session));
 }
 
 /// The part under `mpirun`.
-pub fn count(session: &Session) {
+fn count(session: &Session) {
     assert!(measure(|| drop(std::hint::black_box(vec![0.0; 100]))).count_total > 0, "nothing is counted");
     let changed: [(&str, &[&str]); 6] = [
         (PAPER, &[MULTIGRID]),

@@ -224,7 +224,7 @@ fn total_mass<const D: usize, const S: usize>(session: &Session, whole: &GlobalM
     }
 }
 
-pub fn compare(session: &Session) {
+fn compare(session: &Session) {
     let plane = crossed([3, 2]);
     let askew = stir(rectangle([1.0, 2.0], [4, 3], Diagonal::Alternating, [1.0, 1.0]).expect("mesh"), 0.06);
     let space = brick([2, 3, 2]);
@@ -245,5 +245,5 @@ pub fn compare(session: &Session) {
 
 #[test]
 fn the_matrix_is_that_of_a_dense_computation_on_any_number_of_ranks() {
-    run_on(&[1, 2, 3, 4], "assembly");
+    run_on(&[1, 2, 3, 4], |world| compare(&world.session));
 }

@@ -7,7 +7,7 @@ use clarke::{parallel::session::Session, run::Simulation};
 
 /// A block that falls with `v = g t` on a law whose slope changes at 0.25 m/s: all contact points change their branch in the step
 /// that passes this velocity and in no other, also if the start value of the step is its solution.
-pub fn passed(session: &Session) {
+fn passed(session: &Session) {
     let job = format!(
         "{}[time]\nend = 0.6\nstep = 0.1\n[material]\nhypothesis = \"plane_strain\"\ndensity = 1\n\
          viscosity = {{ volumetric = 1, shear = 2 }}\n[[body_force]]\nvalue = [0, -1]\n[[contact]]\non = [\"bottom\"]\n\
@@ -24,5 +24,5 @@ pub fn passed(session: &Session) {
 
 #[test]
 fn changes_of_branches_are_counted_from_the_state_before_the_step_on_all_ranks() {
-    run_on(&[1, 2], "branches");
+    run_on(&[1, 2], |world| passed(&world.session));
 }

@@ -1,7 +1,7 @@
 //! Newton's method, whose callbacks may fail on one rank.
 
 use crate::petsc_boundary::{assert_owned, matrix, product, set, share, shares, vector};
-use crate::{mpirun, run_on};
+use crate::{mpirun, run_on, test_of};
 use clarke::{
     error::{Error, Exit, Result},
     linear_algebra::petsc::{
@@ -162,7 +162,7 @@ fn problem<'a>(session: &Session, matrix: &'a Matrix, fault: Fault) -> Cubic<'a>
     }
 }
 
-pub fn solve_nonlinear(session: &Session) {
+fn solve_nonlinear(session: &Session) {
     let matrix = matrix(session);
     let mut snes = solver(session);
     let mut problem = problem(session, &matrix, Fault::None);
@@ -182,7 +182,7 @@ pub fn solve_nonlinear(session: &Session) {
     assert_eq!(short.description(), "too many Newton iterations");
 }
 
-pub fn fail_on_the_last_rank(session: &Session) {
+fn fail_on_the_last_rank(session: &Session) {
     let last = session.ranks() - 1;
     let matrix = matrix(session);
     let mut snes = solver(session);
@@ -217,7 +217,7 @@ pub fn fail_on_the_last_rank(session: &Session) {
     }
 }
 
-pub fn panic_on_the_last_rank(session: &Session, folder: &Path) {
+fn panic_on_the_last_rank(session: &Session, folder: &Path) {
     let pid = std::process::id().to_string();
     std::fs::write(folder.join(format!("rank-{}", session.rank())), pid).expect("written");
     let matrix = matrix(session);
@@ -229,18 +229,19 @@ pub fn panic_on_the_last_rank(session: &Session, folder: &Path) {
 
 #[test]
 fn newtons_method_solves_a_nonlinear_system() {
-    run_on(&[1, 2, 3], "newton");
+    run_on(&[1, 2, 3], |world| solve_nonlinear(&world.session));
 }
 
 #[test]
 fn an_error_in_a_callback_of_one_rank_fails_the_solve_on_all() {
-    run_on(&[1, 2, 3], "callback_error");
+    run_on(&[1, 2, 3], |world| fail_on_the_last_rank(&world.session));
 }
 
 #[test]
 fn a_panic_in_a_callback_ends_all_ranks_with_exit_code_4() {
+    let Some(test) = test_of(|world| panic_on_the_last_rank(&world.session, &world.folder)) else { return };
     let folder = tempfile::tempdir().expect("folder");
-    let output = mpirun::start(2, "callback_panic", folder.path());
+    let output = mpirun::start(2, test, folder.path());
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(4), "{words}");
     assert!(words.contains("a callback panicked"), "{words}");

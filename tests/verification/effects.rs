@@ -295,7 +295,7 @@ fn allocations(session: &Session) {
     assert!(refused.is_err(), "nothing determines the velocity");
 }
 
-pub fn count(session: &Session) {
+fn count(session: &Session) {
     phases::<2, 3>(session, &crossed([3, 2]));
     phases::<2, 4>(session, &crossed([3, 2]));
     phases::<3, 6>(session, &brick([2, 2, 2]));
@@ -306,5 +306,5 @@ pub fn count(session: &Session) {
 
 #[test]
 fn absent_effects_are_not_called_gather_nothing_and_hold_no_memory() {
-    run_on(&[1, 2], "effects");
+    run_on(&[1, 2], |world| count(&world.session));
 }

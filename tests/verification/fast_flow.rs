@@ -45,7 +45,7 @@ fn reach(session: &Session, run: &Simulation<2, 3>) -> f64 {
 
 /// In the first steps the bar does not flow. Then the overstress is three times the yield stress, and the law relaxes `3^4` times
 /// as fast as at the overstress for which the set-up computes the bound.
-pub fn power_laws(session: &Session) {
+fn power_laws(session: &Session) {
     let time = |step: f64, more: &str| format!("[time]\nend = 0.5\nstep = {step}\n{more}");
     for law in ["metric = 'compliance'", "hardening_modulus = 50"] {
         let refused = bar(law, &time(0.005, ""));
@@ -67,7 +67,8 @@ pub fn power_laws(session: &Session) {
         let (taken, error) = steps(session, &mut cut);
         let implicit = bar(law, &time(5e-4, "scheme = 'implicit_euler'\n"));
         let mut implicit = started(session, &implicit);
-        assert!(steps(session, &mut implicit).1.is_none());
+        let failure = steps(session, &mut implicit).1;
+        assert!(failure.is_none(), "{law}: {failure:?}");
         let [found, expected] = [&cut, &implicit].map(|run| reach(session, run));
         println!("{law}: {taken} adaptive steps, {found} m, {expected} m implicitly");
         assert!(
@@ -79,7 +80,7 @@ pub fn power_laws(session: &Session) {
 
 /// If viscosity and elasticity are proportional and all stress components relax at the same rate, an error changes by the factor `1
 /// - k / eta - k / tau` in a step of length `k`.
-pub fn together(session: &Session) {
+fn together(session: &Session) {
     let (eta, tau) = (0.2, 0.1);
     let job = |step: f64| {
         format!(
@@ -120,10 +121,10 @@ pub fn together(session: &Session) {
 
 #[test]
 fn steps_beyond_the_bound_at_the_overstress_that_occurs_are_refused_or_cut() {
-    run_on(&[1, 2], "power_laws");
+    run_on(&[1, 2], |world| power_laws(&world.session));
 }
 
 #[test]
 fn flow_and_elastic_stress_are_stable_up_to_the_sum_of_the_inverse_bounds() {
-    run_on(&[1], "flow_together");
+    run_on(&[1], |world| together(&world.session));
 }

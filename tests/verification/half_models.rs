@@ -190,8 +190,8 @@ fn pressed(session: &Session, degrees: f64, laws: [&str; 2], order: usize) -> Ve
     nodal::<3, 6>(session, &job, &wedge(degrees))
 }
 
-/// The scenario `contact_edges`: rigid walls and friction at an edge of any angle.
-pub fn edges(session: &Session) {
+/// Rigid walls and friction at an edge of any angle.
+fn edges(session: &Session) {
     let rigid = "normal.unilateral = {}";
     let stiff = "normal.compliance = { stiffness = 1e8 }";
     let springs = "normal.compliance = { stiffness = 500 }";
@@ -244,16 +244,46 @@ pub fn edges(session: &Session) {
 
 #[test]
 fn friction_and_rigid_walls_act_at_edges_of_any_angle() {
-    run_on(&[1, 2], "contact_edges");
+    run_on(&[1, 2], |world| edges(&world.session));
 }
 
-/// The scenario `half_models`.
-pub fn all(session: &Session) {
+/// An obstacle that slides past a body with a curved boundary, also along directions in which supports hold nodes of this boundary: friction
+/// is that of Coulomb's law at every node, and points where the obstacle goes.
+fn slid_past<const D: usize, const S: usize>(session: &Session, half: &GlobalMesh<D>, planes: &[&str]) {
+    for law in ["normal.unilateral = {}", "normal.compliance = { stiffness = 3000 }"] {
+        let contact = format!("{law}\nfriction.coulomb.coefficient = 0.2");
+        let moves = if D == 2 { "\"-2*t\", \"0.03*t\"" } else { "\"-2*t\", \"-t\", \"0.03*t\"" };
+        let job = job::<D>(1, "implicit_euler", &contact, planes, false);
+        let (before, after) = job.split_once("point = [").expect("an obstacle");
+        let slides = format!("{before}point = [{moves}{}", &after[after.find(']').expect("its end")..]);
+        let mut run: Simulation<D, S> = simulation(session, &slides, half);
+        while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{slides}")).is_some() {
+            assert!(run.totals.energy_imbalance <= 1e-10, "{:e}\n{slides}", run.totals.energy_imbalance);
+        }
+        let velocity = run.state.velocity.local().expect("velocity");
+        let mut forces: std::collections::BTreeMap<u32, Vec<Vector<D>>> = std::collections::BTreeMap::new();
+        run.body.contacts[0].forces(&velocity, |node, force| forces.entry(node).or_default().push(force));
+        let mut pressed = 0.0;
+        for (node, forces) in forces {
+            let [normal, friction] = forces[..] else { panic!("friction at {node}: {forces:?}\n{slides}") };
+            let size = norm(&normal);
+            assert!((norm(&friction) - 0.2 * size).abs() <= 1e-7 * size, "{normal:?} {friction:?}\n{slides}");
+            assert!(size == 0.0 || friction[0] < 0.0, "{normal:?} {friction:?}\n{slides}");
+            pressed += f64::from(u8::from(size > 0.0));
+        }
+        let [pressed] = session.sum([pressed]);
+        assert!(pressed > 1.0, "{pressed} nodes touch\n{slides}");
+    }
+}
+
+fn all(session: &Session) {
+    slid_past::<2, 4>(session, &bowl(crossed([3, 2])), &["left"]);
+    slid_past::<3, 6>(session, &bowl(brick([2, 2, 2])), &["left", "front"]);
     compare::<2, 4>(session, &bowl(crossed([3, 2])), &["left"]);
     compare::<3, 6>(session, &bowl(brick([2, 2, 2])), &["left", "front"]);
 }
 
 #[test]
 fn half_and_quarter_models_with_friction_on_a_curved_boundary_are_the_whole_body() {
-    run_on(&[1, 2, 3], "half_models");
+    run_on(&[1, 2, 3], |world| all(&world.session));
 }

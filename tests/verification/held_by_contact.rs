@@ -82,15 +82,15 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
                 let points = outcome.points;
                 assert!(points.sticking > 0 && points.slipping == 0, "{solver}, {share}: {points:?}");
             }
-            assert_eq!(run.state.step, 2);
+            assert_eq!(run.state.step, 2, "{solver}, {share}");
         }
     }
     // A shear load above the friction bound, and a load that lifts the block off.
     for (pressure, shear) in [(PRESSURE, 1.01 * FRICTION * PRESSURE), (-PRESSURE, 0.0)] {
         let mut run = simulation::<D, S>(session, &job::<D>(pressure, shear, solvers[0]), mesh);
         let found = session.agree(run.advance(session)).expect_err("a failure");
-        assert_eq!(found.exit(), Exit::Failed);
         let words = found.to_string();
+        assert_eq!(found.exit(), Exit::Failed, "{pressure} Pa, {shear} Pa: {words}");
         assert!(words.contains("only contact and friction resist the following rigid motions"), "{words}");
         assert!(words.contains("translation along x"), "{words}");
     }
@@ -107,7 +107,7 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
     assert!(!words.contains(height), "{words}");
 }
 
-pub fn blocks(session: &Session) {
+fn blocks(session: &Session) {
     // So high that some ranks have no node on the plane.
     let plate = rectangle([0.1, 0.3], [3, 9], Diagonal::Right, [1.0; 2]).expect("mesh");
     block::<2, 4>(session, &plate);
@@ -115,7 +115,7 @@ pub fn blocks(session: &Session) {
 }
 
 /// A block with negligible inertia is pushed along its plane.
-pub fn nearly_free(session: &Session) {
+fn nearly_free(session: &Session) {
     let mesh = rectangle([0.04, 0.04], [32, 32], Diagonal::Right, [1.0; 2]).expect("mesh");
     for density in [7800.0, 1e-3] {
         let sizes = ["cholesky", "gamg"].map(|preconditioner| {
@@ -132,7 +132,7 @@ pub fn nearly_free(session: &Session) {
                 assert!(outcome.newton_iterations <= 20, "{density}, {preconditioner}: {outcome:?}");
                 assert!(outcome.inclusion_residual <= 1e-9, "{density}, {preconditioner}: {outcome:?}");
             }
-            assert_eq!(run.state.step, 3);
+            assert_eq!(run.state.step, 3, "{density}, {preconditioner}");
             run.state.displacement.norm().expect("a norm")
         });
         let off = (sizes[0] - sizes[1]).abs();
@@ -142,7 +142,7 @@ pub fn nearly_free(session: &Session) {
 
 /// A stiff block on soft springs under a pressure that varies along it: rounding errors of its internal forces exceed the tolerance by
 /// orders of magnitude, and it sinks in as a rigid body, at each point by the pressure over the stiffness.
-pub fn on_soft_springs(session: &Session) {
+fn on_soft_springs(session: &Session) {
     let mesh = rectangle([1.5, 0.25], [48, 4], Diagonal::Left, [1.0, 1.0]).expect("mesh");
     let springs = [
         "[[contact]]\non = [\"bottom\"]\nnormal.compliance = { stiffness = 2000 }\n",
@@ -164,7 +164,7 @@ pub fn on_soft_springs(session: &Session) {
             while let Some(outcome) = run.advance(session).unwrap_or_else(|e| panic!("{what}: {e}")) {
                 assert!(is_reached || outcome.newton_iterations <= 20, "{what}: {outcome:?}");
             }
-            assert_eq!(run.state.step, 4);
+            assert_eq!(run.state.step, 4, "{what}");
             let displacement = run.state.displacement.owned().expect("values");
             for (place, found) in run.body.mesh.nodes.iter().zip(displacement.chunks_exact(2)) {
                 // Springs at the nodes resist a rotation more than those along the boundary.
@@ -183,15 +183,15 @@ pub fn on_soft_springs(session: &Session) {
 
 #[test]
 fn a_stiff_block_sinks_into_soft_springs_as_far_as_rounding_errors_permit() {
-    run_on(&[1, 2], "soft_springs");
+    run_on(&[1, 2], |world| on_soft_springs(&world.session));
 }
 
 #[test]
 fn contact_and_friction_alone_hold_a_quasistatic_block_up_to_coulombs_limit() {
-    run_on(&[1, 2, 3], "held_by_contact");
+    run_on(&[1, 2, 3], |world| blocks(&world.session));
 }
 
 #[test]
 fn friction_holds_a_block_whose_inertia_counts_for_next_to_nothing() {
-    run_on(&[1, 2], "nearly_free");
+    run_on(&[1, 2], |world| nearly_free(&world.session));
 }

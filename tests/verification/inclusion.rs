@@ -9,7 +9,7 @@ use clarke::{
 };
 
 /// The distance to the graphs, with the same unbalanced forces, of the same step solved by several methods.
-pub fn judged(session: &Session) {
+fn judged(session: &Session) {
     let mesh = rectangle([0.2, 0.1], [8, 4], Diagonal::Right, [1.0; 2]).expect("mesh");
     let solvers = ["preconditioner = \"cholesky\"", "preconditioner = \"gamg\""];
     let laws = [
@@ -56,7 +56,7 @@ pub fn judged(session: &Session) {
 
 /// Under a steady load a body without inertia comes to rest. Velocities and forces of a step are then rounding errors, which must
 /// not count as a distance to laws with very small pressures.
-pub fn at_rest(session: &Session) {
+fn at_rest(session: &Session) {
     let mesh = rectangle([1.0, 1.0], [3, 3], Diagonal::Right, [1.0; 2]).expect("mesh");
     let laws = [
         "normal.graph = { points = [[0, 0]] }",
@@ -86,10 +86,10 @@ pub fn at_rest(session: &Session) {
 
 #[test]
 fn bodies_come_to_rest_beside_obstacles_under_every_scheme() {
-    run_on(&[1, 2], "at_rest");
+    run_on(&[1, 2], |world| at_rest(&world.session));
 }
 
 #[test]
 fn the_distance_to_the_graphs_does_not_depend_on_how_a_step_was_solved() {
-    run_on(&[1, 2], "judged");
+    run_on(&[1, 2], |world| judged(&world.session));
 }

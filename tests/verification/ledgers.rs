@@ -34,7 +34,7 @@ fn sliding(scheme: &str, steps: usize) -> String {
     )
 }
 
-pub fn orders(session: &Session) {
+fn orders(session: &Session) {
     let mesh = crossed([3, 2]);
     for scheme in ["bdf2", "midpoint"] {
         let ends = [40, 80, 160].map(|steps| {
@@ -135,7 +135,7 @@ fn throw(session: &Session, text: &str) -> (f64, clarke::fem::effect::Energy) {
     (motion, run.totals.energy)
 }
 
-pub fn obstacles(session: &Session) {
+fn obstacles(session: &Session) {
     let found = ["lagged_euler", "implicit_euler", "bdf2", "midpoint"].map(|scheme| {
         let (velocity, energy) = throw(session, &thrown(scheme, ""));
         if session.is_first() {
@@ -179,7 +179,7 @@ fn falling(session: &Session, scheme: &str, steps: usize) -> [f64; 2] {
     obstacle.motion()
 }
 
-pub fn closed_forms(session: &Session) {
+fn closed_forms(session: &Session) {
     // From t = 0.1 s on, until it leaves at 0.219 s: depth 4 mm (1 - cos(w s)) + 0.4 / w sin(w s) with w = sqrt(1000) 1/s and s = 0.1 s.
     let rate = 1000f64.sqrt();
     let (sine, cosine) = (0.1 * rate).sin_cos();
@@ -195,7 +195,7 @@ pub fn closed_forms(session: &Session) {
     }
 }
 
-pub fn bounces(session: &Session) {
+fn bounces(session: &Session) {
     for (law, ends_free) in [
         ("normal.compliance = { stiffness = 3e6, gap = 0.01 }", true),
         ("normal.compliance = { stiffness = 3e8, exponent = 2.5, gap = 0.01 }", true),
@@ -214,20 +214,20 @@ pub fn bounces(session: &Session) {
 
 #[test]
 fn energies_have_the_order_of_their_scheme() {
-    run_on(&[1], "ledger_orders");
+    run_on(&[1], |world| orders(&world.session));
 }
 
 #[test]
 fn foundations_with_a_potential_give_all_energy_back_under_the_midpoint_rule() {
-    run_on(&[1, 2], "bounces");
+    run_on(&[1, 2], |world| bounces(&world.session));
 }
 
 #[test]
 fn the_energy_of_obstacles_moved_by_forces_is_balanced_under_each_scheme() {
-    run_on(&[1, 2], "thrown_balls");
+    run_on(&[1, 2], |world| obstacles(&world.session));
 }
 
 #[test]
 fn a_weight_that_falls_on_springs_moves_as_its_closed_form() {
-    run_on(&[1], "falling_weight");
+    run_on(&[1], |world| closed_forms(&world.session));
 }

@@ -23,7 +23,7 @@ fn step(scheme: &str, cells: usize, of_size: f64) -> f64 {
     if scheme == "bdf2" { 2.0 * of_size / cells as f64 } else { of_size * 4.0 / (cells * cells) as f64 }
 }
 
-pub fn plane(session: &Session) {
+fn plane(session: &Session) {
     let mesh = |n: usize| {
         stir(rectangle([1.0, 1.0], [n, n], Diagonal::Alternating, [1.0, 1.0]).expect("mesh"), 0.1 / n as f64)
     };
@@ -47,7 +47,7 @@ pub fn plane(session: &Session) {
     }
 }
 
-pub fn space(session: &Session) {
+fn space(session: &Session) {
     for scheme in SCHEMES {
         for acts in [(RELAXES, Touch::Spring), (None, Touch::Rubbing)] {
             let [coarse, fine] = [4, 8].map(|n: usize| {
@@ -62,10 +62,10 @@ pub fn space(session: &Session) {
 
 #[test]
 fn every_scheme_finds_plane_motions_with_flow_springs_and_friction_at_its_orders() {
-    run_on(&[1], "manufactured_contact_plane");
+    run_on(&[1], |world| plane(&world.session));
 }
 
 #[test]
 fn every_scheme_finds_motions_in_space_with_flow_springs_and_friction_at_its_orders() {
-    run_on(&[1], "manufactured_contact_space");
+    run_on(&[1], |world| space(&world.session));
 }

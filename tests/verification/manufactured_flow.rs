@@ -302,7 +302,7 @@ fn check<const D: usize, const S: usize>(
     }
 }
 
-pub fn plane(session: &Session) {
+fn plane(session: &Session) {
     let mesh = |n: usize| {
         stir(rectangle([1.0, 1.0], [n, n], Diagonal::Alternating, [1.0; 2]).expect("mesh"), 0.1 / n as f64)
     };
@@ -316,7 +316,7 @@ pub fn plane(session: &Session) {
     check::<2, 4>(session, "plane_strain", Law::DruckerPrager, mesh);
 }
 
-pub fn space(session: &Session) {
+fn space(session: &Session) {
     let mesh = |n: usize| box_mesh([1.0; 3], [n; 3], [1.0; 3]).expect("mesh");
     check::<3, 6>(session, "", Law::Hardening { metric: "frobenius" }, mesh);
     check::<3, 6>(session, "", Law::DruckerPrager, mesh);
@@ -333,10 +333,10 @@ fn polynomials_go_through_their_values() {
 
 #[test]
 fn flow_in_the_plane_is_found_with_first_order_in_stress() {
-    run_on(&[2], "flowing_plane");
+    run_on(&[2], |world| plane(&world.session));
 }
 
 #[test]
 fn flow_in_space_is_found_with_first_order_in_stress() {
-    run_on(&[2], "flowing_space");
+    run_on(&[2], |world| space(&world.session));
 }

@@ -143,7 +143,7 @@ fn refused_at_edges(session: &Session) {
     assert!(speaks, "{refused}");
 }
 
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     follows::<2, 4>(session, &crossed([3, 2]), [0.9, 1.2]);
     follows::<3, 6>(session, &brick([2, 2, 2]), [1.1, 0.8]);
     bound(session);
@@ -153,5 +153,5 @@ pub fn all(session: &Session) {
 
 #[test]
 fn a_plate_on_a_foundation_that_remembers_moves_like_a_mass_that_feels_its_whole_past() {
-    run_on(&[1, 2], "memory");
+    run_on(&[1, 2], |world| all(&world.session));
 }

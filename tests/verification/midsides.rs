@@ -19,10 +19,10 @@ use std::{collections::BTreeMap, path::Path};
 
 #[test]
 fn nodes_on_edges_are_the_same_on_any_number_of_ranks() {
-    run_on(&[1, 2, 3, 4], "midsides");
+    run_on(&[1, 2, 3, 4], |world| all(&world.session, &world.folder));
 }
 
-pub fn all(session: &Session, folder: &Path) {
+fn all(session: &Session, folder: &Path) {
     let plate = Rectangle::new([2.0, 1.0], [5, 4], Diagonal::Crossed, [1.5, 1.0]).expect("a grid");
     let brick = Cuboid::new([1.0, 2.0, 1.5], [3, 2, 4], [1.0, 1.2, 1.0]).expect("a grid");
     origins(session, &plate, folder);

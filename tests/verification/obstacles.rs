@@ -268,7 +268,7 @@ fn impact(session: &Session, cells: usize) -> [f64; 4] {
     [touch[0], touch[touch.len() - 1], mean, 0.1 - impulse / 1000.0]
 }
 
-pub fn impacts(session: &Session) {
+fn impacts(session: &Session) {
     let found = [10, 20, 40].map(|cells| impact(session, cells));
     for ([first, last, pressure, rebound], cells) in found.into_iter().zip([10.0, 20.0, 40.0]) {
         if session.is_first() {
@@ -287,19 +287,19 @@ pub fn impacts(session: &Session) {
     }
 }
 
-pub fn moving(session: &Session) {
+fn moving(session: &Session) {
     balanced::<2, 4>(session, &crossed([6, 3]));
     balanced::<3, 6>(session, &brick([4, 3, 2]));
     alike::<2, 4>(session, &crossed([6, 3]));
     alike::<3, 6>(session, &brick([4, 3, 2]));
 }
 
-pub fn bounds(session: &Session) {
+fn bounds(session: &Session) {
     cross_checked::<2, 4>(session, &crossed([8, 5]));
     cross_checked::<3, 6>(session, &brick([4, 3, 3]));
 }
 
-pub fn several(session: &Session, folder: &std::path::Path) {
+fn several(session: &Session, folder: &std::path::Path) {
     let found =
         [mixed_laws::<2, 4>(session, &crossed([6, 4])), mixed_laws::<3, 6>(session, &brick([3, 3, 3]))];
     let file = folder.join("several.json");
@@ -316,20 +316,20 @@ pub fn several(session: &Session, folder: &std::path::Path) {
 
 #[test]
 fn an_elastic_bar_is_thrown_back_by_a_wall_as_travelling_waves_say() {
-    run_on(&[1], "impacts");
+    run_on(&[1], |world| impacts(&world.session));
 }
 
 #[test]
 fn obstacles_that_move_do_work_that_energy_accounts_for() {
-    run_on(&[1, 2], "moving_obstacles");
+    run_on(&[1, 2], |world| moving(&world.session));
 }
 
 #[test]
 fn contacts_that_are_bounds_are_solved_alike_by_petsc_s_variational_inequalities() {
-    run_on(&[1, 2], "bounds");
+    run_on(&[1, 2], |world| bounds(&world.session));
 }
 
 #[test]
 fn contacts_of_several_laws_meet_at_corners_the_same_on_any_number_of_ranks() {
-    run_on(&[1, 2, 3], "several_laws");
+    run_on(&[1, 2, 3], |world| several(&world.session, &world.folder));
 }

@@ -181,7 +181,7 @@ fn pushed_hard(session: &Session) {
     assert_eq!(touching.collect::<Vec<_>>(), [-3e-10, -3e-10]);
 }
 
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     by_hand(session);
     pushed_hard(session);
     refusal(session);
@@ -189,5 +189,5 @@ pub fn all(session: &Session) {
 
 #[test]
 fn contact_forces_on_one_cell_are_those_worked_out_by_hand() {
-    run_on(&[1], "one_cell");
+    run_on(&[1], |world| all(&world.session));
 }

@@ -123,20 +123,20 @@ fn all<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) 
     }
 }
 
-pub fn plane(session: &Session) {
+fn plane(session: &Session) {
     all::<2, 4>(session, &rectangle([1.0; 2], [5; 2], Diagonal::Crossed, [1.0; 2]).expect("mesh"));
 }
 
-pub fn space(session: &Session) {
+fn space(session: &Session) {
     all::<3, 6>(session, &box_mesh([1.0; 3], [3; 3], [1.0; 3]).expect("mesh"));
 }
 
 #[test]
 fn every_effect_is_of_the_order_of_its_schemes_in_the_plane() {
-    run_on(&[1], "orders_plane");
+    run_on(&[1], |world| plane(&world.session));
 }
 
 #[test]
 fn every_effect_is_of_the_order_of_its_schemes_in_space() {
-    run_on(&[1], "orders_space");
+    run_on(&[1], |world| space(&world.session));
 }

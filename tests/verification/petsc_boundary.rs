@@ -1,6 +1,6 @@
 //! The safe handles around PETSc behave as documented.
 
-use crate::run_on;
+use crate::{mpirun, run_on, test_of};
 use clarke::{
     error::Exit,
     linear_algebra::petsc::{
@@ -75,7 +75,7 @@ pub fn product(all: usize, row: usize, x: impl Fn(usize) -> f64) -> f64 {
     (0..all * BLOCK).map(|column| entry(row, column) * x(column)).sum()
 }
 
-pub fn exchange_vectors(session: &Session) {
+fn exchange_vectors(session: &Session) {
     let (first, own, all) = share(session);
     let unknowns = all * BLOCK;
     let value = |unknown: usize| 10.0 + unknown as f64;
@@ -106,7 +106,7 @@ pub fn exchange_vectors(session: &Session) {
     assert_owned(session, &x, |u| 0.5 * value(u));
 }
 
-pub fn multiply_matrices(session: &Session) {
+fn multiply_matrices(session: &Session) {
     let (_, _, all) = share(session);
     let matrix = matrix(session);
     let value = |unknown: usize| (unknown as f64 * 0.7).sin();
@@ -119,7 +119,7 @@ pub fn multiply_matrices(session: &Session) {
     assert_eq!(matrix.stored_entries().expect("count"), stored as f64);
 }
 
-pub fn solve_linear(session: &Session) {
+fn solve_linear(session: &Session) {
     let (_, _, all) = share(session);
     let matrix = matrix(session);
     let solution = |unknown: usize| 1.0 + (unknown as f64).cos();
@@ -171,7 +171,7 @@ fn limited_iterations(session: &Session, prefix: &str) -> usize {
     ksp.solve(&b, &mut x).expect("solve").iterations
 }
 
-pub fn set_options(session: &Session) {
+fn set_options(session: &Session) {
     set_option("asked_ksp_max_it", "2").expect("option");
     set_default_option("asked_ksp_max_it", "4").expect("default");
     assert_eq!(limited_iterations(session, "asked_"), 2, "a default does not override");
@@ -216,7 +216,7 @@ fn assert_refused() {
 }
 
 /// Drops the session and MPI first, then what they were needed for.
-pub fn outlive(mpi: Mpi, session: Session) {
+fn outlive(mpi: Mpi, session: Session) {
     std::thread::spawn(assert_refused).join().expect("PETSc belongs to the thread that started it");
     assert!(mpi.session().is_err(), "PETSc is started once");
     let matrix = matrix(&session);
@@ -244,21 +244,21 @@ pub fn outlive(mpi: Mpi, session: Session) {
 
 #[test]
 fn vectors_exchange_ghosts_both_ways_also_where_a_rank_has_no_nodes() {
-    run_on(&[1, 2, 3], "vectors");
+    run_on(&[1, 2, 3], |world| exchange_vectors(&world.session));
 }
 
 #[test]
 fn a_matrix_of_block_rows_multiplies_as_by_hand() {
-    run_on(&[1, 2, 3], "matrices");
+    run_on(&[1, 2, 3], |world| multiply_matrices(&world.session));
 }
 
 #[test]
 fn linear_solves_reach_the_solution_and_say_when_they_do_not() {
-    run_on(&[1, 3], "linear");
+    run_on(&[1, 3], |world| solve_linear(&world.session));
 }
 
 /// PETSc refuses a product of vectors of two lengths on the last rank, while the others wait inside another one.
-pub fn fail_alone(session: &Session) {
+fn fail_alone(session: &Session) {
     let mut long = vector(session);
     // PETSc stores the norm of a vector of zeros.
     set(session, &mut long, |u| (u as f64).sin());
@@ -276,8 +276,9 @@ pub fn fail_alone(session: &Session) {
 
 #[test]
 fn a_fault_of_petsc_on_one_rank_ends_those_that_wait_inside_it() {
+    let Some(test) = test_of(|world| fail_alone(&world.session)) else { return };
     let folder = tempfile::tempdir().expect("folder");
-    let output = crate::mpirun::start(3, "petsc_fails_alone", folder.path());
+    let output = mpirun::start(3, test, folder.path());
     let words = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(Exit::Internal as i32), "{words}");
     assert_eq!(words.matches("error: rank 2: PETSc error").count(), 1, "{words}");
@@ -286,10 +287,10 @@ fn a_fault_of_petsc_on_one_rank_ends_those_that_wait_inside_it() {
 
 #[test]
 fn options_are_heard_in_order_of_rank_and_errors_carry_message_and_trace() {
-    run_on(&[1, 2], "options");
+    run_on(&[1, 2], |world| set_options(&world.session));
 }
 
 #[test]
 fn handles_that_outlive_their_session_keep_petsc_and_without_petsc_there_are_none() {
-    run_on(&[1, 2], "outlive");
+    run_on(&[1, 2], |world| outlive(world.mpi, world.session));
 }

@@ -153,7 +153,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
     }
 }
 
-pub fn all(session: &Session, folder: &Path) {
+fn all(session: &Session, folder: &Path) {
     written::<2, 3>(session, folder, crossed([5, 3]));
     written::<2, 4>(session, folder, crossed([5, 3]));
     written::<3, 6>(session, folder, brick([4, 3, 2]));
@@ -161,5 +161,5 @@ pub fn all(session: &Session, folder: &Path) {
 
 #[test]
 fn profiles_give_pressures_by_the_measure_of_facets_and_along_free_normals() {
-    run_on(&[1, 2, 3], "profiles");
+    run_on(&[1, 2, 3], |world| all(&world.session, &world.folder));
 }

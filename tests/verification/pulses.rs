@@ -115,7 +115,7 @@ fn named(session: &Session) {
     assert!([0.3, 0.6, 1.0].iter().all(|time| times.contains(time)), "{times:?}");
 }
 
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     named(session);
     kicked(session);
     pushed(session);
@@ -124,5 +124,5 @@ pub fn all(session: &Session) {
 
 #[test]
 fn steps_see_pulses_and_land_on_what_the_job_names() {
-    run_on(&[1, 3], "pulses");
+    run_on(&[1, 3], |world| all(&world.session));
 }

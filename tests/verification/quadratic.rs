@@ -112,7 +112,7 @@ fn orders<const D: usize, const S: usize>(
     assert!((1.85..2.6).contains(&order[2]), "{what}: stress {order:?}");
 }
 
-pub fn plane(session: &Session) {
+fn plane(session: &Session) {
     let mesh = |n: usize| {
         stir(rectangle([1.0, 1.0], [n, n], Diagonal::Alternating, [1.0, 1.0]).expect("mesh"), 0.1 / n as f64)
     };
@@ -120,7 +120,7 @@ pub fn plane(session: &Session) {
     orders::<2, 4>(session, "plane_strain", "gauss", [5, 10], mesh);
 }
 
-pub fn space(session: &Session) {
+fn space(session: &Session) {
     let mesh = |n: usize| box_mesh([1.0; 3], [n; 3], [1.0; 3]).expect("mesh");
     orders::<3, 6>(session, "", "gauss", [3, 6], mesh);
 }
@@ -161,7 +161,7 @@ fn bars_of<const D: usize, const S: usize>(session: &Session, mesh: impl Fn(usiz
     }
 }
 
-pub fn bars(session: &Session) {
+fn bars(session: &Session) {
     bars_of::<2, 4>(session, |n| {
         rectangle([4.0, 1.0], [16 * n, 4 * n], Diagonal::Right, [1.0; 2]).expect("mesh")
     });
@@ -170,15 +170,15 @@ pub fn bars(session: &Session) {
 
 #[test]
 fn motions_in_the_plane_are_found_with_third_order_in_l2_and_second_in_stress() {
-    run_on(&[1, 2], "quadratic_plane");
+    run_on(&[1, 2], |world| plane(&world.session));
 }
 
 #[test]
 fn motions_in_space_are_found_with_third_order_in_l2_and_second_in_stress() {
-    run_on(&[2], "quadratic_space");
+    run_on(&[2], |world| space(&world.session));
 }
 
 #[test]
 fn quadratic_bars_do_not_lock() {
-    run_on(&[1, 3], "quadratic_bars");
+    run_on(&[1, 3], |world| bars(&world.session));
 }

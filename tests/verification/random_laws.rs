@@ -93,7 +93,7 @@ fn job(law: &str, load: [f64; 3], step: f64) -> String {
     )
 }
 
-pub fn solve(session: &Session) {
+fn solve(session: &Session) {
     let laws = std::env::var(NUMBER).ok().map_or(LAWS, |number| number.parse().expect("a number of laws"));
     let mesh = rectangle([1.0, 0.5], [12, 5], Diagonal::Alternating, [1.0, 1.3]).expect("mesh");
     let mut counts = Vec::new();
@@ -144,5 +144,5 @@ pub fn solve(session: &Session) {
 
 #[test]
 fn every_step_with_one_solution_is_solved_whatever_the_law_and_the_load() {
-    run_on(&[1, 2], "random_laws");
+    run_on(&[1, 2], |world| solve(&world.session));
 }

@@ -7,16 +7,12 @@
 mod drawn;
 mod invariants;
 
-use crate::mpirun;
-use clarke::parallel::session::Session;
-use std::path::Path;
+use crate::{World, mpirun, test_of};
 
 /// Jobs of `make test`; `CLARKE_RANDOM_SCENES=5000`, or `=17..18`, tries others.
 const JOBS: u64 = 60;
 /// Jobs for each start of the launcher.
 const BATCH: u64 = 100;
-/// The name of the scenario, before the first job and the one behind the last.
-pub const SCENARIO: &str = "random_scenes ";
 
 fn chosen() -> std::ops::Range<u64> {
     let Some(words) = std::env::var("CLARKE_RANDOM_SCENES").ok() else { return 0..JOBS };
@@ -27,15 +23,16 @@ fn chosen() -> std::ops::Range<u64> {
     }
 }
 
-/// The jobs whose numbers the name of a scenario has.
-pub fn scenario(session: &Session, name: &str, folder: &Path) {
-    let numbers: Vec<u64> =
-        name[SCENARIO.len()..].split(' ').map(|text| text.parse().expect("a number")).collect();
-    invariants::hold(session, numbers[0]..numbers[1], folder);
+/// The scenario of the jobs whose numbers follow the name of the test.
+fn scenario(world: &World) {
+    let words = std::env::var(mpirun::SCENARIO).expect("a scenario");
+    let numbers: Vec<u64> = words.split(' ').skip(1).map(|text| text.parse().expect("a number")).collect();
+    invariants::hold(&world.session, numbers[0]..numbers[1], &world.folder);
 }
 
 #[test]
 fn random_scenes_are_completed_or_end_with_a_reason_and_keep_their_invariants() {
+    let Some(test) = test_of(|world| scenario(&world)) else { return };
     let jobs = chosen();
     let mut first = jobs.start;
     while first < jobs.end {
@@ -43,7 +40,7 @@ fn random_scenes_are_completed_or_end_with_a_reason_and_keep_their_invariants() 
         let folder = tempfile::tempdir().expect("folder");
         // The results on one rank come first: the others are compared with them.
         for ranks in [1, 2, 3] {
-            mpirun::run(ranks, &format!("{SCENARIO}{first} {end}"), folder.path());
+            mpirun::run(ranks, &format!("{test} {first} {end}"), folder.path());
         }
         first = end;
     }

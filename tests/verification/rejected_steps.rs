@@ -48,7 +48,7 @@ fn tried_and_straight(session: &Session, effect: &Acting, scheme: &str) {
     assert_eq!(straight.totals, trying.totals, "{}, {scheme}", effect.name);
 }
 
-pub fn in_the_plane(session: &Session) {
+fn in_the_plane(session: &Session) {
     for effect in &EFFECTS {
         SCHEMES.iter().for_each(|(scheme, _)| tried_and_straight(session, effect, scheme));
     }
@@ -56,7 +56,7 @@ pub fn in_the_plane(session: &Session) {
 
 #[test]
 fn rejected_steps_leave_no_trace_in_any_effect_under_any_scheme() {
-    run_on(&[1, 2], "rejected_steps");
+    run_on(&[1, 2], |world| in_the_plane(&world.session));
 }
 
 /// The set-up for steps of another length fails at each of its agreements in turn; steps of the previous length then give the same
@@ -96,7 +96,7 @@ fn failing_and_straight(session: &Session, effect: &Acting, under: &str) {
     assert!(failures > 12, "{under}: {failures} failures");
 }
 
-pub fn after_failures(session: &Session) {
+fn after_failures(session: &Session) {
     for effect in [&EFFECTS[0], &EFFECTS[6]] {
         SCHEMES.iter().for_each(|(scheme, _)| failing_and_straight(session, effect, scheme));
     }
@@ -104,5 +104,5 @@ pub fn after_failures(session: &Session) {
 
 #[test]
 fn a_set_up_that_fails_leaves_matrices_of_other_lengths_usable() {
-    run_on(&[1, 2], "failed_set_up");
+    run_on(&[1, 2], |world| after_failures(&world.session));
 }

@@ -85,7 +85,7 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
     assert!(rubbing > 0.5 * area && rubbing < area, "{areas:?}");
 }
 
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     for scheme in ["lagged_euler", "implicit_euler", "bdf2"] {
         block::<2, 4>(session, &crossed([4, 3]), scheme);
         block::<3, 6>(session, &brick([3, 2, 2]), scheme);
@@ -121,7 +121,7 @@ fn worst_balance(session: &Session, mesh: &GlobalMesh<2>, text: &str) -> f64 {
 }
 
 /// The forces on a body that is carried along fast are solved for, not those that would stop it.
-pub fn carried(session: &Session) {
+fn carried(session: &Session) {
     let steel = |scheme: &str| {
         format!(
             "{}[time]\nscheme = \"{scheme}\"\nend = 0.2\nstep = 0.01\n[material]\nhypothesis = \"plane_strain\"\n\
@@ -151,10 +151,10 @@ pub fn carried(session: &Session) {
 
 #[test]
 fn forces_on_a_body_that_is_carried_along_are_balanced() {
-    run_on(&[1, 2], "carried");
+    run_on(&[1, 2], |world| carried(&world.session));
 }
 
 #[test]
 fn forces_pressures_and_areas_of_a_pressed_block_are_the_known_ones() {
-    run_on(&[1, 2, 3], "resultants");
+    run_on(&[1, 2, 3], |world| all(&world.session));
 }

@@ -66,7 +66,7 @@ pub fn observed(session: &Session, fields: &[[Vec<f64>; 2]; 3]) -> [f64; 2] {
     })
 }
 
-pub fn orders(session: &Session) {
+fn orders(session: &Session) {
     let end = 0.5;
     let flow = "viscoplasticity.maxwell = { relaxation_time = 0.4, volumetric_relaxation_time = 2 }";
     for (scheme, expected) in [("implicit_euler", 1.0), ("bdf2", 2.0), ("midpoint", 2.0)] {
@@ -169,7 +169,7 @@ fn creep<const D: usize, const S: usize>(
     }
 }
 
-pub fn closed_forms(session: &Session) {
+fn closed_forms(session: &Session) {
     let plane = rectangle([1.0, 1.0], [2, 2], Diagonal::Right, [1.0, 1.0]).expect("mesh");
     let space = box_mesh([1.0; 3], [2; 3], [1.0; 3]).expect("mesh");
     for scheme in ["implicit_euler", "bdf2"] {
@@ -181,12 +181,12 @@ pub fn closed_forms(session: &Session) {
 
 #[test]
 fn implicit_euler_is_of_first_order_bdf2_and_the_midpoint_rule_of_second_over_equal_and_unequal_steps() {
-    run_on(&[1], "scheme_orders");
+    run_on(&[1], |world| orders(&world.session));
 }
 
 #[test]
 fn relaxation_and_creep_follow_each_schemes_closed_form() {
-    run_on(&[1, 2], "scheme_closed_forms");
+    run_on(&[1, 2], |world| closed_forms(&world.session));
 }
 
 /// Cells along a side of the paper's square.
@@ -218,7 +218,7 @@ fn largest_error(session: &Session, overrides: &[String], reference: &[Vec<f64>]
     (run.state.step, run.scheme.set_ups, largest)
 }
 
-pub fn adapted(session: &Session) {
+fn adapted(session: &Session) {
     let scheme = |scheme: &str, steps: usize| {
         let step = 1.0 / steps as f64;
         vec![format!("time.scheme={scheme}"), format!("time.step={step}"), "solver.tolerance=1e-12".into()]
@@ -248,5 +248,5 @@ pub fn adapted(session: &Session) {
 
 #[test]
 fn adapted_steps_reach_the_error_of_1024_lagged_ones_with_a_tenth_of_them() {
-    run_on(&[1], "scheme_adapted");
+    run_on(&[1], |world| adapted(&world.session));
 }

@@ -126,7 +126,7 @@ fn long_steps(session: &Session, scheme: &str) {
     assert!(errors[1] <= share * errors[0] && errors[0] < 0.05, "{scheme}: {errors:?} of {exact}");
 }
 
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     for scheme in ["implicit_euler", "bdf2"] {
         ALL.iter().for_each(|softening| derivatives(session, softening, scheme));
         long_steps(session, scheme);
@@ -135,5 +135,5 @@ pub fn all(session: &Session) {
 
 #[test]
 fn damage_bonds_and_memory_at_the_end_of_a_step_have_consistent_derivatives_and_balance() {
-    run_on(&[1, 2], "softening");
+    run_on(&[1, 2], |world| all(&world.session));
 }

@@ -172,8 +172,7 @@ fn contradictions(session: &Session) {
     }
 }
 
-/// The scenario `supports`.
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     in_dimension::<2, 4>(session, &crossed([4, 3]));
     in_dimension::<3, 6>(session, &brick([3, 2, 3]));
     carried(session);
@@ -182,5 +181,5 @@ pub fn all(session: &Session) {
 
 #[test]
 fn supports_move_and_give_way_in_any_direction() {
-    run_on(&[1, 2, 3], "supports");
+    run_on(&[1, 2, 3], |world| all(&world.session));
 }

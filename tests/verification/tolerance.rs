@@ -195,7 +195,7 @@ fn memory(session: &Session, scheme: &str, bounds: [f64; 2]) {
     falls(session, &format!("memory, {scheme}"), job, off, (1e-3, bounds));
 }
 
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     let of_each = [[0.25, 2e-2], [0.25, 2e-2], [0.15, 5e-3]];
     for (scheme, bounds) in SCHEMES.into_iter().zip(of_each) {
         relaxation(session, scheme, bounds);
@@ -208,5 +208,5 @@ pub fn all(session: &Session) {
 
 #[test]
 fn errors_of_stress_creep_damage_bonds_and_memory_fall_with_the_tolerance() {
-    run_on(&[1, 2], "tolerance");
+    run_on(&[1, 2], |world| all(&world.session));
 }

@@ -395,12 +395,12 @@ fn worst_steps<const D: usize, const S: usize>(session: &Session, mesh: &GlobalM
     worst_step::<D, S>(session, mesh, Scheme::Bdf2, step(0.15, 0.0).or(step(0.15, 0.15)));
 }
 
-pub fn plane(session: &Session) {
+fn plane(session: &Session) {
     all::<2, 3>(session, &crossed([4, 3]));
     worst_steps::<2, 3>(session, &crossed([3, 2]));
 }
 
-pub fn space(session: &Session) {
+fn space(session: &Session) {
     all::<3, 6>(session, &brick([2, 2, 2]));
     worst_steps::<3, 6>(session, &brick([1, 1, 1]));
     several(session);
@@ -408,10 +408,10 @@ pub fn space(session: &Session) {
 
 #[test]
 fn certificates_in_the_plane_are_eigenvalues_of_what_the_solver_sums() {
-    run_on(&[1, 2], "unique_plane");
+    run_on(&[1, 2], |world| plane(&world.session));
 }
 
 #[test]
 fn certificates_in_space_are_eigenvalues_of_what_the_solver_sums() {
-    run_on(&[1, 2], "unique_space");
+    run_on(&[1, 2], |world| space(&world.session));
 }

@@ -116,7 +116,7 @@ pub fn tangent(session: &Session, run: &mut Simulation<2, 4>, law: &str) -> bool
     all[2] > 0.0
 }
 
-pub fn all(session: &Session) {
+fn all(session: &Session) {
     [32, 50].into_iter().for_each(|steps| permanent_set(session, steps));
     for law in [
         "perzyna = { relaxation = 0.5, yield_stress = 10 }",
@@ -130,5 +130,5 @@ pub fn all(session: &Session) {
 
 #[test]
 fn what_unloads_flows_no_more() {
-    run_on(&[1, 2], "unloading");
+    run_on(&[1, 2], |world| all(&world.session));
 }

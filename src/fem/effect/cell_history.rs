@@ -174,12 +174,8 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
     }
 
     fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
-        let target = match (moment, &mut self.earlier) {
-            _ if quantity != self.quantity => return,
-            (Moment::Last, _) => &mut self.converged,
-            (Moment::Earlier, Some(earlier)) => earlier,
-            (Moment::Earlier, None) => return,
-        };
+        let kept = moment.of(&mut self.converged, self.earlier.as_mut());
+        let Some(target) = kept.filter(|_| quantity == self.quantity) else { return };
         let (values, _) = values.as_chunks::<W>();
         let batches = self.runs.iter().flat_map(|run| (0..self.points).map(move |point| (run, point)));
         for ((run, point), place) in batches.zip(&self.places) {

@@ -60,12 +60,8 @@ impl HistoryStore for NodeHistory {
     }
 
     fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
-        let target = match (moment, &mut self.earlier) {
-            _ if quantity != self.quantity => return,
-            (Moment::Last, _) => &mut self.converged,
-            (Moment::Earlier, Some(earlier)) => earlier,
-            (Moment::Earlier, None) => return,
-        };
+        let kept = moment.of(&mut self.converged, self.earlier.as_mut());
+        let Some(target) = kept.filter(|_| quantity == self.quantity) else { return };
         let saved = self.nodes.iter().map(|&node| values[node as usize]);
         target.iter_mut().zip(saved).for_each(|(value, saved)| *value = saved);
     }

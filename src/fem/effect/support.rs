@@ -279,10 +279,19 @@ impl<const D: usize> SupportMotion<D> {
     }
 
     /// Adds to velocities of owned nodes, 0 at held components, those of the supports at time 0; `step` in s is the first step.
-    pub fn start_velocity(&self, step: f64, velocity: &mut [f64]) -> Result<()> {
+    /// `known` has the velocity of a node along a direction where it is known already.
+    pub fn start_velocity(
+        &self,
+        step: f64,
+        known: impl Fn(usize, &Vector<D>) -> Option<f64>,
+        velocity: &mut [f64],
+    ) -> Result<()> {
         let span = START_SHARE * step;
         for moved in &self.nodes {
-            moved.add(velocity, |_, number| {
+            moved.add(velocity, |part, number| {
+                if let Some(known) = known(moved.node as usize, &part.direction) {
+                    return Ok(known);
+                }
                 let Prescribed { value, is_displacement } = &self.values[number];
                 let value = |time: f64| finite(value, time, &moved.place, what);
                 let start = value(0.0)?;

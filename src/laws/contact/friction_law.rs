@@ -35,6 +35,15 @@ pub struct SlidingContext {
     pub step_length: f64,
     /// Whether the history follows a two-step scheme.
     pub is_blended: bool,
+    /// The speed in m/s of the part of the sliding velocity that supports hold.
+    pub held: f64,
+}
+
+impl SlidingContext {
+    /// The same beside a held part of the sliding velocity with this speed in m/s.
+    pub fn beside(self, held: f64) -> Self {
+        Self { held, ..self }
+    }
 }
 
 /// A number at each point on which a friction law depends.
@@ -96,7 +105,7 @@ pub trait FrictionBound {
     /// A step from this blend of the histories after the last step and before it.
     fn context(&self, [recent, earlier]: [f64; 2], blend: Blend) -> SlidingContext {
         let history = blend.of(recent, earlier);
-        SlidingContext { history, step_length: blend.length, is_blended: blend.earlier != 0.0 }
+        SlidingContext { history, step_length: blend.length, is_blended: blend.earlier != 0.0, held: 0.0 }
     }
 
     /// The history after a step that starts from this blend of the histories after the last step and before it, at this sliding velocity
@@ -137,7 +146,51 @@ pub trait FrictionBound {
             coefficient: if pressure > 0.0 { self.coefficient(speed, at) } else { 0.0 },
         }
     }
+
+    /// The point of the graph of the free part `v` of a sliding velocity whose other part, across to it, is held: with
+    /// `V = hypot(v, held)`, `c v + g(V) v / V = s`, for an `s` that is not negative and a `c` above the steepest decrease.
+    fn resolve_beside(&self, s: f64, c: f64, pressure: f64, at: SlidingContext) -> Slip {
+        let held = at.held;
+        if held == 0.0 {
+            return self.resolve(s, c, pressure, at);
+        }
+        let graph = |speed: f64| {
+            let whole = speed.hypot(held);
+            let (bound, along, across) = (self.bound(whole, pressure, at), speed / whole, held / whole);
+            [bound * along, self.slope(whole, pressure, at) * along * along + bound / whole * across * across]
+        };
+        let mut speed = s / (c + self.bound(held, pressure, at) / held);
+        let [mut low, mut high] = [0.0, s / c];
+        for _ in 0..ITERATIONS {
+            let [traction, slope] = graph(speed);
+            let open = c * speed + traction - s;
+            if open > 0.0 {
+                high = speed;
+            } else {
+                low = speed;
+            }
+            let newton = speed - open / (c + slope);
+            let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
+            let change = (next - speed).abs();
+            speed = next;
+            if change <= 2.0 * f64::EPSILON * next {
+                break;
+            }
+        }
+        let [traction, slope] = graph(speed);
+        let derivative = 1.0 / (c + slope);
+        if c * derivative < STICKS {
+            return Slip { speed, traction, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
+        }
+        let whole = speed.hypot(held);
+        let coefficient = if pressure > 0.0 { self.coefficient(whole, at) * speed / whole } else { 0.0 };
+        Slip { speed, traction, derivative, slope, coefficient }
+    }
 }
+
+/// A point whose velocity follows the parameter by less than this share of `1 / c` counts as sticking: it creeps so slowly that the change
+/// of its velocity has no effect on Newton's method, while its slope would only spoil the condition of the matrix.
+pub(super) const STICKS: f64 = 1e-8;
 
 /// The root of `c v + g(v) = s`, whose left side is increasing and convex, by Newton's method with bisection where it leaves the
 /// bracket.
@@ -200,6 +253,7 @@ macro_rules! friction_laws {
                 history_measure(history: f64) -> f64;
                 own_faults() -> Vec<crate::laws::law::LawFault>;
                 resolve(s: f64, c: f64, pressure: f64, at: SlidingContext) -> Slip;
+                resolve_beside(s: f64, c: f64, pressure: f64, at: SlidingContext) -> Slip;
             }
 
             /// The history of a point at the start of the run, twice: that before it is the same.

@@ -202,7 +202,8 @@ mod tests {
         }
     }
 
-    const FIRST: SlidingContext = SlidingContext { history: 0.0, step_length: 0.0, is_blended: false };
+    const FIRST: SlidingContext =
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
 
     fn any_law() -> impl Strategy<Value = FrictionLaw> {
         let weakening =
@@ -214,6 +215,18 @@ mod tests {
             (0.0f64..2.0).prop_map(|coefficient| FrictionLaw::Coulomb(Coulomb { coefficient })),
             weakening,
         ]
+    }
+
+    #[test]
+    fn beside_a_held_part_of_4_a_free_part_of_3_has_three_fifths_of_the_bound() {
+        let coulomb = FrictionLaw::Coulomb(Coulomb { coefficient: 0.5 });
+        let found = coulomb.resolve_beside(9.0, 2.0, 10.0, FIRST.beside(4.0));
+        assert!((found.speed - 3.0).abs() < 1e-14 && (found.traction - 3.0).abs() < 1e-14, "{found:?}");
+        // The slope of 5 v / hypot(v, 4).
+        assert!((found.slope - 5.0 * 16.0 / 125.0).abs() < 1e-14 && (found.coefficient - 0.3).abs() < 1e-15);
+        assert_eq!(coulomb.resolve_beside(4.0, 2.0, 10.0, FIRST), coulomb.resolve(4.0, 2.0, 10.0, FIRST));
+        let rest = coulomb.resolve_beside(0.0, 2.0, 10.0, FIRST.beside(4.0));
+        assert_eq!((rest.speed, rest.traction, rest.slope), (0.0, 0.0, 1.25));
     }
 
     proptest! {
@@ -230,6 +243,30 @@ mod tests {
                 let known = if pressure > 0.0 { law.coefficient(speed, FIRST) } else { 0.0 };
                 prop_assert!((by_pressure - known).abs() < 1e-7);
             }
+        }
+
+        #[test]
+        fn beside_a_held_part_of_the_sliding_velocity_the_law_is_the_same_radial_graph(
+            law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0, held in -6.0f64..1.0,
+        ) {
+            let held = 10f64.powf(held);
+            let c = more * law.steepest_decrease(FIRST) * pressure.max(0.0) + 0.1;
+            let found = law.resolve_beside(s, c, pressure, FIRST.beside(held));
+            prop_assert!((c * found.speed + found.traction - s).abs() < 1e-12 * (1.0 + s));
+            let whole = found.speed.hypot(held);
+            prop_assert!((found.traction - law.bound(whole, pressure, FIRST) * found.speed / whole).abs() < 1e-12 * (1.0 + s));
+            let slope = 1.0 / found.derivative - c;
+            prop_assert!(found.derivative == 0.0 || (slope - found.slope).abs() < 1e-9 * (c + slope.abs()));
+            let free_part = |speed: f64| {
+                let whole = speed.hypot(held);
+                law.bound(whole, pressure, FIRST) * speed / whole
+            };
+            let h = 1e-5 * whole;
+            let quotient = (free_part(found.speed + h) - free_part(found.speed - h)) / (2.0 * h);
+            let size = law.bound(0.0, pressure, FIRST) / whole + law.steepest_decrease(FIRST) * pressure.max(0.0);
+            prop_assert!(found.derivative == 0.0 || (quotient - found.slope).abs() <= 1e-6 * size, "{quotient} {found:?}");
+            let known = if pressure > 0.0 { law.coefficient(whole, FIRST) * found.speed / whole } else { 0.0 };
+            prop_assert!(found.derivative == 0.0 || (found.coefficient - known).abs() <= 1e-12 * known);
         }
 
         #[test]

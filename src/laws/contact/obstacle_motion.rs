@@ -13,15 +13,7 @@
 //! velocities from displacements: in a step of implicit Euler, `x' = (x_n - x_{n-1}) / k`, so that a sticking point moves exactly
 //! as far as the obstacle. All other quantities are those at the end of the step, as is the gap.
 
-use super::{
-    obstacle::{Gap, Plane, Sphere},
-    obstacle_shape::{Shape, vector},
-};
-use crate::{
-    error::{Error, Result},
-    laws::expression::Scalar,
-    linear_algebra::tensor::{Vector, add_scaled, cross, norm},
-};
+use crate::linear_algebra::tensor::{Vector, add_scaled, cross};
 
 /// The formula of a scheme for the rate at the end of a step in terms of values at this time and at earlier times.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +31,7 @@ impl Rate {
         Self { time, before: [[time - length, 1.0 / length], [0.0; 2]] }
     }
 
-    fn of<const D: usize>(&self, value: impl Fn(f64) -> Vector<D>) -> Vector<D> {
+    pub(super) fn of<const D: usize>(&self, value: impl Fn(f64) -> Vector<D>) -> Vector<D> {
         let now = value(self.time);
         let mut rate = [0.0; D];
         for [time, weight] in self.before.into_iter().filter(|[_, weight]| *weight != 0.0) {
@@ -54,10 +46,10 @@ impl Rate {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObstacleMotion<const D: usize> {
     /// Velocity in m/s of the centre.
-    velocity: Vector<D>,
-    centre: Vector<D>,
+    pub(super) velocity: Vector<D>,
+    pub(super) centre: Vector<D>,
     /// Angular velocity in rad/s.
-    angular_velocity: Vector<3>,
+    pub(super) angular_velocity: Vector<3>,
 }
 
 impl<const D: usize> ObstacleMotion<D> {
@@ -87,98 +79,8 @@ impl<const D: usize> ObstacleMotion<D> {
     }
 }
 
-impl Gap {
-    /// Whether the surface of the obstacle may have a velocity; false for a given gap, whose change is not a motion of a surface.
-    pub fn surface_may_move(&self) -> bool {
-        let rotation = match self {
-            Self::Distance(_) => &None,
-            Self::Plane(Plane { rotation, .. })
-            | Self::Sphere(Sphere { rotation, .. })
-            | Self::Shape(Shape { rotation, .. }) => rotation,
-        };
-        self.is_driven() || rotation.as_ref().is_some_and(|rotation| *rotation != Scalar::default())
-    }
-
-    /// Whether the place of the surface depends on the time.
-    pub(super) fn is_driven(&self) -> bool {
-        let moves = |components: &[Scalar]| components.iter().any(Scalar::depends_on_time);
-        match self {
-            Self::Distance(_) => false,
-            Self::Plane(Plane { point, normal, .. }) => moves(point) || moves(normal),
-            Self::Sphere(Sphere { centre, .. }) | Self::Shape(Shape { centre, .. }) => moves(centre),
-        }
-    }
-
-    /// The centre in m at `time` of a sphere or shape, the point of a plane; the origin without an obstacle.
-    pub fn centre<const D: usize>(&self, time: f64) -> Vector<D> {
-        match self {
-            Self::Distance(_) => [0.0; D],
-            Self::Plane(Plane { point, .. }) => vector(point, time),
-            Self::Sphere(Sphere { centre, .. }) | Self::Shape(Shape { centre, .. }) => vector(centre, time),
-        }
-    }
-
-    /// The direction of the axis of rotation of a sphere or shape; in the plane z.
-    pub fn axis(&self) -> Vector<3> {
-        match self {
-            Self::Sphere(Sphere { axis, .. }) | Self::Shape(Shape { axis, .. }) => {
-                axis_of(axis.as_deref().unwrap_or_default())
-            }
-            Self::Distance(_) | Self::Plane(_) => axis_of(&[]),
-        }
-    }
-
-    /// The motion of the obstacle at the end of a step; zero without an obstacle.
-    pub fn motion<const D: usize>(&self, rate: Rate) -> Result<ObstacleMotion<D>> {
-        let time = rate.time;
-        let rotation_rate =
-            |rotation: &Option<Scalar>| rotation.as_ref().map_or(0.0, |r| r.evaluate(time, &[]));
-        let motion = match self {
-            Self::Distance(_) => {
-                return Ok(ObstacleMotion {
-                    velocity: [0.0; D],
-                    centre: [0.0; D],
-                    angular_velocity: [0.0; 3],
-                });
-            }
-            Self::Plane(Plane { point, normal, rotation }) => {
-                let unit = |time| {
-                    let normal = in_space(&vector::<D>(normal, time));
-                    normal.map(|x| x / norm(&normal))
-                };
-                let (facing, rotation) = (unit(time), rotation_rate(rotation));
-                let tilt = cross(&facing, &rate.of(unit));
-                ObstacleMotion {
-                    velocity: rate.of(|time| vector(point, time)),
-                    centre: vector(point, time),
-                    angular_velocity: add_scaled(&tilt, rotation, &facing),
-                }
-            }
-            Self::Sphere(Sphere { centre, rotation, axis, .. })
-            | Self::Shape(Shape { centre, rotation, axis, .. }) => {
-                let rotation = rotation_rate(rotation);
-                let axis = axis_of(axis.as_deref().unwrap_or_default());
-                let angular_velocity =
-                    if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) };
-                ObstacleMotion {
-                    velocity: rate.of(|time| vector(centre, time)),
-                    centre: vector(centre, time),
-                    angular_velocity,
-                }
-            }
-        };
-        if motion.velocity.iter().chain(&motion.angular_velocity).all(|x| x.is_finite()) {
-            return Ok(motion);
-        }
-        Err(Error::Failed(format!(
-            "contact: the obstacle moves at {:?} m/s and turns at {:?} rad/s at t = {time} s; correct [contact.obstacle]",
-            motion.velocity, motion.angular_velocity
-        )))
-    }
-}
-
 /// An axis of rotation; in the plane, where none is given, z.
-fn axis_of(given: &[f64]) -> Vector<3> {
+pub(super) fn axis_of(given: &[f64]) -> Vector<3> {
     if given.is_empty() { [0.0, 0.0, 1.0] } else { in_space(given) }
 }
 
@@ -193,7 +95,13 @@ fn in_plane<const D: usize>(vector: &Vector<3>) -> Vector<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::contact::obstacle::tests::{expression, numbers};
+    use crate::laws::{
+        contact::obstacles::{
+            Gap, Plane, Shape, Sphere,
+            tests::{expression, numbers},
+        },
+        expression::Scalar,
+    };
 
     const STEP: Rate = Rate { time: 0.5, before: [[0.25, 4.0], [0.0; 2]] };
 

@@ -11,10 +11,7 @@
 //! of these times, deeper than the depths at the ends of this step and of its neighbours differ from each other: then the steps do not
 //! resolve the motion. A motion that they resolve may touch between their ends, with an error that is that of the scheme.
 
-use super::{
-    obstacle::{Gap, Sphere, to_sphere},
-    obstacle_shape::vector,
-};
+use super::obstacles::Gap;
 use crate::{
     error::Result,
     linear_algebra::tensor::{Vector, add_scaled, larger, norm},
@@ -52,11 +49,9 @@ impl Gap {
         if self.comes_and_goes(sweep) {
             return Ok(true);
         }
-        let centres: [Vector<D>; 2] = match self {
-            Self::Sphere(Sphere { centre, .. }) => times.map(|time| vector(centre, time)),
-            Self::Shape(shape) => times.map(|time| vector(&shape.centre, time)),
-            Self::Distance(_) | Self::Plane(_) => [[0.0; D]; 2],
-        };
+        let has_other_side = self.has_other_side();
+        let centres: [Vector<D>; 2] =
+            times.map(|time| if has_other_side { self.centre(time) } else { [0.0; D] });
         let offsets: [Vector<D>; 2] = std::array::from_fn(|i| add_scaled(&places[i], -1.0, &centres[i]));
         let size = offsets.as_flattened().iter().fold(0.0, |most, x| larger(most, x.abs()));
         if depth > ROUNDING * size {
@@ -65,18 +60,12 @@ impl Gap {
         let way = add_scaled(&offsets[1], -1.0, &offsets[0]);
         let length = norm(&way);
         // Within its distance from the end, the point does not meet the obstacle. Half-spaces have no other side.
-        if matches!(self, Self::Plane(_)) || -depth >= length {
+        if !has_other_side || -depth >= length {
             return Ok(false);
         }
         let back = way.map(|x| -x / length);
-        let ray = match self {
-            // The end of the way lies at the surface; a ray from there depends on rounding.
-            _ if -depth <= ROUNDING * size => 0.0,
-            Self::Sphere(Sphere { radius, hollow, .. }) => to_sphere(&offsets[1], &back, *radius, *hollow),
-            Self::Shape(shape) => shape.along(&offsets[1], &back),
-            Self::Distance(_) | Self::Plane(_) => f64::INFINITY,
-        };
-        let ray = self.number(ray, times[1], &places[1])?;
+        // Where the end of the way lies at the surface, a ray from there depends on rounding.
+        let ray = if -depth <= ROUNDING * size { 0.0 } else { self.at(times[1], &places[1], &back)? };
         if ray >= (1.0 - ROUNDING) * length {
             return Ok(false);
         }
@@ -124,12 +113,9 @@ impl Gap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::contact::{
-        obstacle::{
-            Plane,
-            tests::{expression, numbers},
-        },
-        obstacle_shape::Shape,
+    use crate::laws::contact::obstacles::{
+        Plane, Shape, Sphere,
+        tests::{expression, numbers},
     };
 
     const DOWN: Vector<2> = [0.0, -1.0];

@@ -131,72 +131,33 @@ laws! {
     Norton = "norton",
 }
 
+/// Methods that delegate to the chosen law.
+macro_rules! delegate {
+    ($($method:ident $(::<$size:ident>)? ($($argument:ident: $kind:ty),*) -> $out:ty;)*) => {
+        $(
+            #[inline(always)]
+            fn $method $(<const $size: usize>)? (&self $(, $argument: $kind)*) -> $out {
+                chosen!(self, law => law.$method $(::<$size>)? ($($argument),*))
+            }
+        )*
+    };
+}
+
 impl Flow for FlowLaw {
-    #[inline]
-    fn elasticity(&self) -> &Isotropic {
-        chosen!(self, law => law.elasticity())
-    }
-
-    #[inline]
-    fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
-        chosen!(self, law => law.rate(s, accumulated))
-    }
-
-    #[inline(always)]
-    fn rates<const S: usize>(
-        &self,
-        stresses: &Pack<S>,
-        accumulated: &[f64; LANES],
-        growths: &mut [f64; LANES],
-    ) -> Option<Pack<S>> {
-        chosen!(self, law => law.rates(stresses, accumulated, growths))
-    }
-
-    fn flow_to_end<const S: usize>(
-        &self,
-        trial: &Mandel<S>,
-        length: f64,
-        accumulated: f64,
-        tangent: Option<&mut Tangent<S>>,
-    ) -> Option<(Mandel<S>, f64)> {
-        chosen!(self, law => law.flow_to_end(trial, length, accumulated, tangent))
-    }
-
-    #[inline(always)]
-    fn yielding<const S: usize>(&self, stresses: &Pack<S>, accumulated: &[f64; LANES]) -> [bool; LANES] {
-        chosen!(self, law => law.yielding(stresses, accumulated))
-    }
-
-    fn has_symmetric_tangent<const S: usize>(&self) -> bool {
-        chosen!(self, law => law.has_symmetric_tangent::<S>())
-    }
-
-    fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64 {
-        chosen!(self, law => law.fastest_rate::<S>(overstress))
-    }
-
-    fn is_power_law(&self) -> bool {
-        chosen!(self, law => law.is_power_law())
-    }
-
-    #[inline]
-    fn overstress<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> f64 {
-        chosen!(self, law => law.overstress(s, accumulated))
-    }
-
-    fn hardens(&self) -> bool {
-        chosen!(self, law => law.hardens())
-    }
-
-    fn equivalent_stress<const S: usize>(&self, s: &Mandel<S>) -> Option<(f64, Mandel<S>)> {
-        chosen!(self, law => law.equivalent_stress(s))
-    }
-
-    fn strength(&self, accumulated: f64) -> f64 {
-        chosen!(self, law => law.strength(accumulated))
-    }
-
-    fn hardening_modulus(&self) -> f64 {
-        chosen!(self, law => law.hardening_modulus())
+    delegate! {
+        elasticity() -> &Isotropic;
+        rate::<S>(s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64);
+        rates::<S>(s: &Pack<S>, accumulated: &[f64; LANES], growths: &mut [f64; LANES]) -> Option<Pack<S>>;
+        flow_to_end::<S>(trial: &Mandel<S>, length: f64, accumulated: f64, tangent: Option<&mut Tangent<S>>)
+            -> Option<(Mandel<S>, f64)>;
+        yielding::<S>(stresses: &Pack<S>, accumulated: &[f64; LANES]) -> [bool; LANES];
+        has_symmetric_tangent::<S>() -> bool;
+        fastest_rate::<S>(overstress: f64) -> f64;
+        is_power_law() -> bool;
+        overstress::<S>(s: &Mandel<S>, accumulated: f64) -> f64;
+        hardens() -> bool;
+        equivalent_stress::<S>(s: &Mandel<S>) -> Option<(f64, Mandel<S>)>;
+        strength(accumulated: f64) -> f64;
+        hardening_modulus() -> f64;
     }
 }

@@ -38,7 +38,11 @@ mod tests {
 
     #[test]
     fn openblas_takes_the_number_of_threads() {
-        let Some(get) = find(c"openblas_get_num_threads") else { return };
+        assert!(find(c"dgemm_").is_some(), "a BLAS is loaded");
+        let is_loaded = std::fs::read_to_string("/proc/self/maps").unwrap().contains("openblas");
+        let get = find(c"openblas_get_num_threads");
+        assert_eq!((get.is_some(), find(c"openblas_set_num_threads").is_some()), (is_loaded, is_loaded));
+        let Some(get) = get else { return };
         // SAFETY: OpenBLAS has this function without arguments.
         let get = unsafe { std::mem::transmute::<*mut c_void, unsafe extern "C" fn() -> c_int>(get) };
         for threads in [2, 1] {

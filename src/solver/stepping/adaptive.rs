@@ -9,7 +9,8 @@
 //! relaxes keeps its accuracy, and one that vanishes does not stop the run. It includes the stress caused by the velocity
 //! error in the step, and the errors of viscoplastic histories, damage, the bonding of adhesion and the memory pressure of contact.
 //! What friction and wear keep, and the motions of obstacles moved by forces, are measured against their own largest deviations from
-//! their values at the start: a state of friction may change little beside a large normal stress and still determine the motion.
+//! their values at the start, bonds and memory also against their own largest forces: a state of friction may change little beside a
+//! large normal stress, and a bond hold little of it, and still determine the motion.
 //! The accumulated strain of hardening cells needs no term of its own: it grows no faster than the flow, whose error is included in
 //! that of the histories.
 
@@ -52,6 +53,9 @@ pub struct StepLevel {
     /// Largest deviations of the quantities of contacts from their values at the start so far.
     #[serde(default)]
     pub contact: [f64; CONTACT_QUANTITIES],
+    /// Largest norm of the forces of bonds and contact memory so far.
+    #[serde(default)]
+    pub surface: f64,
     /// Number of rejected steps.
     pub rejected: u64,
 }
@@ -74,12 +78,13 @@ pub struct Adaptive<const D: usize> {
 
 impl StepLevel {
     /// Keeps the norms of a step that exceed those so far.
-    fn keep_largest(&mut self, StepError { size, contact, .. }: &StepError) {
+    fn keep_largest(&mut self, StepError { size, contact, surface, .. }: &StepError) {
         self.velocity = self.velocity.max(size.velocity);
         self.stress = self.stress.max(size.stress);
         for (largest, found) in self.contact.iter_mut().zip(contact) {
             *largest = largest.max(found.size);
         }
+        self.surface = self.surface.max(surface.size);
     }
 }
 
@@ -246,7 +251,7 @@ impl<const D: usize> Adaptive<D> {
     }
 
     /// The error relative to the norms so far; NaN if the error or a norm is NaN.
-    fn relative(&self, StepError { error, size, negligible, contact }: StepError) -> f64 {
+    fn relative(&self, StepError { error, size, negligible, contact, surface }: StepError) -> f64 {
         let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.step_level.velocity.max(size.velocity);
         let largest_stress = self.step_level.stress.max(size.stress);
@@ -254,7 +259,8 @@ impl<const D: usize> Adaptive<D> {
         let present_stress = size.stress.max(LEAST_SHARE * largest_stress);
         let stress = ratio(error.stress, present_stress.max(negligible.stress * largest_velocity));
         let mut square = velocity * velocity + stress * stress;
-        for (largest, found) in self.step_level.contact.iter().zip(contact) {
+        let own = self.step_level.contact.iter().chain([&self.step_level.surface]);
+        for (largest, found) in own.zip(contact.into_iter().chain([surface])) {
             let ratio = ratio(found.error, largest.max(found.size).max(found.negligible));
             square += ratio * ratio;
         }
@@ -351,7 +357,7 @@ mod tests {
             error: norms(error),
             size: norms(size),
             negligible: norms([1e-3, 1e-2]),
-            contact: [Deviation::default(); CONTACT_QUANTITIES],
+            ..StepError::default()
         };
         let mut adaptive = adaptive();
         (adaptive.step_level.velocity, adaptive.step_level.stress) = (2.0, 0.5);
@@ -394,6 +400,12 @@ mod tests {
         assert_eq!(adaptive.step_level.contact[..3], [0.2, 4.0, 1e-12]);
         contact[0].error = f64::NAN;
         assert!(adaptive.relative(found(contact)).is_nan());
+        let bonds = |error, size| StepError {
+            surface: Deviation { error, size, negligible: 0.0 },
+            ..StepError::default()
+        };
+        adaptive.step_level.keep_largest(&bonds(0.0, 5.0));
+        assert!((adaptive.relative(bonds(0.1, 3.0)) - 0.02).abs() < 1e-15, "the largest was 5");
     }
 
     #[test]

@@ -82,6 +82,10 @@ impl Floor {
 /// The number of Krylov iterations that take as long as factoring the condensed matrix with the forces at the surface.
 const MANY_ITERATIONS: usize = 15;
 
+/// The message of linear equations that neither CG nor GMRES solve.
+const NO_DIRECTION: &str =
+    "the linearised equations are indefinite or singular, and GMRES does not solve them";
+
 /// The residual decreased to less than this share of the last one unless it stagnates.
 const STAGNATION: f64 = 0.5;
 
@@ -406,7 +410,11 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         residual: &DistributedVector,
         direction: &mut DistributedVector,
     ) -> Result<()> {
-        self.solve_linearised(residual, direction, ProjectedKsp::solve).map(|_| ())
+        match self.solve_linearised(residual, direction, ProjectedKsp::solve)? {
+            Curvature::Positive => Ok(()),
+            // Without a direction, iterations would repeat the same velocity.
+            Curvature::Negative => Err(Error::Failed(NO_DIRECTION.into())),
+        }
     }
 }
 

@@ -76,6 +76,12 @@ impl Springs {
             nodes.flat_map(|c| c.frame[..c.active].iter().map(|motion| (c.node, *motion))).collect();
         let total = body.mesh.total_nodes as f64;
         let first = body.mesh.first_node;
+        // Where contact nodes have no mass, their rows do not show the inertia of the body.
+        let inertia = if body.redistributed_mass.is_some() {
+            sum_of_blocks::<D>(session, &rows)
+        } else {
+            vec![0.0; D * D]
+        };
         let stiffness = |&(node, motion): &(usize, [f64; D])| {
             let range = rows.offsets[node]..rows.offsets[node + 1];
             let (mut own, mut together) = (0.0, 0.0);
@@ -86,7 +92,8 @@ impl Springs {
                     own = power;
                 }
             }
-            if total * together < NEGLIGIBLE * own { STIFFNESS_RATIO * own } else { 0.0 }
+            let whole = (total * together).max(quadratic_form(&inertia, &motion));
+            if whole < NEGLIGIBLE * own { STIFFNESS_RATIO * own } else { 0.0 }
         };
         let springs: Vec<f64> = motions.iter().map(stiffness).collect();
         if session.total(springs.iter().filter(|spring| **spring > 0.0).count()) == 0 {
@@ -111,6 +118,13 @@ impl Springs {
         }
         Ok(RowsWithSprings { rows, springs: Some(springs) })
     }
+}
+
+/// The sum of all blocks over all ranks: the resistance to translations of everything together. Collective.
+fn sum_of_blocks<const D: usize>(session: &Session, rows: &BlockRows) -> Vec<f64> {
+    let of_row = |at: usize| rows.values.chunks_exact(D).skip(at).step_by(D);
+    let mine = (0..D).map(|i| of_row(i).fold([0.0; D], |sum, row| std::array::from_fn(|j| sum[j] + row[j])));
+    mine.flat_map(|row| session.sum(row)).collect()
 }
 
 /// `m . (B m)` with a block `B`.

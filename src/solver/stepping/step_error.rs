@@ -35,6 +35,8 @@ pub struct StepError {
     pub negligible: Norms,
     /// Norms of the quantities of contacts, squares in the calculation of the step.
     pub contact: [Deviation; CONTACT_QUANTITIES],
+    /// Norms of the forces of bonds and contact memory.
+    pub surface: Deviation,
 }
 
 /// Work space for nodal values with ghosts.
@@ -82,11 +84,12 @@ impl ErrorWorkspace {
             write(strained, values.map(|(t, (v, _))| 0.5 * (t - v)));
             step.length
         };
-        let histories = {
+        let [histories, surface] = {
             let (start, length) =
                 flow_start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
             write(end, start.local()?.iter().zip(trial.iter()).map(|(u, v)| u + length * v));
-            body.stress_error(curvature, end)
+            let surface = body.surface_error(curvature, end);
+            [body.stress_error(curvature, end, surface), surface]
         };
         let contact = contact_deviations(session, body, curvature, (&*end, &*trial), step);
         let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
@@ -98,8 +101,10 @@ impl ErrorWorkspace {
         };
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
         let strains = length * length * square(elastic, strained);
-        let mine = [square(form, curved), strains + histories.error, square(form, &trial), histories.size];
-        let mut squares = session.sum(mine);
+        let stresses = [strains + histories.error, histories.size];
+        let [velocity, all_velocity] = [square(form, curved), square(form, &trial)];
+        let [error, size] = [surface.error, surface.size];
+        let mut squares = session.sum([velocity, stresses[0], all_velocity, stresses[1], error, size]);
         // Obstacles that forces move, alike on all ranks.
         let motions = body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
         for motion in motions.flat_map(|obstacle| obstacle.motions()).flatten() {
@@ -108,7 +113,7 @@ impl ErrorWorkspace {
             squares[0] += error / unit;
             squares[2] += size / unit;
         }
-        let [velocity, stress, all_velocity, all_stress] =
+        let [velocity, stress, all_velocity, all_stress, error, size] =
             squares.map(|square| if square > 0.0 { square.sqrt() } else { square });
         // With mass both norms are roots of energies: a free body has a stress of rounding errors, a fixed one a velocity of
         // rounding errors. Without mass the square of a velocity norm is a power.
@@ -118,6 +123,7 @@ impl ErrorWorkspace {
             size: Norms { velocity: all_velocity, stress: all_stress },
             negligible: Norms { velocity: NEGLIGIBLE / unit, stress: NEGLIGIBLE * unit },
             contact,
+            surface: Deviation { error, size, negligible: NEGLIGIBLE * NEGLIGIBLE * all_stress },
         })
     }
 }

@@ -40,7 +40,7 @@ fn times(dimension: Dimension, by: Dimension) -> Dimension {
 
 /// Steps of a scene, and their length in s.
 pub const STEPS: u32 = 12;
-const STEP: f64 = 0.003;
+pub const STEP: f64 = 0.003;
 /// A time in s at which adaptive steps must end, and a kink of a load so shortly before it that a step is shorter than any certified.
 const LANDING: f64 = 7.3 * STEP;
 const KINK: f64 = LANDING - 1e-3 * STEP;
@@ -237,9 +237,7 @@ pub fn scene<const D: usize>(number: u64, frame: Frame) -> Scene<D> {
     draw.line(format!("[checkpoint]\nat = [{half:e}]"));
     let has_stages = draw.chance(0.12);
     let second = has_stages.then(|| second(&draw));
-    // A stage starts with the velocity that its supports have then, not with their mean over the step before.
-    let is_same = content.scheme == "implicit_euler"
-        && !["[time.adaptive]", "\ndisplacement = "].iter().any(|words| draw.text.contains(words));
+    let is_same = content.scheme == "implicit_euler" && !draw.text.contains("[time.adaptive]");
     let both = (has_stages && is_same).then(|| {
         let end = |steps: u32| format!("end = {:e}\n", draw.number(STEP * f64::from(steps), TIME));
         draw.text.replacen(&end(STEPS), &end(2 * STEPS), 1)
@@ -502,7 +500,8 @@ fn contacts<const D: usize>(draw: &mut Draw<D>, content: &Content) {
         let line = draw.text[at..].find('\n').expect("a line") + at + 1;
         draw.text.insert_str(line, &key);
     }
-    let rubs = draw.chance(0.6);
+    // A moment acts against friction.
+    let rubs = draw.chance(0.6) || draw.text.contains("\nmoment = ");
     if rubs {
         friction(draw);
     }

@@ -1,6 +1,6 @@
 //! What holds in each random scene.
 
-use super::drawn::{Frame, Scene, scene, turned};
+use super::drawn::{Frame, STEP, Scene, scene, turned};
 use clarke::{
     error::Exit,
     job::Job,
@@ -19,11 +19,13 @@ use std::{
 const BALANCE: f64 = 1e-7;
 /// Largest accepted difference of results that are equal but for rounding errors and the tolerance of the steps.
 const EQUAL: f64 = 1e-5;
-/// The same where rounding errors choose among adaptive steps.
-const ADAPTED: f64 = 3e-2;
-/// Energies in J that are none, and forces and moments as a share of the energy over a metre: a body that moves rigidly has rounding
-/// errors alone.
+/// The same where rounding errors choose among adaptive steps, or among several solutions of a step.
+const CHOSEN: f64 = 3e-2;
+/// Energies in J that are none: a body that moves rigidly has rounding errors alone.
 const NONE: f64 = 1e-12;
+/// Errors of momentum in a step as a share of the energy over 1 m/s: the tolerance of a step. A body that moves freely has no other
+/// forces, and in a step of some microseconds these are large.
+const SOLVED: f64 = 1e-10;
 /// The frame of the comparison, and its units: 1 mm, 10 g, 0.1 s.
 const OTHER: Frame = Frame { angle: 0.7, units: [1e3, 1e2, 10.0], steps: 1 };
 
@@ -80,9 +82,9 @@ struct Open {
 }
 
 impl Open {
-    /// The error relative to the size, where this is above the least one.
+    /// The error relative to the size, where it is above the least one.
     fn of(self, least: f64) -> f64 {
-        if self.size <= least { 0.0 } else { self.error / self.size }
+        if self.error <= least { 0.0 } else { self.error / self.size }
     }
 }
 
@@ -117,8 +119,10 @@ impl<const D: usize> Trial<'_, D> {
                     }
                 }
                 (Ok(()), false) => fault(format!("is completed on {ranks} ranks, but not on one")),
-                (Err((_, words)), true) => fault(format!("{ranks} ranks: {words}")),
-                (Err(_), false) => {}
+                (Err((_, words)), true) if !self.may_fail(&name, words) => {
+                    fault(format!("{ranks} ranks: {words}"))
+                }
+                (Err(_), _) => {}
             }
             return;
         }
@@ -142,10 +146,12 @@ impl<const D: usize> Trial<'_, D> {
             .iter()
             .map(|name| largest(&plain.history[*name]))
             .sum();
+        let shortest = plain.history["dt"].iter().fold(STEP, |a: f64, b| a.min(*b));
+        let least = SOLVED * turnover.max(1.0) / shortest;
         for (what, worst) in [
             ("energy", largest(&plain.history["energy_imbalance"])),
-            ("forces", plain.open[0].of(NONE * turnover.max(1.0))),
-            ("moments", plain.open[1].of(NONE * turnover.max(1.0))),
+            ("forces", plain.open[0].of(least)),
+            ("moments", plain.open[1].of(least)),
         ] {
             if exceeds(worst, BALANCE) {
                 fault(format!("{what}: {worst:e} out of balance"));
@@ -161,7 +167,8 @@ impl<const D: usize> Trial<'_, D> {
                         fault(format!("{name}: {what}"));
                     }
                 }
-                Err((_, words)) => fault(format!("{name}: {words}")),
+                Err((_, words)) if !self.may_fail(name, &words) => fault(format!("{name}: {words}")),
+                Err(_) => {}
             }
         }
         if scene::<D>(self.number, Frame::PLAIN).both.is_some() {
@@ -208,17 +215,24 @@ impl<const D: usize> Trial<'_, D> {
         }
     }
 
-    /// Shorter steps must approach a limit.
+    /// Shorter steps must approach a limit, unless the body passes unstable states: where it lands depends on the steps.
     fn halve(&self, plain: &Results<D>, fault: &mut impl FnMut(String)) {
         let mut values = vec![self.sample(plain)];
         for steps in [2, 4, 8] {
             let name = format!("steps-{steps}");
             match self.run(Frame { steps, ..Frame::PLAIN }, &name, &Start::Anew) {
                 Ok(()) => values.push(self.sample(&self.results(&name))),
-                // A certificate may exclude short steps.
+                // A certificate may exclude short steps. Friction that weakens where the surface has neither mass nor viscosity has no
+                // limit of short steps: velocities are jumps over lengths of steps.
                 Err((Exit::Refused, _)) => return,
+                Err((Exit::Failed, words)) if words.contains("friction fall here as the body moves") => {
+                    return;
+                }
                 Err((_, words)) => return fault(format!("steps divided by {steps}: {words}")),
             }
+        }
+        if ["ranks-1", "steps-2", "steps-4", "steps-8"].iter().any(|name| self.has_jumped(name)) {
+            return;
         }
         let distance = |a: &[f64], b: &[f64]| {
             a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |a: f64, b| if a >= b { a } else { b })
@@ -307,8 +321,34 @@ impl<const D: usize> Trial<'_, D> {
         }
     }
 
+    /// Whether a file of this name of some stage has these words.
+    fn says(&self, name: &str, file: &str, words: &str) -> bool {
+        ["job", "second"].iter().any(|stage| {
+            let file = self.folder.join(name).join("out").join(stage).join(file);
+            std::fs::read_to_string(file).is_ok_and(|text| text.contains(words))
+        })
+    }
+
+    /// Whether some stage passed unstable states: rounding errors choose where it lands.
+    fn has_jumped(&self, name: &str) -> bool {
+        self.says(name, "run.log", "passes unstable states")
+    }
+
+    /// Whether steps may have had several solutions, as the run says.
+    fn may_choose(&self, name: &str) -> bool {
+        self.has_jumped(name)
+            || self.says(name, "summary.json", "a step is certain to have one solution only up to")
+    }
+
+    /// Whether a run of the same scene may fail with these words where this one does not: from where it has landed after unstable
+    /// states, it may find no solution.
+    fn may_fail(&self, name: &str, words: &str) -> bool {
+        self.has_jumped(name) && words.contains("fall here as the body moves")
+    }
+
     /// How the results of a frame differ from those of the plain one.
     fn differences(&self, frame: Frame, plain: &str, other: &str) -> Vec<String> {
+        let may_choose = self.may_choose(plain) || self.may_choose(other);
         let (plain, other) = (self.results(plain), self.results(other));
         let [metre, kilogram, second] = frame.units;
         let joule = kilogram * metre * metre / (second * second);
@@ -320,7 +360,7 @@ impl<const D: usize> Trial<'_, D> {
         let turnover: f64 = energies.clone().map(|name| last(&plain, name).abs()).sum();
         let mut found = Vec::new();
         let is_adaptive = scene::<D>(self.number, Frame::PLAIN).job.contains("adaptive");
-        let share = if is_adaptive { ADAPTED } else { EQUAL };
+        let share = if is_adaptive || may_choose { CHOSEN } else { EQUAL };
         for name in energies {
             let (expected, got) = (last(&plain, name), last(&other, name) / joule);
             if exceeds((got - expected).abs(), share * turnover + NONE) {

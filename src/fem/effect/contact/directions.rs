@@ -32,7 +32,9 @@ pub fn contact_nodes<const D: usize>(
             nodes.entry(point.node()).or_default().push(active);
         }
         let tangential = contact.friction.iter().flat_map(|friction| &friction.points);
-        tangential.for_each(|point| nodes.entry(point.node()).or_default().push(None));
+        tangential
+            .filter(|point| point.is_free())
+            .for_each(|point| nodes.entry(point.node()).or_default().push(None));
     }
     others.for_each(|node| nodes.entry(node as usize).or_default().push(None));
     let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
@@ -72,7 +74,7 @@ impl<const D: usize> Contact<D> {
         })
     }
 
-    /// The nodes of this rank with friction, each with the tangents of its points.
+    /// The nodes of this rank with friction, each with the free tangents of its points.
     pub fn tangential_directions(&self) -> impl Iterator<Item = (usize, Vector<D>)> {
         self.friction
             .iter()

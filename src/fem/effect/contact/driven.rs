@@ -163,7 +163,7 @@ impl<const D: usize> Contact<D> {
         }
         let tangential = self.friction.iter().flat_map(|friction| &friction.points);
         for point in tangential.filter(|point| point.follows) {
-            point.add(Newton, 1.0, &point.part(&self.carrying(number, point.at)), nodal);
+            point.add(Newton, 1.0, &point.free_part(&self.carrying(number, point.at)), nodal);
         }
     }
 
@@ -179,7 +179,7 @@ impl<const D: usize> Contact<D> {
                 *sum += point.weight * pressure * dot(&point.normal, &self.carrying(number, at));
             }
             for point in self.friction.iter().flat_map(|friction| &friction.points) {
-                *sum += point.weight * dot(&point.traction, &self.carrying(number, point.at));
+                *sum += point.weight * dot(&point.whole_traction(), &self.carrying(number, point.at));
             }
         }
         sums
@@ -195,7 +195,7 @@ impl<const D: usize> Contact<D> {
         });
         let sliding = self.friction.iter().flat_map(|friction| &friction.points).map(|point| {
             let share = point.tangent.theta.iter().map(|theta| (1.0 - theta).abs()).sum::<f64>();
-            point.weight * share * square(norm(&point.part(&self.carrying(number, point.at))))
+            point.weight * share * square(norm(&point.free_part(&self.carrying(number, point.at))))
         });
         normal.sum::<f64>() + sliding.sum::<f64>()
     }

@@ -26,7 +26,7 @@ pub struct ContactEnergy {
     pub work: f64,
     /// Power that friction and laws of the velocity dissipate.
     pub dissipated_power: f64,
-    /// Power of the friction of moving obstacles on the body, and of supports against laws of the velocity.
+    /// Power of the friction of moving obstacles on the body, and of supports against friction and laws of the velocity.
     pub driving_power: f64,
 }
 
@@ -37,8 +37,8 @@ impl<const D: usize> Contact<D> {
     /// The pressure takes up `k p v`. With the penetrations `d`, the energy `e` of the law, a gap that grows by `g` and wear by `h`,
     /// `k p v + numerical = (e(d_n) - e(d_{n-1})) + p g + p h`: stored energy, work on the obstacle, dissipation. Where the law stores
     /// nothing, as a rigid obstacle, `p (d_n - d_{n-1})` is dissipated. Friction `q` on an obstacle with the velocity `w` absorbs
-    /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle. Where supports prescribe a part of `v`, they do the work of the
-    /// pressure there.
+    /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle. Where supports prescribe a part of `v`, they do the work of pressure and
+    /// friction there.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64, with_means: bool) -> ContactEnergy {
         let mut sum = ContactEnergy::default();
         for point in &self.points {
@@ -78,7 +78,7 @@ impl<const D: usize> Contact<D> {
         }
         if let Some(friction) = &self.friction {
             sum.dissipated_power += friction.power(velocity);
-            sum.driving_power += friction.driving_power();
+            sum.driving_power += friction.driving_power(velocity);
         }
         sum
     }

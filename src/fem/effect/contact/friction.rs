@@ -12,6 +12,10 @@
 //! prescribes. In terms of `dv`, at a sliding point, `dq = g' e (e . dv) + g / V (I - e e^T) dv + mu e dp`; at a sticking point
 //! `dv = 0`. Where the normal graph is vertical, `dp` follows from the normal equation of the node: `mu e` times that
 //! equation is subtracted from the tangential ones ([`Friction::reduce`]).
+//!
+//! Where a support holds a node along some of the tangents, the sliding velocity has a known part `w` there, and the law is a radial graph of
+//! the free part `r`: `q = g(V) r / V` with `V = |r + w|` ([`FrictionBound::resolve_beside`](crate::laws::contact::FrictionBound)). The
+//! support takes up `g(V) w / V`.
 
 use super::{
     point::{
@@ -44,10 +48,9 @@ pub(super) struct Friction<const D: usize> {
     pub points: Vec<TangentialPoint<D>>,
     /// Nodes that this rank owns.
     pub owned: usize,
-    /// Velocity in m/s of the obstacle along the tangents of each point; empty where the obstacle does not move.
-    pub obstacle_velocities: Vec<Vector<D>>,
-    /// Tangents that supports fix beside free ones, with the points of the contact; empty where the obstacle does not move.
-    pub held: Vec<(usize, Vector<D>)>,
+    /// Tangents that supports hold in part, because they hold a part of the normal, beside free ones, with the points of the contact;
+    /// empty where the obstacle does not move.
+    pub partly_held: Vec<(usize, Vector<D>)>,
 }
 
 /// The state of a point with friction.
@@ -68,7 +71,7 @@ impl<const D: usize> Friction<D> {
         mesh: &Mesh<D>,
         held: &Held<D>,
     ) -> Result<Self> {
-        let (mut out, mut held_tangents) = (Vec::new(), Vec::new());
+        let (mut out, mut partly_held) = (Vec::new(), Vec::new());
         for (at, point) in points.iter().enumerate() {
             let node = point.node();
             let (frame, free) = held.frame(node);
@@ -81,9 +84,15 @@ impl<const D: usize> Friction<D> {
                     "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, on which this friction law depends; free the normal component there, or use tresca"
                 )));
             }
-            let (tangents, count) = span_without(&frame[..free], &[point.direction]);
-            if obstacle_moves && count > 0 {
-                held_tangents.extend(tangents_held(point, &frame[free..]).map(|tangent| (at, tangent)));
+            let (mut tangents, count) = span_without(&frame[..free], &[point.direction]);
+            let (held_normal, size) = held_part_of_normal(point);
+            let (held_tangents, held_count) = span_without(&frame[free..], &[held_normal]);
+            let all = count + held_count;
+            tangents[count..all].copy_from_slice(&held_tangents[..held_count]);
+            if obstacle_moves && count > 0 && size > 0.0 {
+                let tangent: Vector<D> =
+                    std::array::from_fn(|i| point.free_length * held_normal[i] - size * point.direction[i]);
+                partly_held.push((at, tangent));
             }
             out.push(TangentialPoint {
                 at,
@@ -92,10 +101,14 @@ impl<const D: usize> Friction<D> {
                 tangents,
                 count,
                 follows: true,
+                all,
+                obstacle: [0.0; D],
+                obstacle_speed: 0.0,
                 context: SlidingContext::default(),
                 history: law.first_histories(),
                 pressure: 0.0,
                 traction: [0.0; D],
+                held_traction: [0.0; D],
                 tangent: Tangent::free(),
                 change: [0.0; D],
             });
@@ -109,20 +122,19 @@ impl<const D: usize> Friction<D> {
             follows,
             points: out,
             owned: mesh.owned,
-            obstacle_velocities: Vec::new(),
-            held: held_tangents,
+            partly_held,
         })
     }
 
     /// Removes points that have no tangent.
     pub(super) fn keep_points_with_tangents(&mut self) {
-        self.points.retain(|point| point.count > 0);
+        self.points.retain(TangentialPoint::has_tangents);
     }
 
     /// Reads the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
     pub(super) fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
         for point in &mut self.points {
-            point.traction = point.along(Body, traction);
+            (point.traction, point.held_traction) = point.parts_of(traction);
             point.pressure = points[point.at].pressure;
         }
     }
@@ -139,11 +151,9 @@ impl<const D: usize> Friction<D> {
         if self.law.history().is_none() {
             return;
         }
-        let Self { law, points, obstacle_velocities, .. } = self;
-        for (at, point) in points.iter_mut().enumerate() {
-            let along = point.along(Body, velocity);
-            let obstacle = obstacle_velocities.get(at).map_or([0.0; D], |obstacle| *obstacle);
-            let speed = norm(&add_scaled(&along, -1.0, &obstacle));
+        let Self { law, points, .. } = self;
+        for point in points {
+            let speed = norm(&point.sliding(Body, velocity));
             point.history = [law.history_after(point.history, blend, speed), point.history[0]];
         }
     }
@@ -167,8 +177,16 @@ impl<const D: usize> Friction<D> {
         }
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
-            let length = norm(&unknown);
-            let found = point.resolve(&self.law, [scale, self.give], scale * length);
+            let (length, held) = (norm(&unknown), point.held_sliding(Newton, values));
+            let held_speed = norm(&held);
+            let found = point.resolve(&self.law, [scale, self.give], scale * length, held_speed);
+            point.held_traction = if held_speed == 0.0 {
+                [0.0; D]
+            } else {
+                let whole_speed = found.speed.hypot(held_speed);
+                let per_speed = self.law.bound(whole_speed, point.pressure, point.context) / whole_speed;
+                held.map(|w| per_speed * w)
+            };
             let shares = if found.traction == 0.0 {
                 // Without traction the velocity is bitwise equal to the unknown.
                 [1.0, 0.0]
@@ -183,10 +201,10 @@ impl<const D: usize> Friction<D> {
         self.add_obstacle_velocities(1.0, values);
     }
 
-    /// Adds to nodal values a multiple of the obstacle's velocity along the tangents where the unknowns follow it.
+    /// Adds to nodal values a multiple of the obstacle's velocity along the free tangents where the unknowns follow it.
     fn add_obstacle_velocities(&self, factor: f64, values: &mut [f64]) {
-        let pairs = self.points.iter().zip(&self.obstacle_velocities);
-        pairs.filter(|(point, _)| point.follows).for_each(|(point, obstacle)| point.add(Newton, factor, obstacle, values));
+        let points = self.points.iter().filter(|point| point.follows);
+        points.for_each(|point| point.add(Newton, factor, &point.free_part(&point.obstacle), values));
     }
 
     /// The points with their sliding velocities.
@@ -195,11 +213,7 @@ impl<const D: usize> Friction<D> {
         vectors: Vectors,
         velocity: &[f64],
     ) -> impl Iterator<Item = (&TangentialPoint<D>, Vector<D>)> {
-        self.points.iter().enumerate().map(move |(at, point)| {
-            let along = point.along(vectors, velocity);
-            let obstacle = self.obstacle_velocities.get(at);
-            (point, obstacle.map_or(along, |obstacle| std::array::from_fn(|i| along[i] - obstacle[i])))
-        })
+        self.points.iter().map(move |point| (point, point.sliding(vectors, velocity)))
     }
 
     /// Computes the derivative of the law at these unknowns, after `points` have computed their pressures.
@@ -210,10 +224,10 @@ impl<const D: usize> Friction<D> {
         let (scale, follows) = (self.scale, self.follows);
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
-            let length = norm(&unknown);
-            let found = point.resolve(&self.law, [scale, self.give], scale * length);
+            let (length, held) = (norm(&unknown), norm(&point.held_sliding(Newton, values)));
+            let found = point.resolve(&self.law, [scale, self.give], scale * length, held);
             let at_rest = length == 0.0 || found.speed == 0.0;
-            let touches = follows && points[point.at].theta == 0.0;
+            let touches = follows && held == 0.0 && points[point.at].theta == 0.0;
             point.tangent = if found.derivative == 0.0 || (at_rest && touches) {
                 Tangent { sticks: true, theta: [0.0; 2], ..Tangent::free() }
             } else if at_rest {
@@ -272,7 +286,7 @@ impl<const D: usize> Friction<D> {
 
     /// Adds the tractions to nodal values.
     pub(super) fn add_tractions(&self, nodal: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(Body, 1.0, &point.traction, nodal));
+        self.points.iter().for_each(|point| point.add(Body, 1.0, &point.whole_traction(), nodal));
     }
 
     /// Adds the change of the forces with the velocity at sliding points, without that of the pressure of vertical graphs.
@@ -351,10 +365,12 @@ impl<const D: usize> Friction<D> {
     /// The state of each point with its weight, at these velocities.
     pub(super) fn motions(&self, vectors: Vectors, velocity: &[f64]) -> impl Iterator<Item = (Motion, f64)> {
         self.sliding(vectors, velocity).map(|(point, sliding)| {
-            if self.law.follows_pressure() && point.pressure <= 0.0 {
+            // A node that is held over an obstacle at rest has no friction of its own.
+            let is_idle = !point.is_free() && norm(&sliding) == 0.0;
+            if is_idle || (self.law.follows_pressure() && point.pressure <= 0.0) {
                 return (Motion::Separated, point.weight);
             }
-            let parameter: Vector<D> = std::array::from_fn(|i| self.scale * sliding[i] + point.traction[i]);
+            let parameter = add_scaled(&point.whole_traction(), self.scale, &sliding);
             let found = self.law.resolve(norm(&parameter), self.scale, point.pressure, point.context);
             (if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }, point.weight)
         })
@@ -363,27 +379,23 @@ impl<const D: usize> Friction<D> {
     /// Power in W dissipated by friction at these velocities.
     pub(super) fn power(&self, velocity: &[f64]) -> f64 {
         let sliding = self.sliding(Body, velocity);
-        sliding.map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
+        sliding.map(|(p, sliding)| p.weight * dot(&p.whole_traction(), &sliding)).sum()
     }
 
-    /// Power in W of the obstacle's friction on the body.
-    pub(super) fn driving_power(&self) -> f64 {
-        let given = self
-            .points
-            .iter()
-            .zip(&self.obstacle_velocities)
-            .map(|(p, obstacle)| p.weight * dot(&p.traction, obstacle));
-        -given.sum::<f64>()
+    /// Power in W of the obstacle's friction on the body, and of supports against friction, at these velocities.
+    pub(super) fn driving_power(&self, velocity: &[f64]) -> f64 {
+        let given =
+            |p: &TangentialPoint<D>| p.power_of_supports(velocity) - dot(&p.whole_traction(), &p.obstacle);
+        self.points.iter().map(|point| point.weight * given(point)).sum()
     }
 
     /// Largest sliding velocity and largest traction or bound at points on this rank, at velocities in a vector of Newton's method.
     pub(super) fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
         // Sliding that is slower than the rounding of the obstacle's velocity is a rounding error.
-        let obstacle =
-            self.obstacle_velocities.iter().fold(0.0, |most, obstacle| larger(most, norm(obstacle)));
+        let obstacle = self.points.iter().fold(0.0, |most, point| larger(most, norm(&point.obstacle)));
         self.sliding(Newton, velocity).fold([ROUNDING * obstacle, 0.0], |[v, q], (point, sliding)| {
             let bound = self.law.bound(0.0, points[point.at].pressure, point.context);
-            [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
+            [larger(v, norm(&sliding)), larger(larger(q, norm(&point.whole_traction())), bound)]
         })
     }
 
@@ -405,7 +417,7 @@ impl<const D: usize> Friction<D> {
         let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let distance = |(point, sliding): (&TangentialPoint<D>, Vector<D>)| {
             let open = point.along(Newton, residual);
-            let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
+            let traction = add_scaled(&point.whole_traction(), -1.0 / point.weight, &open);
             let pressure = points[point.at].pressure;
             let (speed, size) = (norm(&sliding), norm(&traction));
             let beyond = (size - self.law.bound(0.0, pressure, point.context)).max(0.0);
@@ -430,9 +442,12 @@ impl<const D: usize> Friction<D> {
         worst(self.sliding(Newton, velocity).map(distance))
     }
 
-    /// Adds a unit velocity along the first tangent of each point to nodal values.
+    /// Adds a unit velocity along the first free tangent of each point to nodal values.
     pub(super) fn add_unit_sliding(&self, nodal: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(Body, 1.0, &point.tangents[0], nodal));
+        self.points
+            .iter()
+            .filter(|point| point.is_free())
+            .for_each(|point| point.add(Body, 1.0, &point.tangents[0], nodal));
     }
 
     /// Adds the derivative of half of the sum of `factor w |x_tau|^2` over the points to `forces`.
@@ -471,12 +486,9 @@ fn distance_along_parameter<const D: usize>(
     (off(&sliding, found.speed) / speeds).hypot(off(&traction, found.traction) / tractions)
 }
 
-/// The directions along the boundary that supports fix at a point.
-fn tangents_held<const D: usize>(point: &Point<D>, held: &[Vector<D>]) -> impl Iterator<Item = Vector<D>> {
-    let normal = point.normal;
-    held.iter().filter_map(move |direction| {
-        let tangent = add_scaled(direction, -dot(direction, &normal), &normal);
-        let size = norm(&tangent);
-        (size > ROUNDING).then(|| tangent.map(|x| x / size))
-    })
+/// The direction of the part of the normal at a point that supports hold, and its size; zero if it is a rounding error.
+fn held_part_of_normal<const D: usize>(point: &Point<D>) -> (Vector<D>, f64) {
+    let part = add_scaled(&point.normal, -point.free_length, &point.direction);
+    let size = norm(&part);
+    if size > ROUNDING { (part.map(|x| x / size), size) } else { ([0.0; D], 0.0) }
 }

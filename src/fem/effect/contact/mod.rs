@@ -212,8 +212,8 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &mut self.friction {
             friction.points.retain(|point| !given.contains(&point.at));
             friction.points.iter_mut().for_each(|point| point.at = after(point.at));
-            friction.held.retain(|(at, _)| !given.contains(at));
-            friction.held.iter_mut().for_each(|(at, _)| *at = after(*at));
+            friction.partly_held.retain(|(at, _)| !given.contains(at));
+            friction.partly_held.iter_mut().for_each(|(at, _)| *at = after(*at));
         }
         let mut number = 0..;
         self.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));
@@ -259,7 +259,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`
-    /// along the free normal, and `-sigma_tau`.
+    /// along the free normal, and `-sigma_tau` with what supports take up of it.
     pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
             point.add_traction(point.pressure_at(&self.law, Body, velocity), nodal);

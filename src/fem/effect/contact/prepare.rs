@@ -103,13 +103,12 @@ impl<const D: usize> Contact<D> {
 
     /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
     pub fn obstacle_velocity_square(&self) -> f64 {
-        let obstacle = self.friction.iter().flat_map(|friction| &friction.obstacle_velocities);
-        obstacle.map(|obstacle| dot(obstacle, obstacle)).sum()
+        let points = self.friction.iter().flat_map(|friction| &friction.points);
+        points.map(|point| dot(&point.obstacle, &point.obstacle)).sum()
     }
 
-    /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that fix one tangent
-    /// of a point along this motion and leave another free: the direction of sliding depends on both, but only the free one is an
-    /// unknown. Where supports fix all tangents, friction has no effect.
+    /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that hold a part of the normal
+    /// of a point where the obstacle moves across a free tangent: friction along this motion would also act on the free part of the normal.
     pub(super) fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {
         self.rate = rate;
         self.set_arms();
@@ -126,16 +125,15 @@ impl<const D: usize> Contact<D> {
             let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
             add_scaled(&prescribed, 1.0, &obstacle.map_or([0.0; D], |obstacle| obstacle.velocity_at(&arm)))
         };
-        friction.obstacle_velocities.clear();
-        for point in &friction.points {
-            friction.obstacle_velocities.push(point.part(&velocity(point.at)));
+        for point in &mut friction.points {
+            point.set_obstacle(&velocity(point.at));
         }
-        for (at, tangent) in &friction.held {
+        for (at, tangent) in &friction.partly_held {
             let (point, velocity) = (&points[*at], velocity(*at));
             let along = dot(tangent, &velocity);
             if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
                 return Err(Error::Refused(format!(
-                    "friction at {:?} m: a support fixes a direction in which the obstacle moves (at {along} m/s at t = {} s) but not the other tangential direction, on which the friction depends, too; hold all components there, or exclude the facets around by the `where` of the contact",
+                    "friction at {:?} m: a support holds a direction that is neither along the boundary nor across it, and the obstacle moves there (at {along} m/s at t = {} s); hold all components there, or exclude the facets around by the `where` of the contact",
                     point.place, rate.time
                 )));
             }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    linear_algebra::tensor::{Vector, larger},
+    linear_algebra::tensor::{Vector, add_scaled, larger},
 };
 
 /// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points of constraints whose normal a support
@@ -100,7 +100,8 @@ impl<const D: usize> Contact<D> {
                 PointState { normal: point.normal, direction: point.direction, ..PointState::default() };
             while let Some((tangential, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
                 state.sliding = sliding;
-                state.friction = tangential.along(Body, traction);
+                let (free, held) = tangential.parts_of(traction);
+                state.friction = add_scaled(&free, 1.0, &held);
                 state.sticks = motions.next().map(|(motion, _)| motion == Motion::Sticks);
             }
             if point.carries(&self.law) {
@@ -125,13 +126,13 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Visits the forces in N on the body at the nodes of points on this rank in the step just solved, at its velocities with ghosts.
-    /// They include those that supports take up where these fix a part of the normal.
+    /// They include those that supports take up.
     pub fn forces(&self, velocity: &[f64], mut visit: impl FnMut(u32, Vector<D>)) {
         for point in &self.points {
             point.forces(point.pressure_at(&self.law, Body, velocity), &mut visit);
         }
         for point in self.friction.iter().flat_map(|friction| &friction.points) {
-            visit(point.node() as u32, point.traction.map(|q| -point.weight * q));
+            visit(point.node() as u32, point.whole_traction().map(|q| -point.weight * q));
         }
     }
 }

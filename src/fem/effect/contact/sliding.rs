@@ -41,9 +41,9 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map(|friction| friction.law)
     }
 
-    /// Points with friction on this rank.
+    /// Points with friction on this rank that can move along the boundary.
     pub fn friction_point_count(&self) -> usize {
-        self.friction.as_ref().map_or(0, |friction| friction.points.len())
+        self.friction.iter().flat_map(|friction| &friction.points).filter(|point| point.is_free()).count()
     }
 
     /// Sets `c` in the parameter `s = c v + q` of the friction graph, in Pa s/m, and whether its bound depends on the contact
@@ -105,6 +105,7 @@ impl<const D: usize> Contact<D> {
                 continue;
             }
             let parameter = friction.scale * norm(&sliding.along(Newton, values));
+            let held = norm(&sliding.held_sliding(Newton, values));
             let along = point.along(Newton, values);
             point.context.erosion = 0.0;
             for _ in 0..EROSION_ITERATIONS {
@@ -113,7 +114,9 @@ impl<const D: usize> Contact<D> {
                 } else {
                     sliding.pressure
                 };
-                let speed = friction.law.resolve(parameter, friction.scale, pressure, sliding.context).speed;
+                let at = sliding.context.beside(held);
+                let free = friction.law.resolve_beside(parameter, friction.scale, pressure, at).speed;
+                let speed = if held == 0.0 { free } else { free.hypot(held) };
                 let erosion = wear.erosion(point.context.step_length * speed);
                 let change = erosion - point.context.erosion;
                 point.context.erosion = erosion;

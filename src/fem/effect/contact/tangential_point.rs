@@ -3,11 +3,14 @@
 use super::point::Vectors::{self, Body, Newton};
 use crate::{
     laws::contact::{FrictionLaw, SlidingContext, Slip},
-    linear_algebra::tensor::{Vector, dot, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
 };
 
 /// A direction shorter than this is a rounding error.
 pub(super) const ROUNDING: f64 = 1e-9;
+
+/// A part of the velocity of a node that is smaller by this factor is a rounding error.
+const ROUNDED: f64 = 1e-12;
 
 /// Tangential data of a nodal point.
 #[derive(Debug, Clone)]
@@ -17,19 +20,25 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Numbers of its node in the vectors of the body and in those of Newton's method.
     pub numbers: [usize; 2],
     pub weight: f64,
-    /// Orthonormal; `count` of them are used.
+    /// Orthonormal; of the `all` that are used, the first `count` are free, and supports hold the others.
     pub tangents: [Vector<D>; D],
     pub count: usize,
     /// Whether its unknown is relative to the obstacle.
     pub follows: bool,
+    pub all: usize,
+    /// Velocity of the obstacle along these tangents in m/s, in the current step, and its speed in any direction.
+    pub obstacle: Vector<D>,
+    pub obstacle_speed: f64,
     /// The current step, as the law sees it.
     pub context: SlidingContext,
     /// What the law keeps, if it has a history: after the last step, and before it.
     pub history: [f64; 2],
     /// The contact pressure in Pa that determines the bound.
     pub pressure: f64,
-    /// `q` in Pa at the last evaluation.
+    /// The free part of `q` in Pa at the last evaluation.
     pub traction: Vector<D>,
+    /// The part of `q` in Pa at the last evaluation that supports take up.
+    pub held_traction: Vector<D>,
     /// The last linearisation.
     pub tangent: Tangent<D>,
     /// Change of `q` along the last direction.
@@ -62,7 +71,22 @@ impl<const D: usize> TangentialPoint<D> {
         self.numbers[Body as usize]
     }
 
-    /// Removes from the tangents the components along this direction.
+    /// Whether the node can move along the boundary.
+    pub(super) fn is_free(&self) -> bool {
+        self.count > 0
+    }
+
+    /// Whether friction can act: some tangent is left.
+    pub(super) fn has_tangents(&self) -> bool {
+        self.all > 0
+    }
+
+    /// `q`, with what supports take up.
+    pub(super) fn whole_traction(&self) -> Vector<D> {
+        add_scaled(&self.traction, 1.0, &self.held_traction)
+    }
+
+    /// Removes from the free tangents the components along this direction, which is free.
     pub(super) fn remove_direction(&mut self, direction: &Vector<D>) {
         let mut along = [0.0; D];
         for tangent in &self.tangents[..self.count] {
@@ -72,15 +96,19 @@ impl<const D: usize> TangentialPoint<D> {
         let size = norm(&along);
         if size > ROUNDING {
             let along = along.map(|x| x / size);
-            (self.tangents, self.count) = span_without(&self.tangents[..self.count], &[along]);
+            let (free, count) = span_without(&self.tangents[..self.count], &[along]);
+            let held: Vec<Vector<D>> = self.tangents[self.count..self.all].to_vec();
+            self.tangents[..count].copy_from_slice(&free[..count]);
+            self.tangents[count..count + held.len()].copy_from_slice(&held);
+            (self.count, self.all) = (count, count + held.len());
         }
     }
 
     /// The point with `c v + q = s` of the graph of its law in series with a viscous element, whose velocity is `give` times the
     /// traction: `v = V(q) + give q` and thus `s / (1 + c give) = c' V + q`, `c' = c / (1 + c give)`. It has no jump at rest.
-    pub(super) fn resolve(&self, law: &FrictionLaw, [c, give]: [f64; 2], s: f64) -> Slip {
+    pub(super) fn resolve(&self, law: &FrictionLaw, [c, give]: [f64; 2], s: f64, held_speed: f64) -> Slip {
         let share = 1.0 + c * give;
-        let found = law.resolve(s / share, c / share, self.pressure, self.context);
+        let found = law.resolve_beside(s / share, c / share, self.pressure, self.context.beside(held_speed));
         if give == 0.0 {
             return found;
         }
@@ -95,20 +123,60 @@ impl<const D: usize> TangentialPoint<D> {
         }
     }
 
-    /// The part of a nodal value along the tangents.
+    /// The part of a nodal value along the free tangents.
     pub(super) fn along(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
-        let value = &nodal[self.numbers[vectors as usize] * D..][..D];
-        self.part(&std::array::from_fn(|i| value[i]))
+        self.free_part(&self.value(vectors, nodal))
     }
 
-    /// The part of a vector along the tangents.
-    pub(super) fn part(&self, vector: &Vector<D>) -> Vector<D> {
-        let mut out = [0.0; D];
-        for tangent in &self.tangents[..self.count] {
-            let along: f64 = (0..D).map(|i| tangent[i] * vector[i]).sum();
-            (0..D).for_each(|i| out[i] += along * tangent[i]);
+    fn value(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
+        let value = &nodal[self.numbers[vectors as usize] * D..][..D];
+        std::array::from_fn(|i| value[i])
+    }
+
+    /// The part of a vector along the free tangents.
+    pub(super) fn free_part(&self, vector: &Vector<D>) -> Vector<D> {
+        part(&self.tangents[..self.count], vector)
+    }
+
+    /// The part of a vector along the tangents that supports hold.
+    pub(super) fn held_part(&self, vector: &Vector<D>) -> Vector<D> {
+        part(&self.tangents[self.count..self.all], vector)
+    }
+
+    /// Sets the velocity of the obstacle in m/s, given that of its material point.
+    pub(super) fn set_obstacle(&mut self, velocity: &Vector<D>) {
+        self.obstacle = part(&self.tangents[..self.all], velocity);
+        self.obstacle_speed = norm(velocity);
+    }
+
+    /// The sliding velocity in m/s relative to the obstacle along the tangents that supports hold: there nodal velocities and unknowns
+    /// are those of the supports. Zero if it is a rounding error.
+    pub(super) fn held_sliding(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
+        if self.all == self.count {
+            return [0.0; D];
         }
-        out
+        let value = self.value(vectors, nodal);
+        let (node, obstacle) = (self.held_part(&value), self.held_part(&self.obstacle));
+        let sliding = add_scaled(&node, -1.0, &obstacle);
+        let rounding = larger(ROUNDING * self.obstacle_speed, ROUNDED * norm(&value));
+        if norm(&sliding) > rounding { sliding } else { [0.0; D] }
+    }
+
+    /// The sliding velocity in m/s relative to the obstacle.
+    pub(super) fn sliding(&self, vectors: Vectors, velocity: &[f64]) -> Vector<D> {
+        let free = add_scaled(&self.along(vectors, velocity), -1.0, &self.free_part(&self.obstacle));
+        add_scaled(&free, 1.0, &self.held_sliding(vectors, velocity))
+    }
+
+    /// The parts of a nodal traction of the body along free and along held tangents.
+    pub(super) fn parts_of(&self, traction: &[f64]) -> (Vector<D>, Vector<D>) {
+        let traction = self.value(Body, traction);
+        (self.free_part(&traction), self.held_part(&traction))
+    }
+
+    /// The power in W/m2 of supports against friction, at a nodal velocity of the body.
+    pub(super) fn power_of_supports(&self, velocity: &[f64]) -> f64 {
+        dot(&self.held_traction, &self.value(Body, velocity))
     }
 
     /// Adds to a nodal value.
@@ -134,6 +202,16 @@ impl<const D: usize> TangentialPoint<D> {
                 + (slopes[0] * ahead + coefficient * pressed) * toward[i]
         })
     }
+}
+
+/// The part of a vector in the span of these orthonormal vectors.
+fn part<const D: usize>(vectors: &[Vector<D>], vector: &Vector<D>) -> Vector<D> {
+    let mut out = [0.0; D];
+    for direction in vectors {
+        let along: f64 = (0..D).map(|i| direction[i] * vector[i]).sum();
+        (0..D).for_each(|i| out[i] += along * direction[i]);
+    }
+    out
 }
 
 /// An orthonormal basis of the span of these orthonormal vectors, without these orthonormal or zero directions.

@@ -23,7 +23,8 @@ impl FrictionBound for Coulomb {
 mod tests {
     use super::*;
 
-    const FIRST: SlidingContext = SlidingContext { history: 0.0, step_length: 0.0, is_blended: false };
+    const FIRST: SlidingContext =
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
 
     #[test]
     fn the_bound_is_proportional_to_the_pressure() {

@@ -30,7 +30,7 @@
 //! `1 + max(0, ln(theta_0 / k)) + 1/e` for the slip law.
 
 use crate::laws::{
-    contact::friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip},
+    contact::friction_law::{FrictionBound, FrictionHistory, STICKS, SlidingContext, Slip},
     law::LawFault,
     step::{Blend, quantity},
 };
@@ -83,9 +83,6 @@ pub struct RateAndState {
 const ITERATIONS: usize = 200;
 /// The logarithm of the smallest velocity.
 const LEAST: f64 = -700.0;
-/// A point whose velocity follows the parameter by less than this share of `1 / c` counts as sticking: it creeps so slowly that the change
-/// of its velocity has no effect on Newton's method, while its slope would only spoil the condition of the matrix.
-const STICKS: f64 = 1e-8;
 /// Share of the tolerance of adaptive steps for the state. Stick-slip lives on a balance of a growth per cycle that is a few per cent with a
 /// loss that the error of the state causes in each step: with this share, the default tolerance gives the range of friction to 1 %
 /// and the period to 2 % under `implicit_euler`.
@@ -102,7 +99,7 @@ impl RateAndState {
 
     /// The logarithm of the state over 1 s at the end of a step with this velocity in m/s, and its derivative by the velocity.
     fn log_state(&self, at: SlidingContext, speed: f64) -> [f64; 2] {
-        let SlidingContext { history: before, step_length: length, is_blended } = at;
+        let SlidingContext { history: before, step_length: length, is_blended, .. } = at;
         let (rate, x) = (length / self.distance, length * speed / self.distance);
         let left = (-x).exp();
         match self.law {
@@ -200,7 +197,7 @@ impl FrictionBound for RateAndState {
     fn context(&self, [recent, earlier]: [f64; 2], blend: Blend) -> SlidingContext {
         let is_blended = blend.earlier != 0.0;
         let history = if is_blended { blend.of(recent.ln(), earlier.ln()).exp() } else { recent };
-        SlidingContext { history, step_length: blend.length, is_blended }
+        SlidingContext { history, step_length: blend.length, is_blended, held: 0.0 }
     }
 
     fn history_after(&self, histories: [f64; 2], blend: Blend, speed: f64) -> f64 {
@@ -299,7 +296,7 @@ mod tests {
     }
 
     fn after(history: f64, step_length: f64) -> SlidingContext {
-        SlidingContext { history, step_length, is_blended: false }
+        SlidingContext { history, step_length, is_blended: false, held: 0.0 }
     }
 
     #[test]

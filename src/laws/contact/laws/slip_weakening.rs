@@ -54,7 +54,8 @@ impl FrictionBound for SlipWeakening {
 mod tests {
     use super::*;
 
-    const FIRST: SlidingContext = SlidingContext { history: 0.0, step_length: 0.0, is_blended: false };
+    const FIRST: SlidingContext =
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
 
     #[test]
     fn the_coefficient_falls_by_hand() {

@@ -4,9 +4,14 @@
 //! the ray from a place outside, the obstacle is therefore at least `f` away: the search goes on by this length until the surface is
 //! near, and its last part is halved (Hart, Sphere tracing, The Visual Computer 12, 1996). From a place inside, the search goes back.
 
-use super::obstacle_surface::TriangulatedSurface;
 use crate::{
-    laws::expression::Scalar,
+    laws::{
+        contact::{
+            obstacle::{Obstacle, Prescribed, vector},
+            obstacle_surface::TriangulatedSurface,
+        },
+        expression::Scalar,
+    },
     linear_algebra::tensor::{Vector, add_scaled, larger, norm},
 };
 use schemars::JsonSchema;
@@ -82,14 +87,29 @@ const PARALLEL: f64 = 0.1;
 /// The depth, as a share of the coordinates, below which an edge has been pressed into the body, and the obstacle is not beside it.
 const DEEPEST: f64 = 0.1;
 
-impl Shape {
-    /// The place relative to the centre at `time`.
-    pub(super) fn offset<const D: usize>(&self, time: f64, place: &Vector<D>) -> Vector<D> {
-        add_scaled(place, -1.0, &vector(&self.centre, time))
+impl Obstacle for Shape {
+    fn prescribed(&self) -> Prescribed<'_> {
+        let axis = self.axis.as_deref().unwrap_or_default();
+        Prescribed { centre: &self.centre, rotation: self.rotation.as_ref(), axis, ..Prescribed::default() }
     }
 
+    fn ray<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
+        self.along(&add_scaled(place, -1.0, &vector(&self.centre, time)), normal)
+    }
+
+    fn depth<const D: usize>(&self, time: f64, place: &Vector<D>) -> f64 {
+        -self.distance_at(&add_scaled(place, -1.0, &vector(&self.centre, time)))
+    }
+
+    fn remedy(&self) -> &'static str {
+        "`distance` or `centre` is not finite, `distance` is not a signed distance (it changes by more than the distance between two \
+         points), or parts of `surface` overlap: correct [contact.obstacle.shape]"
+    }
+}
+
+impl Shape {
     /// The distance in m at a place relative to the centre.
-    pub(super) fn distance_at<const D: usize>(&self, offset: &Vector<D>) -> f64 {
+    fn distance_at<const D: usize>(&self, offset: &Vector<D>) -> f64 {
         if let Some(distance) = &self.distance {
             return distance.evaluate(0.0, offset);
         }
@@ -127,7 +147,7 @@ impl Shape {
     /// The length in m of the ray from a place relative to the centre, along the unit normal, to the surface; negative from inside.
     /// Infinite if the ray does not meet the obstacle, NaN if the expression is no number or no distance there. A ray along an edge
     /// of the obstacle meets it.
-    pub(super) fn along<const D: usize>(&self, offset: &Vector<D>, normal: &Vector<D>) -> f64 {
+    fn along<const D: usize>(&self, offset: &Vector<D>, normal: &Vector<D>) -> f64 {
         let size = offset.iter().fold(self.extent(), |most, x| larger(most, x.abs()));
         let slack = self.slack(size);
         let Search { length, nearest } = self.search(offset, normal, [size, 0.0]);
@@ -234,11 +254,6 @@ struct Search {
     length: f64,
     /// The smallest distance in m from the surface at the places of the search before its end.
     nearest: f64,
-}
-
-/// The numbers of components at `time`.
-pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector<D> {
-    std::array::from_fn(|i| components.get(i).map_or(0.0, |component| component.evaluate(time, &[])))
 }
 
 /// The zero of a function that is positive at the first and not at the second place, where its value is at most `small`. On every
