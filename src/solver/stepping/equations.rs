@@ -178,6 +178,8 @@ impl Scratch {
 pub struct SolveCounts {
     /// Calls of the residual.
     pub residuals: usize,
+    /// Norm in N of the first residual.
+    pub first: f64,
     /// Krylov iterations.
     pub linear_iterations: usize,
     /// Those of the last linear system.
@@ -289,11 +291,11 @@ impl<const D: usize> ContactEquations<'_, D> {
         if self.obstacles.is_empty() {
             return Ok(());
         }
-        if let Some(cells) = &mut self.cells {
-            let matrix = self.matrix;
-            self.obstacles.linearise(self.session, |motion, forces| {
+        if self.cells.is_some() || self.obstacles.is_unsymmetric(self.contacts) {
+            let (matrix, cells) = (self.matrix, &mut self.cells);
+            self.obstacles.linearise(self.session, self.contacts, |motion, forces| {
                 matrix.multiply(motion, forces)?;
-                cells.add_derivative(motion, forces)
+                cells.as_mut().map_or(Ok(()), |cells| cells.add_derivative(motion, forces))
             })?;
         }
         let velocity = self.scratch.velocity.owned()?;
@@ -303,7 +305,9 @@ impl<const D: usize> ContactEquations<'_, D> {
     /// Writes the velocities of the last residual relative to the obstacles that forces drive.
     pub(super) fn write_motion(&self, motion: &mut DistributedVector) -> Result<()> {
         motion.copy_from(&self.scratch.velocity)?;
-        self.obstacles.subtract(self.contacts, motion)
+        let mut motion = motion.owned_mut()?;
+        self.contacts.iter().for_each(|contact| contact.subtract_obstacle(&mut motion));
+        Ok(())
     }
 
     /// Writes the residual at the mapped velocities.
@@ -322,9 +326,11 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
         self.counts.residuals += 1;
         self.write_residual_of(x, residual)?;
-        if std::env::var("XV").is_ok() { eprintln!("r {:.3e} {}", residual.norm()?, self.contacts.iter().map(|c| c.show()).collect::<String>()); }
         if !self.equilibrated {
             let last = residual.norm()?;
+            if self.counts.residuals == 1 {
+                self.counts.first = last;
+            }
             let stagnates = last >= STAGNATION * self.scratch.residuals[1];
             self.scratch.residuals[0] = last;
             let speed = self.scratch.velocity.norm()? + self.obstacles.speed(self.contacts);
@@ -440,7 +446,7 @@ impl<const D: usize> ContactEquations<'_, D> {
             && self.session.total(cells.as_ref().map_or(0, |cells| usize::from(!cells.is_symmetric()))) > 0;
         let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
             && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
-        let coupled = coupled || is_unsymmetric;
+        let coupled = coupled || is_unsymmetric || self.obstacles.is_unsymmetric(self.contacts);
         let mut operator = ReducedJacobian {
             matrix: self.matrix,
             cells,

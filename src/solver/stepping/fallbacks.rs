@@ -25,6 +25,15 @@ pub(super) enum Search {
     Equilibrated,
     /// Steps that lower the energy of the step, see [`Descent`](super::descent::Descent).
     Descent,
+    /// The same with few directions.
+    ShortDescent,
+}
+
+impl Search {
+    /// Whether steps lower an energy.
+    pub(super) fn minimises(self) -> bool {
+        matches!(self, Self::Descent | Self::ShortDescent)
+    }
 }
 
 const fn fallback(search: Search, stiffness_factor: f64, iteration: FrictionIteration) -> Fallback {
@@ -58,7 +67,7 @@ const FALLBACKS: [Fallback; 15] = [
 
 /// A light obstacle on a stiff body: points that stick and slide in turn move it to and fro.
 const YIELDING: Fallback =
-    Fallback { yields_at_first: true, ..fallback(Search::FullSteps, 1.0, FrictionIteration::Newton) };
+    Fallback { yields_at_first: true, ..fallback(Search::Descent, 1.0, FrictionIteration::FixedPoint) };
 
 const DESCENT: Fallback = fallback(Search::Descent, 1.0, FrictionIteration::Newton);
 
@@ -89,13 +98,15 @@ impl Conditions {
                 FrictionIteration::Newton => {
                     !self.follows_pressure || self.friction == FrictionIteration::Newton
                 }
-                FrictionIteration::FixedPoint => self.follows_pressure,
+                FrictionIteration::FixedPoint => self.follows_pressure || fallback.yields_at_first,
             };
             let search = match fallback.search {
                 Search::FullSteps => !self.has_user_search,
                 Search::Equilibrated => self.interior_is_linear,
                 Search::Backtracking => true,
-                Search::Descent => self.softens && !self.has_user_search,
+                Search::Descent | Search::ShortDescent => {
+                    (self.softens || fallback.yields_at_first) && !self.has_user_search
+                }
             };
             iteration && search && (self.rubs_obstacles || !fallback.yields_at_first)
         };

@@ -4,7 +4,7 @@ use super::{
     StepOutcome,
     bounded::Bounded,
     contacts::restore_pressures,
-    descent::{DIRECTIONS_PER_ITERATION, Descent},
+    descent::{DIRECTIONS_PER_ITERATION, Descent, SHORT_DESCENT},
     equations::{CellForces, ContactEquations, Floor, Scratch, SolveCounts, cycle_message},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
@@ -72,12 +72,12 @@ const DESCENT_REDUCTION: f64 = 1e-6;
 
 /// The velocities per traction by which friction points yield relative to the compliance of the body: the first, the ratio of each to the
 /// last, and the largest one that is worth trying, and the last.
-const FIRST_RATIO: f64 = 1e6;
-const RATIO_FACTOR: f64 = 0.1;
+const FIRST_RATIO: f64 = 100.0;
+const RATIO_FACTOR: f64 = 0.01;
 const LARGEST_RATIO_FACTOR: f64 = 0.9;
-const LAST_RATIO: f64 = 1e-5;
+const LAST_RATIO: f64 = 1e-3;
 /// The tolerance of these solutions relative to that of the step.
-const YIELDING_TOLERANCE: f64 = 1e4;
+const YIELDING_TOLERANCE: f64 = 1e5;
 
 /// Fixed-point iterations after which an attempt fails.
 const MAX_FIXED_POINT_ITERATIONS: usize = 200;
@@ -159,11 +159,11 @@ impl Newton {
             let has_fixed_bounds = fallback.iteration == FrictionIteration::FixedPoint;
             let mut rounds = 0;
             if fallback.yields_at_first {
-                iterations += self.approach(problem, system, krylov, fallback.search, trial)?;
+                iterations += self.approach(problem, system, krylov, trial)?;
             }
             let failed = loop {
                 if has_fixed_bounds {
-                    problem.body.contacts.iter_mut().for_each(Contact::update_pressures);
+                    self.fix_bounds(problem, system)?;
                 }
                 let attempt = self.attempt(problem, system, krylov, fallback.search, trial)?;
                 // Where nothing was to be done, the solution for the last bounds also solves the equations with its own bounds.
@@ -195,10 +195,26 @@ impl Newton {
             let mut pairs = problem.body.contacts.iter().zip(&self.steepest_decreases);
             if pairs.all(|(contact, decrease)| *decrease <= LARGEST_DECREASE_RATIO * contact.friction_scale())
             {
+                if fallback.yields_at_first {
+                    // Nothing has fallen: the energies were those of fixed friction bounds.
+                    self.counts.unstable = 0;
+                }
                 return self.check_inclusion(problem, trial, iterations);
             }
         }
         Err(explain_failure(problem, &failure, conditions.softens))
+    }
+
+    /// Fixes the friction bounds at the pressures of the last evaluation. Collective.
+    fn fix_bounds<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+    ) -> Result<()> {
+        let contacts = &mut problem.body.contacts;
+        contacts.iter_mut().for_each(Contact::fix_bounds);
+        self.obstacles
+            .set_columns(problem.session, contacts, &self.start, |x, y| system.matrix.multiply(x, y))
     }
 
     /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
@@ -208,18 +224,25 @@ impl Newton {
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         krylov: &mut ProjectedKsp,
-        search: Search,
         trial: &mut DistributedVector,
     ) -> Result<usize> {
-        let system = System { tolerance: YIELDING_TOLERANCE * system.tolerance, ..system };
+        let tolerance = system.tolerance.max(self.settings.tolerance * self.counts.first);
+        let system = System { tolerance: YIELDING_TOLERANCE * tolerance, ..system };
         let (mut iterations, mut reached) = (0, None);
         let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
+        set_give(problem.body, ratio);
+        {
+            let mut unknowns = trial.owned_mut()?;
+            problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+            problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut unknowns));
+        }
+        self.fix_bounds(problem, system)?;
         loop {
             set_give(problem.body, ratio);
-            let attempt = self.attempt(problem, system, krylov, search, trial)?;
-            if std::env::var("XV").is_ok() { eprintln!("ratio {ratio:.3e} {} {:?}", attempt.iterations, attempt.failure); }
+            let attempt = self.attempt(problem, system, krylov, Search::ShortDescent, trial)?;
             iterations += attempt.iterations;
             if attempt.failure.is_none() {
+                self.fix_bounds(problem, system)?;
                 let unknowns = match &mut self.reached {
                     Some(unknowns) => unknowns,
                     none => none.insert(trial.like()?),
@@ -294,7 +317,7 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<Attempt> {
         let session = problem.session;
-        self.has_descended = search == Search::Descent;
+        self.has_descended = search.minimises();
         if self.has_descended {
             let tolerance = LINEAR_SHARE * system.tolerance;
             krylov.set_tolerances(DESCENT_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
@@ -321,13 +344,14 @@ impl Newton {
                 .any(|c| c.law.depends_on_displacement() || c.friction().is_some());
         self.counts.sets.clear();
         self.scratch.restart();
-        let may_end_at_floor = matches!(search, Search::FullSteps | Search::Backtracking);
+        let may_end_at_floor = search != Search::Equilibrated;
         let floor = if may_end_at_floor { system.floor } else { Floor::default() };
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = match (&mut self.flow, problem.flow_start) {
             (Some(flow), Some(start)) => Some(flow.of(cells, start)),
             _ => None,
         };
+        let first = self.counts.first;
         let mut equations = ContactEquations {
             matrix: system.matrix,
             cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
@@ -342,13 +366,17 @@ impl Newton {
             equilibrated: search == Search::Equilibrated,
             counts: std::mem::take(&mut self.counts),
         };
-        // A tolerance relative to the first residual suffices: the right-hand side is almost zero where only an obstacle moves the
-        // body.
-        let tolerances = (system.tolerance, self.settings.tolerance);
+        // A tolerance relative to the first residual of the step suffices: the right-hand side is almost zero where only an obstacle
+        // moves the body.
+        let tolerances = (system.tolerance.max(self.settings.tolerance * first), self.settings.tolerance);
         let limit = self.settings.max_newton_iterations as usize;
-        let descent = self.descent.as_mut().filter(|_| search == Search::Descent);
+        let descent = self.descent.as_mut().filter(|_| search.minimises());
         let solved = if let Some(descent) = descent {
-            let directions = if may_fall { DIRECTIONS_PER_ITERATION * limit } else { limit };
+            let directions = match search {
+                Search::ShortDescent => SHORT_DESCENT,
+                _ if may_fall => DIRECTIONS_PER_ITERATION * limit,
+                _ => limit,
+            };
             let solved = descent.solve(&mut equations, trial, tolerances, directions);
             equations.set_softening(1.0);
             solved.map(|converged| (!converged).then_some(NO_MINIMUM))
@@ -379,7 +407,7 @@ impl Newton {
         }
         if may_end_at_floor && (at_floor || failure.is_some()) {
             let speed = trial.norm()? + self.obstacles.speed(&problem.body.contacts);
-            if at_floor || floor.is_reached(self.snes.residual().norm()?, speed) {
+            if at_floor || floor.is_reached(self.last_residual().norm()?, speed) {
                 failure = None;
                 // The accuracy of pressures is limited by the same errors.
                 let forces = floor.at(speed) / self.settings.inclusion_tolerance

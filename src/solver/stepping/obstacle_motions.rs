@@ -59,8 +59,11 @@ pub struct ObstacleMotions {
 struct Motion {
     /// The numbers of the contact and of the motion of its obstacle.
     place: [usize; 2],
-    /// `N`, and `K N` with the derivatives of forces of cells.
+    /// `N`.
     velocities: DistributedVector,
+    /// The change of nodal velocities with that of the motion, which is `N` unless the obstacle rolls.
+    column: DistributedVector,
+    /// `K` times the column, with the derivatives of forces of cells.
     forces: DistributedVector,
     /// The norm of `N`.
     size: f64,
@@ -122,7 +125,8 @@ impl ObstacleMotions {
         Ok(true)
     }
 
-    fn set_columns<const D: usize>(
+    /// Sets the columns for the contacts as they are; `multiply` is the product with `K`. Collective.
+    pub(super) fn set_columns<const D: usize>(
         &mut self,
         session: &Session,
         contacts: &[Contact<D>],
@@ -137,8 +141,16 @@ impl ObstacleMotions {
         });
         for (at, (place, inertia)) in driven.enumerate() {
             if at == self.motions.len() {
-                let (velocities, forces) = (like.like()?, like.like()?);
-                self.motions.push(Motion { place, velocities, forces, size: 0.0, inertia, approach: None });
+                let [velocities, column, forces] = [like.like()?, like.like()?, like.like()?];
+                self.motions.push(Motion {
+                    place,
+                    velocities,
+                    column,
+                    forces,
+                    size: 0.0,
+                    inertia,
+                    approach: None,
+                });
             }
             let motion = &mut self.motions[at];
             (motion.place, motion.inertia, motion.approach) = (place, inertia, None);
@@ -150,17 +162,26 @@ impl ObstacleMotions {
         if self.is_empty() {
             return Ok(());
         }
-        self.linearise(session, multiply)
+        self.linearise(session, contacts, multiply)
     }
 
-    /// Sets `K N` and the slopes; `multiply` is the product with `K` and the derivatives of forces of cells. Collective.
-    pub(super) fn linearise(
+    /// Sets the columns, `K` times them and the slopes; `multiply` is the product with `K` and the derivatives of forces of cells.
+    /// Collective.
+    pub(super) fn linearise<const D: usize>(
         &mut self,
         session: &Session,
+        contacts: &[Contact<D>],
         mut multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
     ) -> Result<()> {
         let count = self.motions.len();
-        self.motions.iter_mut().try_for_each(|motion| multiply(&motion.velocities, &mut motion.forces))?;
+        for Motion { place: [contact, number], velocities, column, forces, .. } in &mut self.motions {
+            column.copy_from(velocities)?;
+            if *number == 0 && contacts[*contact].rolls() {
+                let added = contacts[*contact].add_sweep(&mut column.owned_mut()?);
+                session.agree(added)?;
+            }
+            multiply(column, forces)?;
+        }
         self.work.clear();
         for (row, column) in (0..count * count).map(|at| (at / count, at % count)) {
             self.work.push(own_dot(&self.motions[row].velocities, &self.motions[column].forces)?);
@@ -189,7 +210,8 @@ impl ObstacleMotions {
         }
         for Motion { place: [contact, _], .. } in &self.motions {
             let laws = &mut contacts[*contact];
-            let is_new = laws.follow_along_new_tangents() || (!laws.follows_obstacle() && laws.has_tractions());
+            let is_new =
+                laws.follow_along_new_tangents() || (!laws.follows_obstacle() && laws.has_tractions());
             self.work.push(f64::from(u8::from(is_new)));
         }
         let sums = session.sum_of_lists(&self.work);
@@ -320,14 +342,23 @@ impl ObstacleMotions {
 
     /// The velocities of all motions.
     pub(super) fn velocities<const D: usize>(&self, contacts: &[Contact<D>]) -> Vec<f64> {
-        let velocity = |[contact, number]: [usize; 2]| contacts[contact].driven()[number].map_or(0.0, LoadedMotion::velocity);
+        let velocity = |[contact, number]: [usize; 2]| {
+            contacts[contact].driven()[number].map_or(0.0, LoadedMotion::velocity)
+        };
         self.motions.iter().map(|motion| velocity(motion.place)).collect()
     }
 
     /// Sets what [`velocities`](Self::velocities) gave.
-    pub(super) fn set_velocities<const D: usize>(&self, contacts: &mut [Contact<D>], velocities: &[f64]) -> Result<()> {
+    pub(super) fn set_velocities<const D: usize>(
+        &self,
+        contacts: &mut [Contact<D>],
+        velocities: &[f64],
+    ) -> Result<()> {
         for (Motion { place: [contact, number], .. }, velocity) in self.motions.iter().zip(velocities) {
-            contacts[*contact].driven_mut(*number).into_iter().for_each(|motion| motion.set_velocity(*velocity));
+            contacts[*contact]
+                .driven_mut(*number)
+                .into_iter()
+                .for_each(|motion| motion.set_velocity(*velocity));
         }
         contacts.iter_mut().try_for_each(Contact::place_obstacle)
     }
@@ -340,18 +371,9 @@ impl ObstacleMotions {
         self.motions.iter().map(|motion| motion.size * change(motion.place).abs()).sum()
     }
 
-    /// Subtracts from velocities those of the obstacles that they follow, since the start of the step.
-    pub(super) fn subtract<const D: usize>(
-        &self,
-        contacts: &[Contact<D>],
-        velocity: &mut DistributedVector,
-    ) -> Result<()> {
-        for Motion { place: [contact, number], velocities, .. } in &self.motions {
-            if let Some(motion) = contacts[*contact].driven()[*number] {
-                velocity.add_scaled(-motion.change(), velocities)?;
-            }
-        }
-        Ok(())
+    /// Whether a motion changes nodal velocities otherwise than the velocities work against forces on the obstacle.
+    pub(super) fn is_unsymmetric<const D: usize>(&self, contacts: &[Contact<D>]) -> bool {
+        self.motions.iter().any(|motion| contacts[motion.place[0]].rolls())
     }
 
     /// The reason why the motions are not solved, given the norm of the nodal residual in N and the relative tolerance of steps.
@@ -437,7 +459,10 @@ mod tests {
     fn small_systems_are_solved_with_pivots_and_empty_rows() {
         let mut value = [5.0, 2.0, 7.0];
         solve_dense(&mut [0.0, 2.0, 1.0, 1.0, 0.0, 0.0, 3.0, 0.0, -1.0], &mut value);
-        assert!(value.iter().zip([2.0, 3.0, -1.0]).all(|(found, right)| (found - right).abs() < 1e-12), "{value:?}");
+        assert!(
+            value.iter().zip([2.0, 3.0, -1.0]).all(|(found, right)| (found - right).abs() < 1e-12),
+            "{value:?}"
+        );
         let mut value = [3.0, 4.0];
         solve_dense(&mut [0.0, 0.0, 0.0, 2.0], &mut value);
         assert_eq!(value, [0.0, 2.0], "a motion without an equation keeps its velocity");

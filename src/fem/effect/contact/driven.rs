@@ -18,6 +18,14 @@ use crate::{
     parallel::session::Session,
 };
 
+/// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
+const NEAR: f64 = 1e-6;
+
+/// The place at which the ray of a point meets the obstacle relative to its centre.
+fn arm<const D: usize>(point: &Point<D>, seen: &Vector<D>, reach: f64, centre: &Vector<D>) -> Vector<D> {
+    add_scaled(&add_scaled(seen, reach, &point.normal), -1.0, centre)
+}
+
 impl<const D: usize> Contact<D> {
     /// The motions of its obstacle that forces drive: along its direction, and about its axis.
     pub fn driven(&self) -> [Option<&LoadedMotion>; 2] {
@@ -82,7 +90,8 @@ impl<const D: usize> Contact<D> {
     pub fn follow_along_new_tangents(&mut self) -> bool {
         let points = &self.points;
         let mut is_new = false;
-        for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
+        let friction = self.friction.iter_mut().filter(|friction| friction.follows);
+        for point in friction.flat_map(|friction| &mut friction.points) {
             if !point.follows && points[point.at].pressure != 0.0 {
                 (point.follows, is_new) = (true, true);
             }
@@ -100,13 +109,6 @@ impl<const D: usize> Contact<D> {
         let friction = self.friction.iter().flat_map(|friction| &friction.points);
         self.points.iter().any(|point| point.pressure != 0.0) || { friction }
             .any(|point| point.traction != [0.0; D])
-    }
-
-    /// x
-    pub fn show(&self) -> String {
-        let w: Vec<f64> = self.driven().into_iter().flatten().map(|m| m.velocity()).collect();
-        let f: String = self.friction.iter().flat_map(|f| &f.points).filter(|p| p.pressure > 0.0).map(|p| format!(" {:.2}{}", p.traction[0] / p.pressure, if p.tangent.sticks {"s"} else {"."})).collect();
-        format!("{w:?} {f}")
     }
 
     /// Whether points on this rank would touch the obstacle where it is, at these velocities of Newton's method.
@@ -131,18 +133,62 @@ impl<const D: usize> Contact<D> {
             if point.reach == f64::INFINITY {
                 return [0.0; D];
             }
-            let arm = |seen: Vector<D>, reach, centre| {
-                add_scaled(&add_scaled(&seen, reach, &point.normal), -1.0, centre)
-            };
-            let after = arm(obstacle.seen_after(&point.place), point.reach, &centre);
+            let after = arm(point, &obstacle.seen_after(&point.place), point.reach, &centre);
             if point.context.mean_from.is_none() {
                 return after;
             }
-            let start = arm(obstacle.seen_before(&point.place), point.reach - point.growth, &before);
+            let start = arm(point, &obstacle.seen_before(&point.place), point.reach - point.growth, &before);
             std::array::from_fn(|i| 0.5 * (start[i] + after[i]))
         });
         self.arms.clear();
         self.arms.extend(arms);
+    }
+
+    /// The change of the velocity of the obstacle's material at a point with the velocity of its translation, in a step in which it also
+    /// turns: the ray along the normal meets it at another place.
+    fn sweep(&self, at: usize) -> Result<Vector<D>> {
+        let point = &self.points[at];
+        let Some(obstacle) = &self.obstacle else { return Ok([0.0; D]) };
+        let (Some((direction, way)), true) = (obstacle.translation(), point.reach < f64::INFINITY) else {
+            return Ok([0.0; D]);
+        };
+        let seen = obstacle.seen_after(&point.place);
+        let distance = NEAR * norm(&self.arms[at]);
+        let reach = self.gap.of_moved(
+            self.rate.time,
+            &add_scaled(&seen, -distance, direction),
+            &point.normal,
+            point.moved,
+        )?;
+        let slope = (reach - point.reach) / distance;
+        let rate = add_scaled(&direction.map(|x| -x), slope, &point.normal);
+        let share = if point.context.mean_from.is_none() { way } else { 0.5 * way };
+        let velocity = obstacle.turning_velocity(&rate);
+        Ok(if slope.is_finite() { velocity.map(|v| share * v) } else { [0.0; D] })
+    }
+
+    /// Adds to [`add_motion`](Self::add_motion) of a translation the change of the velocities at points with friction where the obstacle
+    /// also turns.
+    pub fn add_sweep(&self, nodal: &mut [f64]) -> Result<()> {
+        let friction = self.friction.iter().flat_map(|friction| &friction.points);
+        for point in friction.filter(|point| self.follows && point.follows) {
+            point.add(Newton, 1.0, &point.free_part(&self.sweep(point.at)?), nodal);
+        }
+        Ok(())
+    }
+
+    /// Whether its obstacle moves along a direction and turns.
+    pub fn rolls(&self) -> bool {
+        self.friction.is_some()
+            && self.obstacle.as_ref().is_some_and(|obstacle| obstacle.moves() && obstacle.turns())
+    }
+
+    /// Subtracts from nodal velocities those of the obstacle that they follow.
+    pub fn subtract_obstacle(&self, values: &mut [f64]) {
+        for point in self.points.iter().filter(|point| point.unknown == Unknown::Parameter) {
+            point.add_along(Newton, -point.carried / point.free_length, values);
+        }
+        self.friction.iter().for_each(|friction| friction.add_obstacle_velocities(-1.0, values));
     }
 
     /// The velocity of the obstacle's material at a point for a motion at 1 m/s (1 rad/s).

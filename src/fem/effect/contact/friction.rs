@@ -202,7 +202,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Adds to nodal values a multiple of the obstacle's velocity along the free tangents where the unknowns follow it.
-    fn add_obstacle_velocities(&self, factor: f64, values: &mut [f64]) {
+    pub(super) fn add_obstacle_velocities(&self, factor: f64, values: &mut [f64]) {
         let points = self.points.iter().filter(|point| point.follows);
         points.for_each(|point| point.add(Newton, factor, &point.free_part(&point.obstacle), values));
     }
@@ -349,7 +349,9 @@ impl<const D: usize> Friction<D> {
     /// Hash that differs between linearisations with different sets of branches.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         // In 2D the direction of sliding is one of two.
-        let sense = |p: &TangentialPoint<D>| if D == 2 { dot(&p.tangent.toward, &p.tangents[0]).signum() } else { 1.0 };
+        let sense = |p: &TangentialPoint<D>| {
+            if D == 2 { dot(&p.tangent.toward, &p.tangents[0]).signum() } else { 1.0 }
+        };
         self.points
             .iter()
             .flat_map(move |p| [f64::from(u8::from(p.tangent.sticks)), sense(p) * p.tangent.coefficient])

@@ -142,6 +142,18 @@ impl<const D: usize> LoadedObstacle<D> {
         velocity
     }
 
+    /// The direction along which a force moves it and the length in s that multiplies its velocity in the displacement of a step.
+    pub(super) fn translation(&self) -> Option<(&Vector<D>, f64)> {
+        self.translation.as_ref().map(|(direction, motion)| (direction, motion.travel.way))
+    }
+
+    /// The velocity in m/s of its material at this place relative to the centre by its rotation alone.
+    pub(super) fn turning_velocity(&self, arm: &Vector<D>) -> Vector<D> {
+        let [_, turned] = self.velocities_at(arm);
+        let speed = self.rotation.as_ref().map_or(0.0, |(_, motion)| motion.velocity());
+        turned.map_or([0.0; D], |velocity| velocity.map(|v| speed * v))
+    }
+
     /// Whether a force moves the obstacle.
     pub(super) fn moves(&self) -> bool {
         self.translation.is_some()
