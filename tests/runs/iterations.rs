@@ -95,6 +95,32 @@ fn an_obstacle_moved_by_a_force_takes_as_many_iterations_as_one_whose_motion_is_
     }
 }
 
+/// Few points of a stiff body hold a light disc, and stick and slide in turn.
+#[test]
+fn rolling_takes_few_iterations_on_any_mesh_and_in_any_step() {
+    let case = |cells: &str, time: &str| {
+        Case::of("rolling_disc")
+            .without("check")
+            .set("mesh.rectangle.cells", cells)
+            .set("time", &format!("{{{time}}}"))
+    };
+    for (cells, time, most) in [
+        ("[120, 4]", "end = 0.1, step = 0.002, scheme = 'bdf2'", 950.0),
+        ("[120, 4]", "end = 0.1, step = 0.005, scheme = 'bdf2'", 550.0),
+        ("[120, 4]", "end = 0.1, step = 0.002, scheme = 'implicit_euler'", 1200.0),
+        ("[480, 8]", "end = 0.01, step = 0.002, scheme = 'bdf2'", 300.0),
+    ] {
+        let kept = case(cells, time).run_and_keep(1);
+        let results = kept.results();
+        let found = results.number("newton_iterations");
+        let table = results.table("resultants.csv").only("source", "contact top");
+        let last = |column: &str| *table.numbers(column).last().expect("rows");
+        let rolls = -0.1 * last("obstacle_angular_velocity") / last("obstacle_velocity");
+        println!("{cells}, {time}: {found} iterations, rolls {rolls}");
+        assert!(found <= most && (rolls - 1.0).abs() < 0.01, "{cells}, {time}: {found}, {rolls}");
+    }
+}
+
 #[test]
 fn a_stiff_body_on_soft_springs_repeats_no_iteration_in_vain() {
     // Contact that does not touch yet leaves the body free: linear solvers find no direction beside rounding errors.

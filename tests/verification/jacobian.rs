@@ -3,12 +3,16 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    fem::effect::{Contact, ContactConditions, Effect, Inertia, Quadrature, ViscousStress, choose_unknowns},
+    fem::effect::{
+        Blend, Contact, ContactConditions, Effect, Inertia, LoadedObstacle, Quadrature, Travel,
+        ViscousStress, choose_unknowns,
+    },
     job::{Expression, Fix, FixedDirections, Scalar},
     laws::{
         contact::{
             Bound, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw, Gap, Graph,
-            NormalLaw, NormalResponse, Plane, SlipWeakening, Symmetry, Tresca, Unilateral,
+            NormalLaw, NormalResponse, ObstacleLoad, Plane, SlipWeakening, Sphere, Symmetry, Tresca,
+            Unilateral,
         },
         material::{ByMaterial, Isotropic},
     },
@@ -204,4 +208,77 @@ fn compare(session: &Session) {
 #[test]
 fn the_jacobian_of_contact_is_the_difference_of_residuals() {
     run_on(&[1, 2, 3], |world| compare(&world.session));
+}
+
+/// The change of nodal velocities at fixed unknowns with the velocity of an obstacle that rolls over the bottom of a body.
+fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
+    let (body, state) = body::<D, S>(session, whole, &[("left", Fix::Keyword(FixedDirections::All))], vec![]);
+    let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
+    let number = |value: f64| Scalar::Number(value);
+    let mut centre = vec![number(0.4); D];
+    centre[D - 1] = number(-1.98);
+    let gap = Gap::Sphere(Sphere {
+        centre,
+        radius: 2.0,
+        hollow: false,
+        rotation: None,
+        axis: (D == 3).then(|| vec![0.3, 1.0, 0.0]),
+    });
+    let law = laws()[6].clone();
+    let conditions = ContactConditions { quadrature: Quadrature::Nodal, law, gap };
+    let mut contact = Contact::new(session, &body.mesh, &facets, conditions, &body.held).expect("contact");
+    let friction = FRICTION[1].expect("a law");
+    contact.add_friction(friction, &body.mesh, &body.held).expect("friction");
+    let mut direction = vec![0.1; D];
+    direction[0] = 1.0;
+    let load = ObstacleLoad { direction, moment: Some(number(0.0)), ..ObstacleLoad::default() };
+    contact.obstacle = Some(LoadedObstacle::new(&load, contact.gap.axis()));
+    choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
+    for motion in 0..2 {
+        let travel = Travel::to_end(Blend::euler(0.1));
+        contact.driven_mut(motion).expect("a motion").start(travel, 0.1, None);
+    }
+    let displacement = vec![0.0; state.velocity.local().expect("local").len()];
+    contact.prepare(0.1, 0.1, &displacement).expect("prepared");
+    contact.follow_obstacle(true);
+    let start = [0.7, -3.0];
+    let mut velocities_at = |[along, about]: [f64; 2]| {
+        contact.driven_mut(0).expect("a motion").set_velocity(along);
+        contact.driven_mut(1).expect("a motion").set_velocity(about);
+        contact.place_obstacle().expect("placed");
+        let mut apart = vec![0.0; state.velocity.owned().expect("owned").len()];
+        contact.subtract_obstacle(&mut apart);
+        let columns = [0, 1].map(|motion| {
+            let mut column = vec![0.0; apart.len()];
+            contact.add_motion(motion, &mut column);
+            if motion == 0 {
+                contact.add_sweep(&mut column).expect("swept");
+            }
+            column
+        });
+        (apart, columns)
+    };
+    let h = 1e-4;
+    let (_, columns) = velocities_at(start);
+    for motion in 0..2 {
+        let shifted =
+            |sign: f64| std::array::from_fn(|at| start[at] + if at == motion { sign * h } else { 0.0 });
+        let [(above, _), (below, _)] = [1.0, -1.0].map(|sign| velocities_at(shifted(sign)));
+        let mut sums = [0.0; 2];
+        for ((above, below), column) in above.iter().zip(&below).zip(&columns[motion]) {
+            let change = -0.5 / h * (above - below);
+            sums[0] += (change - column).powi(2);
+            sums[1] += column.powi(2);
+        }
+        let [error, size] = session.sum(sums).map(f64::sqrt);
+        assert!(error < 1e-5 * size && size > 0.1, "{D}D, motion {motion}: {error} of {size}");
+    }
+}
+
+#[test]
+fn columns_of_rolling_obstacles_are_differences_of_their_velocities() {
+    run_on(&[1, 2], |world| {
+        columns::<2, 4>(&world.session, &crossed([4, 3]));
+        columns::<3, 6>(&world.session, &brick([3, 2, 2]));
+    });
 }

@@ -75,8 +75,8 @@ pub struct Solver {
     /// The precision of the matrix factor for steps with contact. It applies with preconditioner cholesky; factors of MUMPS are in
     /// double precision.
     pub factor_precision: FactorPrecision,
-    /// Number of Newton iterations after which a solve fails. A step may need several solves: other start values, obstacles moved by
-    /// a force; the Newton iterations of a step are the sum over its solves. Where forces fall as the body moves, a descent to another
+    /// Number of Newton iterations after which a solve fails. A step may need several solves: other start values, friction on obstacles
+    /// moved by a force; the Newton iterations of a step are the sum over its solves. Where forces fall as the body moves, a descent to another
     /// equilibrium may take 20 times as many.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
