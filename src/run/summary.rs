@@ -53,6 +53,10 @@ pub struct Summary {
     pub time: f64,
     /// Rejected adaptive steps.
     pub rejected_steps: u64,
+    /// Steps since time 0 that passed unstable states to another equilibrium.
+    pub unstable_steps: u64,
+    /// Linear systems since time 0 that were not positive definite.
+    pub indefinite_solves: u64,
     /// Matrices this run assembled, each with its preconditioner.
     pub set_ups: u64,
     /// Newton iterations since time 0.

@@ -394,6 +394,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             steps: state.step,
             time: state.time,
             rejected_steps: totals.step_level.map_or(0, |level| level.rejected),
+            unstable_steps: totals.unstable_steps,
+            indefinite_solves: totals.indefinite_solves,
             set_ups: scheme.set_ups,
             newton_iterations: totals.newton_iterations,
             linear_iterations: totals.linear_iterations,
