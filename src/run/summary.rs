@@ -130,15 +130,18 @@ impl Summary {
         write_whole(&folder.join(SUMMARY), &(text + "\n"))
     }
 
-    /// Warnings where the run left the range of the theory or of a certificate.
-    pub fn range_warnings(&self) -> impl Iterator<Item = String> {
+    /// Warnings where the run left the range of the theory or of a certificate, given whether the contact boundaries have mass.
+    pub fn range_warnings(&self, surface_has_mass: bool) -> impl Iterator<Item = String> {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
-            let advice =
-                if self.effects.contains(&"inertia") { "; a smaller [time] step raises this bound" } else { "" };
+            let remedy = if surface_has_mass {
+                "a smaller [time] step"
+            } else {
+                "a viscosity, or a density without redistribute_mass,"
+            };
             format!(
                 "the contact pressure reached {most:.4e} Pa, but with weakening friction a step is certain to have one solution only up \
-                 to {bound:.4e} Pa{advice}"
+                 to {bound:.4e} Pa; {remedy} raises this bound"
             )
         });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {

@@ -178,6 +178,8 @@ fn a_run_is_compared_with_the_pressure_that_slip_weakening_is_certified_for() {
         assert_eq!(most > bound, beyond, "{most} {bound}");
         let log = results.text("run.log");
         assert_eq!(log.contains("warning: the contact pressure reached "), beyond, "{log}");
+        let log = launch::unwrapped(&log);
+        assert_eq!(log.contains("a smaller [time] step raises this bound"), beyond, "{log}");
     }
     let tresca =
         rigid_block().set("contact.0.friction", "{ tresca = { bound = 30 } }").set("time.end", "0.02");

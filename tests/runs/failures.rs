@@ -211,7 +211,8 @@ fn a_step_that_fails_as_friction_weakens_on_a_surface_without_mass_names_remedie
             .expect(1)
             .says("forces of friction fall here as the body moves")
             .says("`redistribute_mass = false`, under bdf2 or implicit_euler")
-            .says("give the material a viscosity");
+            .says("give the material a viscosity")
+            .says("a viscosity, or a density without redistribute_mass, raises this bound");
         for scheme in ["'bdf2'", "'implicit_euler'"] {
             let massive = weakening().set("contact.0.redistribute_mass", "false").set("time.scheme", scheme);
             massive.run_with(ranks, &[]).expect(0);
