@@ -96,6 +96,12 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         let found: Option<Vec<f64>> = names.iter().map(|name| summary.of_fields.get(name).copied()).collect();
         found.into_iter().for_each(|figures| log.line(line(&figures)));
     }
+    if summary.unstable_steps > 0 || summary.indefinite_solves > 0 {
+        log.line(format!(
+            "unstable   {} steps passed unstable states, {} linear systems were indefinite",
+            summary.unstable_steps, summary.indefinite_solves
+        ));
+    }
     if let Some(guesses) = summary.guesses {
         log.line(format!(
             "guesses    several solutions in {} of {} steps, at most {} in one step",

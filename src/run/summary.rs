@@ -53,6 +53,10 @@ pub struct Summary {
     pub time: f64,
     /// Rejected adaptive steps.
     pub rejected_steps: u64,
+    /// Steps since time 0 that passed unstable states to another equilibrium.
+    pub unstable_steps: u64,
+    /// Linear systems since time 0 that were not positive definite.
+    pub indefinite_solves: u64,
     /// Matrices this run assembled, each with its preconditioner.
     pub set_ups: u64,
     /// Newton iterations since time 0.
@@ -126,15 +130,18 @@ impl Summary {
         write_whole(&folder.join(SUMMARY), &(text + "\n"))
     }
 
-    /// Warnings where the run left the range of the theory or of a certificate.
-    pub fn range_warnings(&self) -> impl Iterator<Item = String> {
+    /// Warnings where the run left the range of the theory or of a certificate, given whether the contact boundaries have mass.
+    pub fn range_warnings(&self, surface_has_mass: bool) -> impl Iterator<Item = String> {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
-            let advice =
-                if self.effects.contains(&"inertia") { "; a smaller [time] step raises this bound" } else { "" };
+            let remedy = if surface_has_mass {
+                "a smaller [time] step"
+            } else {
+                "a viscosity, or a density without redistribute_mass,"
+            };
             format!(
                 "the contact pressure reached {most:.4e} Pa, but with weakening friction a step is certain to have one solution only up \
-                 to {bound:.4e} Pa{advice}"
+                 to {bound:.4e} Pa; {remedy} raises this bound"
             )
         });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {

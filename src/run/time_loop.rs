@@ -14,6 +14,7 @@ use super::{
 };
 use crate::{
     error::{Error, Exit, Result},
+    fem::effect::Form,
     io::output::{checkpoint::Identity, log::Log, output_field::Converged},
     job::{Accept, Job, Loaded},
     linear_algebra::{
@@ -342,9 +343,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             Ok(_) => ("stopped", None),
             Err(error) => ("failed", Some(error.to_string())),
         };
+        let body = &self.simulation.body;
+        let surface_has_mass = body.has_form(Form::Mass) && body.redistributed_mass.is_none();
         let summary = self.summary(status, error, restarted_from);
         let written = self.session.agree(summary).and_then(|mut summary| {
-            summary.range_warnings().for_each(|warning| self.log.warning(warning));
+            summary.range_warnings(surface_has_mass).for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
             self.session.on_first(|| {
                 header::closing(&mut self.log, &summary, self.job);
@@ -394,6 +397,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             steps: state.step,
             time: state.time,
             rejected_steps: totals.step_level.map_or(0, |level| level.rejected),
+            unstable_steps: totals.unstable_steps,
+            indefinite_solves: totals.indefinite_solves,
             set_ups: scheme.set_ups,
             newton_iterations: totals.newton_iterations,
             linear_iterations: totals.linear_iterations,

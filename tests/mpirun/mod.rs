@@ -13,6 +13,7 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
     assert!(output.status.success(), "{scenario} on {ranks} ranks:\n{words}");
     assert!(words.contains("1 passed"), "{scenario} on {ranks} ranks has not run:\n{words}");
     assert!(!words.contains("HDF5-DIAG"), "HDF5 printed its error stack:\n{words}");
+    print!("{words}");
 }
 
 pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {

@@ -177,9 +177,48 @@ fn a_step_without_solution_fails_and_names_branches_that_come_back() {
             .expect(1)
             .says(
                 "failed: too many Newton iterations; Newton's method cycles: the branches of the contact graphs recur after 2 \
-                 iterations; forces of contact or friction fall here as the body moves",
+                 iterations; forces of contact fall here as the body moves",
             )
             .says("try a smaller [time] step");
+    }
+}
+
+/// A block that slides with friction that falls steeply with its velocity, on a surface without mass.
+fn weakening() -> Case {
+    Case::of("stick_on_a_jump")
+        .set("mesh.rectangle", "{ size = [1.2, 0.9], cells = [4, 3] }")
+        .set(
+            "material",
+            "{ hypothesis = 'plane_strain', density = 1.4, elasticity = { youngs_modulus = 30, poisson_ratio = 0.07 } }",
+        )
+        .without("support")
+        .set("traction", "[{ on = ['top', 'right'], value = [-2.4, -2.5] }]")
+        .set("initial.velocity", "['-0.15 + 0.04*x - 0.08*y', '-0.7 - 0.27*x + 0.15*y']")
+        .set(
+            "contact",
+            "[{ on = ['bottom'], redistribute_mass = true, normal = { unilateral = { bound = 'velocity' } }, \
+             friction = { slip_weakening = { static = 0.4, dynamic = 0.2, decay_velocity = 0.5 } } }]",
+        )
+        .set("time", "{ scheme = 'midpoint', end = 0.004, step = 2e-4 }")
+        .set("output.probe", "[]")
+}
+
+#[test]
+fn a_step_that_fails_as_friction_weakens_on_a_surface_without_mass_names_remedies_that_help() {
+    for ranks in [1, 2] {
+        weakening()
+            .run_with(ranks, &[])
+            .expect(1)
+            .says("forces of friction fall here as the body moves")
+            .says("`redistribute_mass = false`, under bdf2 or implicit_euler")
+            .says("give the material a viscosity")
+            .says("a viscosity, or a density without redistribute_mass, raises this bound");
+        for scheme in ["'bdf2'", "'implicit_euler'"] {
+            let massive = weakening().set("contact.0.redistribute_mass", "false").set("time.scheme", scheme);
+            massive.run_with(ranks, &[]).expect(0);
+        }
+        let viscous = weakening().set("material.viscosity", "{ volumetric = 0.0, shear = 0.3 }");
+        viscous.run_with(ranks, &[]).expect(0);
     }
 }
 

@@ -461,3 +461,23 @@ fn the_gap_is_what_is_left_of_the_distance() {
     assert_eq!(left.len(), 7);
     assert!(left.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-14), "{left:?} {expected:?}");
 }
+
+#[test]
+fn a_run_that_passes_unstable_states_says_so() {
+    let case = Case::of("verification/double_cantilever");
+    let results = case.run(1);
+    let (log, summary) = (results.text("run.log"), results.summary());
+    let fell = log.matches(": passes unstable states").count() as u64;
+    assert!(fell > 0, "{log}");
+    assert_eq!(summary["unstable_steps"], fell);
+    let indefinite = &summary["indefinite_solves"];
+    assert!(
+        log.contains(&format!("unstable   {fell} steps passed unstable states, {indefinite} linear systems"))
+    );
+    let page = std::fs::read_to_string(report(&results.path(""))).expect("a page");
+    assert!(page.contains(&format!("to another equilibrium: {fell}.")), "{page}");
+    let case = Case::of("stick_on_a_jump");
+    let calm = case.run(1);
+    assert_eq!(calm.summary()["unstable_steps"], 0);
+    assert!(!calm.text("run.log").contains("unstable"));
+}

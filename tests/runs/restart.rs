@@ -233,6 +233,41 @@ fn a_restarted_run_with_wear_is_the_straight_run_to_the_last_bit() {
 }
 
 #[test]
+fn a_restarted_run_with_boundaries_that_wear_and_meet_at_an_edge_is_the_straight_run_to_the_last_bit() {
+    let side = "normal = { compliance = { stiffness = 1000.0 } }, wear = { coefficient = 0.01 }";
+    let make = |order: &str, law: &str| {
+        let on = |side_of: &str| format!("{{ on = ['{side_of}'], {side}, friction = {{ {law} }} }}");
+        Case::cube(2)
+            .set("checkpoint.every", "4")
+            .set("output.profile", "[{on = 'bottom'}]")
+            .set("mesh.order", order)
+            .set("time.scheme", "'bdf2'")
+            .set("support", "[{ on = ['top'], fix = 'all', velocity = [-0.02, 0.3, -0.02] }]")
+            .without("traction")
+            .set("contact", &format!("[{}, {}]", on("bottom"), on("left")))
+    };
+    for (order, law) in [
+        ("1", "coulomb = { coefficient = 0.3 }"),
+        ("1", "distance_weakening = { static = 0.4, dynamic = 0.3, distance = 0.2 }"),
+        ("2", "coulomb = { coefficient = 0.3 }"),
+    ] {
+        let what = format!("cells of order {order}, {law}");
+        compare_with_straight(|| make(order, law), 1, &what);
+        compare_with_straight(|| make(order, law), 3, &what);
+    }
+    // One contact on both boundaries.
+    let both = || {
+        make("1", "coulomb = { coefficient = 0.3 }").set(
+            "contact",
+            &format!(
+                "[{{ on = ['bottom', 'left'], {side}, friction = {{ coulomb = {{ coefficient = 0.3 }} }} }}]"
+            ),
+        )
+    };
+    compare_with_straight(both, 2, "one contact");
+}
+
+#[test]
 fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() {
     for law in [
         "tresca = { bound = 0.2 }",

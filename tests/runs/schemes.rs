@@ -5,6 +5,7 @@ use crate::{
     results::{Results, relative_difference},
 };
 use clarke::linear_algebra::tensor::larger;
+use std::path::Path;
 
 const IMPLICIT: [&str; 2] = ["implicit_euler", "bdf2"];
 
@@ -141,5 +142,33 @@ fn the_energy_of_a_bouncing_bar_never_grows_under_the_midpoint_rule() {
             "{what}: {first} Pa, {largest} Pa"
         );
         assert!(results.number("max_energy_imbalance") < 1e-8, "{what}");
+    }
+}
+
+/// A mass on a spring and a dashpot: the force on it at any time, from `x = v0/w sin(w t) exp(-z t)`, with an error of the order of the
+/// scheme.
+#[test]
+fn reactions_are_those_at_the_time_of_their_row_with_the_order_of_the_scheme() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/damped_oscillator.toml");
+    let (mass, stiffness, damping, speed): (f64, f64, f64, f64) = (40.0, 8000.0, 160.0, 1.5);
+    let decay = 0.5 * damping / mass;
+    let frequency = (stiffness / mass - decay * decay).sqrt();
+    let force = |t: f64| {
+        let (sine, cosine) = (frequency * t).sin_cos();
+        let growth = speed * (-decay * t).exp();
+        let (x, v) = (growth * sine / frequency, growth * (cosine - decay * sine / frequency));
+        -stiffness * x - damping * v
+    };
+    for (scheme, order) in [("implicit_euler", 1.0), ("bdf2", 2.0), ("midpoint", 2.0)] {
+        let errors = [0.01, 0.005].map(|step: f64| {
+            let case =
+                under(Case::from(&file), scheme).set("time.step", &step.to_string()).set("time.end", "0.3");
+            let table = case.run(1).table("resultants.csv").only("source", "support left");
+            let rows = table.numbers("time").into_iter().zip(table.numbers("force_x"));
+            rows.map(|(time, found)| (found - force(time)).abs()).fold(0.0, larger)
+        });
+        let observed = (errors[0] / errors[1]).log2();
+        println!("{scheme}: {errors:?} N of {}, order {observed:.2}", force(0.0).abs());
+        assert!((observed - order).abs() < 0.3, "{scheme}: {errors:?}");
     }
 }

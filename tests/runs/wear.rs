@@ -49,6 +49,41 @@ fn a_pad_wears_off_with_the_order_of_the_scheme() {
     }
 }
 
+/// A pad on a dashpot, which the belt carries along: with the velocity `m p / c` of the pad the pressure follows
+/// `p' = -p (1 - p / P) / s` with `P = c (1 cm/s) / m = 1 MPa`, `p = P / (1 + exp(t))`.
+#[test]
+fn a_pad_that_its_friction_carries_along_wears_with_the_order_of_the_scheme_and_off_completely() {
+    let carried = |scheme: &str, step: f64, end: f64| {
+        pad(scheme, step, end)
+            .set("contact.0.friction.coulomb.coefficient", "1e-4")
+            .set("contact.0.wear.coefficient", "2e-9")
+            .set("contact.0.obstacle.plane.point", "['0.01*t', 1e-5]")
+            .set(
+                "support",
+                "[{ on = ['top'], fix = ['y'] }, { on = ['top'], damping = { tangential = 1e4 } }]",
+            )
+    };
+    let time: f64 = 0.8;
+    let exact = 1e6 / (1.0 + time.exp());
+    for (scheme, order) in [("implicit_euler", 1.0), ("bdf2", 2.0)] {
+        let errors = [0.1, 0.05].map(|step| {
+            let case = carried(scheme, step, time);
+            let results = case.run(1);
+            let iterations = results.table("history.csv").numbers("newton_iterations");
+            assert!(iterations.iter().all(|count| *count <= 12.0), "{scheme}: {iterations:?}");
+            results.table("resultants.csv").only("source", "contact bottom").last("mean_pressure") - exact
+        });
+        let observed = (errors[0] / errors[1]).abs().log2();
+        println!("{scheme}: {errors:?} of {exact} Pa, order {observed:.2}");
+        assert!((observed - order).abs() < 0.1, "{scheme}: {errors:?} of {exact} Pa");
+        for step in [0.5, 3.0, 100.0] {
+            let case = carried(scheme, step, 40.0 * step);
+            let depth = deepest(&case.run(1));
+            assert!((depth / INTERFERENCE - 1.0).abs() < 1e-6, "{scheme}, steps of {step} s: {depth} m");
+        }
+    }
+}
+
 #[test]
 fn a_pad_never_wears_off_more_than_it_overlaps_its_belt_in_steps_of_any_length() {
     for scheme in ["implicit_euler", "bdf2"] {

@@ -10,7 +10,7 @@ use clarke::{
         state::State,
     },
     job::{Job, Scheme},
-    laws::contact::Gap,
+    laws::{contact::Gap, step::Blend},
     linear_algebra::{petsc::DistributedVector, tensor::larger},
     mesh::{GlobalMesh, generate::box_mesh},
     parallel::session::Session,
@@ -321,6 +321,15 @@ fn several(session: &Session) {
 const FALL_WITH_DISPLACEMENT: f64 = 300.0;
 const FALL_WITH_SLIP: f64 = 0.2 / 0.25;
 
+/// The fall of the friction bound of a contact with the sliding velocity in Pa s/m, at its largest pressure in a step that follows from a
+/// blend of this length in s.
+fn fall_of_friction<const D: usize>(contact: &Contact<D>, length: f64) -> f64 {
+    let law = contact.friction().expect("friction");
+    let at = law.context(law.first_histories(), Blend::euler(length));
+    let speed = 1e-6;
+    (law.bound(speed, LARGEST, at) - law.bound(2.0 * speed, LARGEST, at)) / speed
+}
+
 /// Certificates of the worst step of a range under a scheme. Pressures fall with the velocity below, with slip on the same side, and
 /// with the displacement on the right; the least resistance is between the shortest and the longest step.
 fn worst_step<const D: usize, const S: usize>(
@@ -334,6 +343,7 @@ fn worst_step<const D: usize, const S: usize>(
          [[contact]]\non = ['right']\n[contact.normal.displacement_graph]\n\
          points = [[0.0, 0.0], [0.1, 60.0], [0.2, 30.0]]\n"
     );
+    let contacts = massless(contacts, scheme);
     let job = job::<D>(&contacts, 3.0)
         .replace(
             "[[support]]\non = ['left']",
@@ -341,7 +351,7 @@ fn worst_step<const D: usize, const S: usize>(
         )
         .replace("[time]\n", &format!("[time]\nscheme = '{}'\n", scheme.name()));
     let mut run = simulation::<D, S>(session, &job, mesh);
-    let [_, longest] = range.steps;
+    let longest = range.steps[1];
     let mut of_step = run.scheme.matrix(session, &mut run.body, longest).expect("matrix");
     let found = Certificates::of(session, &run.body, &run.state, &mut of_step, range).expect("certificates");
     let whole = of_step.range.matrices[0];
@@ -355,17 +365,16 @@ fn worst_step<const D: usize, const S: usize>(
     let normal =
         |at: usize| dense_form(session, &run, |x, y| run.body.contacts[at].add_squares([1.0, 0.0], x, y));
     let (below, beside) = (normal(0), normal(1));
-    let slip = sliding(session, &run, LARGEST * FALL_WITH_SLIP);
-    let theta = |matrix: f64, step: f64| {
-        let with_velocity = combine(FALL, &below, &combine(step - 1.0, &slip, &slip));
-        let falls = combine(matrix * FALL_WITH_DISPLACEMENT, &beside, &with_velocity);
-        largest(&falls, &matrix_of(matrix))
+    let slip = sliding(session, &run, 1.0);
+    let fall = |length: f64| fall_of_friction(&run.body.contacts[0], length);
+    close(fall(whole), whole * LARGEST * FALL_WITH_SLIP, "fall of the friction");
+    let theta = |length: f64| {
+        let with_velocity = combine(FALL, &below, &combine(fall(length) - 1.0, &slip, &slip));
+        let falls = combine(length * FALL_WITH_DISPLACEMENT, &beside, &with_velocity);
+        largest(&falls, &matrix_of(length))
     };
     let [least, greatest] = range.matrices;
-    let at = |share: f64| {
-        let length = least * (greatest / least).powf(share);
-        theta(length, f64::min(range.slip * length, longest))
-    };
+    let at = |share: f64| theta(least * (greatest / least).powf(share));
     // The largest of samples, then by thirds.
     let samples = 24;
     let best = (0..=samples).map(|n| at(f64::from(n) / f64::from(samples))).enumerate();
@@ -384,6 +393,75 @@ fn worst_step<const D: usize, const S: usize>(
     assert_eq!(found.step_range, Some(range.steps));
 }
 
+/// The contacts of a job, with boundaries without mass where the scheme requires them.
+fn massless(contacts: String, scheme: Scheme) -> String {
+    if scheme.is_midpoint() {
+        contacts.replace("[[contact]]\n", "[[contact]]\nredistribute_mass = true\n")
+    } else {
+        contacts
+    }
+}
+
+/// `theta_step` where a pressure falls with the displacement, against the derivatives of the forces in a step just taken.
+fn derivatives_of_a_step<const D: usize, const S: usize>(
+    session: &Session,
+    mesh: &GlobalMesh<D>,
+    scheme: Scheme,
+) {
+    // The pressure falls by 10 Pa over the 1 cm about the gap, closed at the start.
+    let contacts = "[[contact]]\non = ['right']\n[contact.normal.displacement_graph]\n\
+                    points = [[-0.005, 0.0], [-0.005, 20.0], [0.005, 10.0]]\n";
+    let job = job::<D>(&massless(contacts.into(), scheme), 3.0)
+        .replace("[time]\n", &format!("[time]\nscheme = '{}'\n", scheme.name()))
+        .replace(
+            "[[support]]\non = ['left']",
+            "elasticity = { youngs_modulus = 9e5, poisson_ratio = 0.2 }\n[[support]]\non = ['left']",
+        );
+    let mut run = simulation::<D, S>(session, &job, mesh);
+    for _ in 0..2 {
+        run.advance(session).expect("a step").expect("a step");
+    }
+    let Some(formula) = scheme.formula() else { return };
+    let step = Step { time: STEP, length: STEP, previous_length: STEP };
+    let range = StepRange::of(scheme, step);
+    let mut of_step = run.scheme.matrix(session, &mut run.body, STEP).expect("matrix");
+    let found = Certificates::of(session, &run.body, &run.state, &mut of_step, range).expect("certificates");
+    let form = |form| dense_form(session, &run, |x, y| run.body.add_form(form, x, y));
+    let (mass, viscosity, elasticity) = (form(Form::Mass), form(Form::Viscosity), form(Form::Elasticity));
+    let length = formula(step).length;
+    let matrix = combine(1.0 / length, &mass, &combine(length, &elasticity, &viscosity));
+    let mut contacts = std::mem::take(&mut run.body.contacts);
+    let falls = falling(session, &run, &mut contacts);
+    let what = format!("derivatives of {}, {D}D, {} ranks", scheme.name(), session.ranks());
+    close(found.theta_step.expect("theta"), largest(&falls, &matrix), &what);
+}
+
+/// The pressure up to which a step of a scheme has one solution where friction falls with the slip.
+fn slip_pressure<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>, scheme: Scheme) {
+    let contacts = "[[contact]]\non = ['bottom']\n[contact.normal.compliance]\nstiffness = 30.0\n\
+                    [contact.friction.distance_weakening]\nstatic = 0.5\ndynamic = 0.3\ndistance = 0.25\n";
+    let job = job::<D>(&massless(contacts.into(), scheme), 3.0)
+        .replace("[time]\n", &format!("[time]\nscheme = '{}'\n", scheme.name()))
+        .replace(
+            "[[support]]\non = ['left']",
+            "elasticity = { youngs_modulus = 900, poisson_ratio = 0.2 }\n[[support]]\non = ['left']",
+        );
+    let mut run = simulation::<D, S>(session, &job, mesh);
+    let Some(formula) = scheme.formula() else { return };
+    let step = Step { time: 1.0, length: STEP, previous_length: STEP };
+    let mut of_step = run.scheme.matrix(session, &mut run.body, STEP).expect("matrix");
+    let range = StepRange::of(scheme, step);
+    let found = Certificates::of(session, &run.body, &run.state, &mut of_step, range).expect("certificates");
+    let form = |form| dense_form(session, &run, |x, y| run.body.add_form(form, x, y));
+    let (mass, viscosity, elasticity) = (form(Form::Mass), form(Form::Viscosity), form(Form::Elasticity));
+    let length = formula(step).length;
+    let matrix = combine(1.0 / length, &mass, &combine(length, &elasticity, &viscosity));
+    let fall = fall_of_friction(&run.body.contacts[0], length) / LARGEST;
+    let expected = (1.0 - Certificates::MARGIN) / largest(&sliding(session, &run, fall), &matrix);
+    let what = format!("slip pressure of {}, {D}D, {} ranks", scheme.name(), session.ranks());
+    close(found.slip_pressure_bound.expect("a bound"), expected, &what);
+}
+
 fn worst_steps<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let adaptive =
         |scheme, steps| worst_step::<D, S>(session, mesh, scheme, StepRange::adaptive(scheme, steps));
@@ -393,6 +471,14 @@ fn worst_steps<const D: usize, const S: usize>(session: &Session, mesh: &GlobalM
     let step =
         |length, previous_length| StepRange::of(Scheme::Bdf2, Step { time: 1.0, length, previous_length });
     worst_step::<D, S>(session, mesh, Scheme::Bdf2, step(0.15, 0.0).or(step(0.15, 0.15)));
+    let midpoint =
+        |length| StepRange::of(Scheme::Midpoint, Step { time: 1.0, length, previous_length: length });
+    worst_step::<D, S>(session, mesh, Scheme::Midpoint, midpoint(0.15));
+    worst_step::<D, S>(session, mesh, Scheme::Midpoint, midpoint(0.01).or(midpoint(0.3)));
+    for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2, Scheme::Midpoint] {
+        derivatives_of_a_step::<D, S>(session, mesh, scheme);
+        slip_pressure::<D, S>(session, mesh, scheme);
+    }
 }
 
 fn plane(session: &Session) {

@@ -116,6 +116,10 @@ pub struct Totals {
     pub newton_iterations: u64,
     /// Linear iterations.
     pub linear_iterations: u64,
+    /// Number of steps that passed unstable states.
+    pub unstable_steps: u64,
+    /// Linear systems that were not positive definite.
+    pub indefinite_solves: u64,
     /// Number of steps with a search for other solutions.
     pub guessed_steps: u64,
     /// Number of steps with several solutions.
@@ -182,6 +186,8 @@ impl Totals {
         self.peaks.strain = larger(self.peaks.strain, outcome.peaks.strain);
         self.newton_iterations += outcome.newton_iterations as u64;
         self.linear_iterations += outcome.linear_iterations as u64;
+        self.unstable_steps += u64::from(outcome.fell);
+        self.indefinite_solves += outcome.indefinite_solves as u64;
         self.guessed_steps += u64::from(outcome.solutions > 0);
         self.steps_with_several += u64::from(outcome.solutions > 1);
         self.most_solutions = self.most_solutions.max(outcome.solutions as u64);
@@ -270,6 +276,15 @@ mod tests {
         energy[WORK] = -6.5;
         wrong.add(&StepOutcome { energy, ..StepOutcome::default() });
         assert_eq!(wrong.energy_imbalance, 2.0);
+    }
+
+    #[test]
+    fn unstable_steps_and_indefinite_solves_are_counted() {
+        let mut totals = Totals::default();
+        for (fell, indefinite_solves) in [(true, 3), (false, 2), (true, 0), (false, 0)] {
+            totals.add(&StepOutcome { fell, indefinite_solves, ..StepOutcome::default() });
+        }
+        assert_eq!((totals.unstable_steps, totals.indefinite_solves), (2, 5));
     }
 
     #[test]

@@ -89,6 +89,7 @@ impl<const D: usize> ResultantTable<D> {
         motion: BalancedMotion<'_>,
         load: Option<&DistributedVector>,
     ) -> Result<(), Agreed> {
+        let time = motion.time;
         self.resultants.update(session, body, state, motion, load)?;
         let Self { resultants, names, with, file } = self;
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
@@ -101,14 +102,14 @@ impl<const D: usize> ResultantTable<D> {
                 };
                 let motions = obstacle.map_or([None; 2], |obstacle| obstacle.motions());
                 let [path, turn] = [0, 1].map(|number| ObstaclePath {
-                    motion: motions[number].map(|motion| motion.motion()),
+                    motion: motions[number].map(|motion| motion.balanced()),
                     is_there: with.motions[number],
                 });
                 let moment = &resultant.moment[3 - moment_axes::<D>().len()..];
                 file.row(format_args!(
                     "{},{},{name},{},{}{areas}{path}{turn}",
                     state.step,
-                    Time(state.time),
+                    Time(time),
                     Numbers(&resultant.force),
                     Numbers(moment),
                 ))?;

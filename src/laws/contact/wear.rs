@@ -107,8 +107,14 @@ impl NormalResponse {
         if node.erosion == 0.0 {
             return self.distance(velocity, pressure, node, range);
         }
-        let retreat = node.erosion / node.step_length * pressure.max(0.0);
-        self.distance(velocity - retreat, pressure, node, range)
+        // An error of the pressure is one of the retreat, too.
+        let (retreat, [width, height]) = (node.erosion / node.step_length, range);
+        self.distance(
+            velocity - retreat * pressure.max(0.0),
+            pressure,
+            node,
+            [width + retreat * height, height],
+        )
     }
 }
 
@@ -137,6 +143,20 @@ mod tests {
     }
 
     #[test]
+    fn an_error_of_the_pressure_is_measured_by_the_range_of_pressures_however_much_it_wears_off() {
+        let [wall, ..] = laws();
+        for erosion in [0.0, 1e-3, 10.0] {
+            let node = NodeContext { penetration: -0.3, step_length: 0.5, mean_from: None, erosion };
+            let velocity = |pressure: f64| (0.3 + erosion * pressure) / 0.5;
+            let range = [0.01, 5.0];
+            assert!(wall.distance_worn(velocity(4.0), 4.0, node, range) < 1e-12);
+            let off = wall.distance_worn(velocity(4.0), 4.5, node, range);
+            assert!(off <= 0.1, "{off}");
+            assert!(wall.distance_worn(velocity(4.0) + 0.02, -2.5, node, range) >= 0.5);
+        }
+    }
+
+    #[test]
     fn a_rigid_obstacle_wears_a_surface_by_hand() {
         let [wall, ..] = laws();
         // From 0.3 m before the obstacle with 2 m/s over 0.5 s: 0.7 m are worn off at 0.1 m/Pa.
@@ -146,7 +166,8 @@ mod tests {
         // 1 / (c + k / e).
         assert!((found.derivative - 1.0 / (3.0 + 5.0)).abs() < 1e-15);
         assert!(wall.distance_worn(2.0, 7.0, node, [1.0; 2]) < 1e-14);
-        assert!((wall.distance_worn(2.2, 7.0, node, [1.0; 2]) - 0.2).abs() < 1e-14);
+        // 0.2 m/s beside the graph, on which 1 m/s and 0.2 m/s for each Pa count.
+        assert!((wall.distance_worn(2.2, 7.0, node, [1.0; 2]) - 0.2 / 1.2).abs() < 1e-14);
         let slow = NodeContext { erosion: 1e-7, ..node };
         assert_eq!(wall.resolve_worn(13.0, 3.0, slow).derivative, 0.0, "as good as vertical");
         assert_eq!(wall.resolve_worn(-13.0, 3.0, node), wall.resolve(-13.0, 3.0, node), "open");

@@ -13,12 +13,14 @@ use serde_json::Value;
 use std::fmt::Write;
 
 /// Members of `summary.json` with their descriptions and units, in the order of the page: those before the figures of fields.
-const MEMBERS: [(&str, &str, &str); 10] = [
+const MEMBERS: [(&str, &str, &str); 12] = [
     ("status", "status", ""),
     ("error", "error", ""),
     ("time", "time reached", "s"),
     ("steps", "steps", ""),
     ("rejected_steps", "rejected steps", ""),
+    ("unstable_steps", "steps that passed unstable states", ""),
+    ("indefinite_solves", "indefinite linear systems", ""),
     ("newton_iterations", "Newton iterations", ""),
     ("linear_iterations", "linear iterations", ""),
     ("final_von_mises", "largest von Mises stress at the end", "Pa"),
@@ -90,6 +92,17 @@ pub(super) fn ending(summary: &Value) -> String {
         _ => "Ended",
     };
     format!("{ended}: {} steps to t = {} s on {ranks}{took}.", value("steps"), value("time"))
+}
+
+/// That steps passed unstable states, if any did.
+pub(super) fn unstable(summary: &Value) -> String {
+    match summary.get("unstable_steps").and_then(Value::as_u64) {
+        None | Some(0) => String::new(),
+        Some(steps) => paragraph(&format!(
+            "Steps that passed unstable states to another equilibrium: {steps}. Where they ended may depend on the steps and on rounding \
+             errors."
+        )),
+    }
 }
 
 /// Why the run failed, if it did.
@@ -279,6 +292,16 @@ mod tests {
         {
             assert_eq!(rate(&summary, phase, seconds), "", "{phase}");
         }
+    }
+
+    #[test]
+    fn unstable_steps_are_stated_and_nothing_where_there_are_none() {
+        assert_eq!(unstable(&json!({ "unstable_steps": 0 })) + &unstable(&json!({})), "");
+        let found = json!({ "unstable_steps": 4, "indefinite_solves": 7 });
+        assert!(unstable(&found).contains("another equilibrium: 4."));
+        let page = summary(&found);
+        assert!(page.contains(&row("steps that passed unstable states", "4")), "{page}");
+        assert!(page.contains(&row("indefinite linear systems", "7")), "{page}");
     }
 
     #[test]

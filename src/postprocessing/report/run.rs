@@ -114,6 +114,7 @@ fn head(found: &Found) -> String {
     }
     if let Some(summary) = &found.summary {
         head += &paragraph(&facts::ending(summary));
+        head += &facts::unstable(summary);
         head += &facts::reason(summary);
         head += &facts::warnings(summary);
     }

@@ -26,8 +26,9 @@
 //! `M/k' + A + k' E` (`bdf2`: from `k/2`, if a step of length `k` is much longer than the last one, to `k` in the first step; `midpoint`:
 //! `k/2`) the quotient of each motion has one peak as a function of `k'` (`worst_length.rs`), so that the ascent over motions takes the
 //! worst length of each. It starts from lengths over the whole range, because there may be several local peaks. Slopes of laws of the
-//! displacement grow with `k'` (`midpoint`: with `k`), those of friction that weakens with the slip or a state with `k`, those of damped
-//! responses do not: without inertia and viscosity their worst step is the shortest. A run that makes a step outside of the range, as
+//! displacement and of friction that weakens with the slip or a state grow with `k'`: under `midpoint` the former are those of the mean
+//! pressure over `k`, at most half as steep as the law. Those of damped responses do not depend on the step: without inertia and viscosity
+//! their worst step is the shortest. A run that makes a step outside of the range, as
 //! after a restart with other steps, renews its certificates.
 //!
 //! `m_j` is the steepest decrease of a contact graph, `m_t` that of a friction graph (slip weakening: the decrease of the

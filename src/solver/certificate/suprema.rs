@@ -47,54 +47,12 @@ const RATIO_OF_STARTS: f64 = 10.0;
 struct Steps {
     /// The least and the greatest length in s of their matrices.
     lengths: [f64; 2],
-    slip: Slip,
-}
-
-/// The length of steps by which the slip of friction grows.
-#[derive(Debug, Clone, Copy)]
-enum Slip {
-    /// This multiple of the length of the matrix.
-    OfMatrix(f64),
-    /// This length in s.
-    Whole(f64),
 }
 
 impl Steps {
-    /// The steps of a range. As slip grows by at most the longest step, and by at most a multiple of the length of the matrix, they are two
-    /// sorts where the length of the matrix may be that of the step or less.
-    fn of(range: StepRange, has_slip: bool) -> Vec<Self> {
-        let ([least, greatest], longest) = (range.matrices, range.steps[1]);
-        let bend = (longest / range.slip).clamp(least, greatest);
-        if !has_slip || bend * (1.0 + TIME_TOLERANCE) >= greatest {
-            return vec![Self { lengths: [least, greatest], slip: Slip::OfMatrix(range.slip) }];
-        }
-        vec![
-            Self { lengths: [least, bend], slip: Slip::OfMatrix(range.slip) },
-            Self { lengths: [bend, greatest], slip: Slip::Whole(longest) },
-        ]
-    }
-
     /// Whether all have a matrix of this length in s.
     fn have_length(&self, length: f64) -> bool {
         self.lengths.iter().all(|own| (own - length).abs() <= TIME_TOLERANCE * length)
-    }
-
-    /// The decreases of a contact in a step, as a multiple of the length of the matrix and a constant.
-    fn decreases(&self, [normal, tangential]: [Decrease; 2], is_midpoint: bool) -> [Decrease; 2] {
-        // Contact at the end of a step, and the matrix of half of it.
-        let whole = if is_midpoint { 2.0 } else { 1.0 };
-        let normal = Decrease { proportional: whole * normal.proportional, ..normal };
-        let Decrease { constant, proportional } = tangential;
-        let tangential = match self.slip {
-            Slip::OfMatrix(ratio) => Decrease { constant, proportional: ratio * proportional },
-            Slip::Whole(length) => Decrease { constant: constant + length * proportional, proportional: 0.0 },
-        };
-        [normal, tangential]
-    }
-
-    /// The steps of one length of the matrix in s.
-    fn at(self, length: f64) -> Self {
-        Self { lengths: [length; 2], ..self }
     }
 
     /// Lengths over the whole range, in geometric progression.
@@ -133,48 +91,40 @@ impl<'a, 'm, const D: usize, const S: usize> Suprema<'a, 'm, D, S> {
     /// Approaches the supremum from below, over all steps of the range if it is one of a step. Collective.
     pub(super) fn find(&mut self, supremum: Supremum) -> Result<f64> {
         let (session, body, state) = (self.session, self.body, self.state);
-        let whole = self.range.steps;
+        let steps = Steps { lengths: self.range.matrices };
         if supremum == Supremum::ExplicitStep {
             let start = pseudorandom_vector(body, state)?;
-            let steps = Steps { lengths: self.range.matrices, slip: Slip::OfMatrix(self.range.slip) };
+            let whole = self.range.matrices;
             let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum, whole, steps };
             return Ok(maximise(session, &mut pencil, start, None, EXPLICIT_STEP_LIMITS)?.value);
         }
-        let has_slip = |contact: &Contact<D>| {
-            contact.decreases(whole)[1].proportional > 0.0
-                || contact.decreases_per_pressure(whole).proportional > 0.0
-        };
-        let has_slip = body.contacts.iter().any(has_slip);
-        let mut most = 0.0;
-        for steps in Steps::of(self.range, has_slip) {
-            let is_of_steps = matches!(supremum, Supremum::ThetaStep | Supremum::SlipPressure);
-            if !is_of_steps || steps.have_length(self.matrix.range.matrices[0]) {
-                most = larger(most, self.climb(supremum, steps)?);
-                continue;
-            }
-            // The ascent over motions and lengths starts from the best of several lengths.
-            let mut best: Option<(f64, DistributedVector)> = None;
-            for length in steps.samples() {
-                let value = self.climb(supremum, steps.at(length))?;
-                most = larger(most, value);
-                if best.as_ref().is_none_or(|(most, _)| value > *most)
-                    && let Some(peak) = &self.peak
-                {
-                    best = Some((value, copy(peak)?));
-                }
-            }
-            if let Some((_, peak)) = best {
-                self.peak = Some(peak);
-            }
-            most = larger(most, self.climb(supremum, steps)?);
+        let is_of_steps = matches!(supremum, Supremum::ThetaStep | Supremum::SlipPressure);
+        if !is_of_steps || steps.have_length(self.matrix.range.matrices[0]) {
+            return self.climb(supremum, steps);
         }
-        Ok(most)
+        // The ascent over motions and lengths starts from the best of several lengths.
+        let mut most = 0.0;
+        let mut best: Option<(f64, DistributedVector)> = None;
+        for length in steps.samples() {
+            let value = self.climb(supremum, Steps { lengths: [length; 2] })?;
+            most = larger(most, value);
+            if best.as_ref().is_none_or(|(most, _)| value > *most)
+                && let Some(peak) = &self.peak
+            {
+                best = Some((value, copy(peak)?));
+            }
+        }
+        if let Some((_, peak)) = best {
+            self.peak = Some(peak);
+        }
+        Ok(larger(most, self.climb(supremum, steps)?))
     }
 
     /// Ascends over motions, and over the lengths of these steps. Collective.
     fn climb(&mut self, supremum: Supremum, steps: Steps) -> Result<f64> {
         let (session, body, state) = (self.session, self.body, self.state);
-        let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum, whole: self.range.steps, steps };
+        let mut pencil =
+            Pencil { body, matrix: &mut *self.matrix, supremum, whole: self.range.matrices, steps };
         let contact_response = match &self.contact_response {
             Some(contact_response) => copy(contact_response)?,
             None => {
@@ -205,7 +155,7 @@ struct Pencil<'a, 'm, const D: usize, const S: usize> {
     body: &'a Body<D, S>,
     matrix: &'a mut MatrixOfStep<'m>,
     supremum: Supremum,
-    /// The shortest and the longest step of the run in s.
+    /// The least and the greatest length in s of the matrices of the run.
     whole: [f64; 2],
     /// The steps of the suprema of steps.
     steps: Steps,
@@ -267,12 +217,8 @@ impl<const D: usize, const S: usize> Pencil<'_, '_, D, S> {
     /// The coefficients of the squares at the points of a contact.
     fn coefficients(&self, part: Part, contact: &Contact<D>) -> [f64; 2] {
         let whole = |step: [Decrease; 2]| step.map(|d| d.constant + self.steps.lengths[1] * d.proportional);
-        let is_midpoint = self.matrix.scheme.is_midpoint();
-        let own = || self.steps.decreases(contact.decreases(self.whole), is_midpoint);
-        let per_pressure = || {
-            let friction = [Decrease::default(), contact.decreases_per_pressure(self.whole)];
-            self.steps.decreases(friction, is_midpoint)
-        };
+        let own = || contact.decreases(self.whole);
+        let per_pressure = || [Decrease::default(), contact.decreases_per_pressure(self.whole)];
         match part {
             Part::Constant => own().map(|decrease| decrease.constant),
             Part::Proportional => own().map(|decrease| decrease.proportional),

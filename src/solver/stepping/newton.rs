@@ -10,7 +10,7 @@ use super::{
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
     obstacle_motions::ObstacleMotions,
-    problem::{REMEDY, SOFTENING_REMEDY, StepProblem, System},
+    problem::{MASSLESS_REMEDY, REMEDY, SOFTENING_REMEDY, StepProblem, System},
     solver::Reduced,
 };
 use crate::{
@@ -522,10 +522,14 @@ fn explain_failure<const D: usize, const S: usize>(
     if !softens {
         return problem.failed(why, REMEDY);
     }
-    let contacts = problem.body.contacts.iter().any(decreases).then_some("contact or friction");
-    let names: Vec<&str> = problem.body.softening().chain(contacts).collect();
+    let contacts = &problem.body.contacts;
+    let falls = contacts.iter().any(|contact| contact.monotonicity_constant() > 0.0);
+    let weakens = contacts.iter().any(Contact::has_decreasing_friction);
+    let own = [falls.then_some("contact"), weakens.then_some("friction")];
+    let names: Vec<&str> = problem.body.softening().chain(own.into_iter().flatten()).collect();
     let why = format!("{why}; forces of {} fall here as the body moves", names.join(", "));
-    problem.failed(&why, SOFTENING_REMEDY)
+    let is_massless = weakens && problem.body.redistributed_mass.is_some();
+    problem.failed(&why, if is_massless { MASSLESS_REMEDY } else { SOFTENING_REMEDY })
 }
 
 /// Whether pressure or friction of a contact decrease with the motion.

@@ -77,3 +77,7 @@ pub(super) const REMEDY: &str =
 /// The same where laws soften: shorter steps help only if something resists fast motions.
 pub(super) const SOFTENING_REMEDY: &str = "give the body a density or a viscosity and try a smaller [time] step, refine the mesh where these forces fall, \
      or lower the `strength` of bonds";
+
+/// The same for friction that weakens where the surface has no mass: the velocity jumps, the more the shorter the steps.
+pub(super) const MASSLESS_REMEDY: &str = "friction that weakens makes the velocity of a surface without mass jump, the more the \
+     shorter the steps: leave its mass there (`redistribute_mass = false`, under bdf2 or implicit_euler) or give the material a viscosity";

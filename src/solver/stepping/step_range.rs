@@ -14,15 +14,13 @@ pub struct StepRange {
     pub steps: [f64; 2],
     /// The least and the greatest `k'` in s.
     pub matrices: [f64; 2],
-    /// The greatest `k / k'`.
-    pub slip: f64,
 }
 
 impl StepRange {
     /// The range of a single step under a scheme.
     pub fn of(scheme: Scheme, step: Step) -> Self {
         let length = scheme.formula().map_or(step.length, |formula| formula(step).length);
-        Self { steps: [step.length; 2], matrices: [length; 2], slip: step.length / length }
+        Self { steps: [step.length; 2], matrices: [length; 2] }
     }
 
     /// The range of all fixed steps of a run.
@@ -44,18 +42,14 @@ impl StepRange {
             return all;
         }
         // `k' / k = (1 + w) / (1 + 2 w)` for any ratio `w` of successive steps.
-        Self { matrices: [0.5 * all.matrices[0], all.matrices[1]], slip: 2.0, ..all }
+        Self { matrices: [0.5 * all.matrices[0], all.matrices[1]], ..all }
     }
 
     /// The least range that contains both.
     pub fn or(self, other: Self) -> Self {
         let both =
             |[low, high]: [f64; 2], [lower, higher]: [f64; 2]| [f64::min(low, lower), f64::max(high, higher)];
-        Self {
-            steps: both(self.steps, other.steps),
-            matrices: both(self.matrices, other.matrices),
-            slip: self.slip.max(other.slip),
-        }
+        Self { steps: both(self.steps, other.steps), matrices: both(self.matrices, other.matrices) }
     }
 
     /// Whether it contains another range, up to the rounding of times.
@@ -63,9 +57,7 @@ impl StepRange {
         let near = 1.0 + TIME_TOLERANCE;
         let within =
             |[low, high]: [f64; 2], [lower, higher]: [f64; 2]| low <= near * lower && higher <= near * high;
-        within(self.steps, other.steps)
-            && within(self.matrices, other.matrices)
-            && other.slip <= near * self.slip
+        within(self.steps, other.steps) && within(self.matrices, other.matrices)
     }
 }
 
@@ -98,11 +90,9 @@ mod tests {
         {
             close(range(scheme).steps, [0.1; 2]);
             close(range(scheme).matrices, [matrix; 2]);
-            close([range(scheme).slip, 1.0], [0.1 / matrix, 1.0]);
         }
         let two = range(Scheme::Bdf2);
         close(two.matrices, [0.2 / 3.0, 0.1]);
-        close([two.slip, 1.0], [1.5, 1.0]);
     }
 
     #[test]
@@ -119,7 +109,6 @@ mod tests {
         // After 0.1 s the step of 0.05 s has w = 1/2 and k' = 0.0375 s; that of 0.1 s after it w = 2 and k' = 0.06 s.
         let two = StepRange::fixed(Scheme::Bdf2, &landings(vec![0.15], 0.25));
         close(two.matrices, [0.0375, 0.1]);
-        close([two.slip, 1.0], [0.1 / 0.06, 1.0]);
     }
 
     #[test]

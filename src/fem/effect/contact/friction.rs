@@ -415,8 +415,7 @@ impl<const D: usize> Friction<D> {
         range: [f64; 2],
         reference: ReferenceValues,
     ) -> f64 {
-        let range = [range[0].max(range[1] / reference.resistance[1]), range[1].max(reference.traction())];
-        let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
+        let [speeds, tractions] = reference.range(range, 1.0, 1);
         let distance = |(point, sliding): (&TangentialPoint<D>, Vector<D>)| {
             let open = point.along(Newton, residual);
             let traction = add_scaled(&point.whole_traction(), -1.0 / point.weight, &open);

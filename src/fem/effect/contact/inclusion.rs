@@ -29,13 +29,10 @@ impl<const D: usize> Contact<D> {
     /// residual of the equations of motion, in N; `range` scales where the law has no range of its own or a smaller one.
     pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
         let sliding = [range[2], range[3]];
-        // Without a range, the reference values are the mean pressure of the forces and the velocity that corresponds to the
-        // pressures; where the law has a range, a share of that pressure.
+        // Without a range, the reference pressure is the mean pressure of the forces; where the law has a range, a share of it.
         let share = if self.law.is_zero() || self.law.depends_on_displacement() { 1.0 } else { FORCE_SHARE };
         let reference = self.reference;
-        let range =
-            [range[0].max(range[1] / reference.resistance[0]), range[1].max(share * reference.traction())];
-        let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
+        let range = reference.range([range[0], range[1]], share, 0);
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
         let distance = |p: &Point<D>| {
             let pressure = p.pressure_at(&self.law, Newton, velocity) - p.open_pressure(residual);

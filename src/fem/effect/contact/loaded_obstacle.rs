@@ -210,6 +210,12 @@ impl LoadedMotion {
         self.converged
     }
 
+    /// Displacement in m and velocity in m/s where the equations of the last step held.
+    pub fn balanced(&self) -> [f64; 2] {
+        let ([displacement, velocity], Travel { blend, way, .. }) = (self.trial, self.travel);
+        [displacement - (way - blend.length) * velocity, velocity]
+    }
+
     /// Displacement and velocity, each at the end of the step, after the last one, before it, and at the start of the run.
     pub fn last_values(&self) -> [[f64; 4]; 2] {
         [0, 1].map(|kind| [self.trial[kind], self.converged[kind], self.earlier[kind], self.start[kind]])
@@ -438,6 +444,7 @@ mod tests {
         assert_eq!(values, [9.375, 5.25, 2.625, 0.0]);
         obstacle.commit();
         assert_eq!((obstacle.motion(), obstacle.resultant()), ([0.875, 2.5], 3.0));
+        assert_eq!(obstacle.balanced(), [0.4375, 1.75], "at the midpoint");
         // Implicit Euler to 4 m/s: 3 kg 1.5 m/s / 0.5 s = 9 N over 2 m; 1/2 3 kg (1.5 m/s)^2 are lost.
         obstacle.start(Travel::to_end(Blend::euler(0.5)), 1.0, None);
         obstacle.set_velocity(4.0);
@@ -445,6 +452,7 @@ mod tests {
         let energy = obstacle.energy_of_step(f64::NAN);
         let values = [OBSTACLE_KINETIC, OBSTACLE_WORK, WORK, OBSTACLE_NUMERICAL].map(|kind| energy[kind]);
         assert_eq!(values, [24.0, 12.0, 6.0, -3.375]);
+        assert_eq!(obstacle.balanced(), [2.875, 4.0], "at the end");
         // The second-order formula takes means of forces over the step.
         obstacle.start(
             Travel::to_end(Blend { length: 0.5, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }),

@@ -287,8 +287,13 @@ impl<const D: usize> HistoryStore for Contact<D> {
     }
 
     fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
-        if quantity == WEAR && self.wear.is_some() {
-            self.points.iter_mut().for_each(|point| point.worn[moment as usize] = values[point.node()]);
+        let Some(friction) = self.friction.as_ref().filter(|_| quantity == WEAR && self.wear.is_some())
+        else {
+            return;
+        };
+        // Of the points at an edge only one has friction, and wears.
+        for sliding in &friction.points {
+            self.points[sliding.at].worn[moment as usize] = values[sliding.node()];
         }
     }
 }
