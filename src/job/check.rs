@@ -74,8 +74,7 @@ pub(super) fn check_names(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>)
     if let Some(initial) = &job.initial {
         initial.check_in_body(&mut table.table("initial"), (mesh.dimension, job.material.hypothesis));
     }
-    let size = if table.lacks("mesh") { &[] } else { job.mesh.size() };
-    job.output.check_names(&mut table.table("output"), mesh, size);
+    job.output.check_names(&mut table.table("output"), mesh, job.mesh.size());
     warn_of_inner_facets(job, table, mesh);
 }
 

@@ -38,11 +38,6 @@ pub(crate) struct Table<'a> {
     path: String,
 }
 
-/// Whether a path is another one, or leads on from it.
-fn is_in(path: &str, other: &str) -> bool {
-    path.strip_prefix(other).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-}
-
 impl<'a> Table<'a> {
     /// The whole document, with the paths of what could not be read: nothing else is refused there.
     pub(super) fn new(root: &'a Node, unread: &'a [String], findings: &'a mut Findings) -> Self {
@@ -74,12 +69,9 @@ impl<'a> Table<'a> {
 
     /// Whether this key could not be read, or only as a part of something that could not.
     pub(super) fn is_unread(&self, key: &str) -> bool {
-        self.unread.iter().any(|part| is_in(&self.path(key), part))
-    }
-
-    /// Whether a part of this key could not be read.
-    pub(super) fn lacks(&self, key: &str) -> bool {
-        self.unread.iter().any(|part| is_in(part, &self.path(key)))
+        let path = self.path(key);
+        let mut rests = self.unread.iter().filter_map(|part| path.strip_prefix(part.as_str()));
+        rests.any(|rest| rest.is_empty() || rest.starts_with('.'))
     }
 
     /// Adds a fault at a key, which should be absent.

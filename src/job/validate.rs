@@ -81,20 +81,10 @@ impl Walk<'_> {
             Value::Table(_) if schema.accepts("object") => return self.table(node, schema, path),
             Value::Array(_) if schema.accepts("array") => return self.list(node, schema, path),
             Value::Text(text) if schema.accepts("string") => self.string(node, text, schema, path),
-            Value::Integer(number) if schema.accepts("integer") => {
-                if !self.number(node, *number as f64, schema, path) {
-                    node.value = neutral(schema, &node.at);
-                }
-                true
+            Value::Integer(number) if schema.accepts("integer") || schema.accepts("number") => {
+                self.number(node, *number as f64, schema, path)
             }
-            Value::Integer(number) if schema.accepts("number") => {
-                self.number(node, *number as f64, schema, path);
-                true
-            }
-            Value::Float(number) if schema.accepts("number") => {
-                self.number(node, *number, schema, path);
-                true
-            }
+            Value::Float(number) if schema.accepts("number") => self.number(node, *number, schema, path),
             Value::Boolean(_) if schema.accepts("boolean") => true,
             _ => {
                 self.wrong_type(node, schema, path);
@@ -253,13 +243,13 @@ impl Walk<'_> {
         }
     }
 
-    /// Whether the number is in the range of the key.
+    /// Whether the number has the type of the key, to which the range of whole numbers belongs.
     fn number(&mut self, node: &Node, number: f64, schema: Schema, path: &str) -> bool {
         let may_be = number.is_finite() || (number == f64::INFINITY && schema.may_be_infinite());
         if !may_be {
             let message = format!("`{path}` is not a finite number");
             self.faults.push(Fault::new(node.at.clone(), message, "not finite").help("give a number"));
-            return false;
+            return true;
         }
         let most = schema
             .number("maximum")
@@ -274,7 +264,7 @@ impl Walk<'_> {
             let help = format!("allowed: {}", describe::range(schema));
             self.faults.push(Fault::new(node.at.clone(), message, label).help(help));
         }
-        inside
+        inside || !schema.accepts("integer")
     }
 
     /// Whether the text has the type of the key, even if it is no name.

@@ -168,11 +168,12 @@ impl Output {
 
     /// Checks the keys with the names in the mesh. A generated body reaches from the origin to its size.
     pub(in crate::job) fn check_names(&self, table: &mut Table<'_>, mesh: MeshNames<'_>, size: &[f64]) {
+        let is_known = size.iter().all(|length| *length > 0.0);
         table.each("probe", &self.probe, |Probe { point, .. }, table| {
             if point.len() != mesh.dimension {
                 let message = format!("`{}` has {} coordinate(s)", table.path("point"), point.len());
                 table.fault("point", message, format!("a {0}D body needs {0}", mesh.dimension));
-            } else if point.iter().zip(size).any(|(x, length)| *x < 0.0 || *x > *length) {
+            } else if is_known && point.iter().zip(size).any(|(x, length)| *x < 0.0 || *x > *length) {
                 let help = format!("the body reaches from the origin to {size:?}");
                 table.fault("point", "this probe lies outside the body", help);
             }
