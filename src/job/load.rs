@@ -6,12 +6,14 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use super::check::{check, check_names};
+use super::findings::{Findings, MeshNames, Table};
 use super::petsc_options::reaches_beyond_the_run;
 use super::report::{Fault, Place, Texts};
 use super::schema::Kind;
-use super::semantic::{self, MeshNames};
 use super::source::{Node, parse};
-use super::{Job, MeshSource, set, surfaces, tables, validate};
+use super::validate;
+use super::{Job, MeshSource, set, surfaces, tables};
 use crate::error::{Error, Result};
 
 /// Largest size of a file in bytes.
@@ -51,12 +53,11 @@ impl Job {
 
 /// A document and the faults found so far.
 pub(crate) struct Document {
-    /// Its keys.
-    pub root: Node,
-    /// The texts to which faults refer.
-    pub texts: Texts,
-    /// Faults so far.
-    pub faults: Vec<Fault>,
+    root: Node,
+    texts: Texts,
+    faults: Vec<Fault>,
+    /// The paths of what could not be read.
+    unread: Vec<String>,
 }
 
 impl Document {
@@ -79,8 +80,9 @@ impl Document {
             faults.extend(set::apply(&mut root, text, index + 1).err());
         }
         tables::insert(&mut root, folder, &mut faults);
-        faults.extend(validate::faults(kind, &root, text));
-        Ok(Self { root, texts, faults })
+        let (of_keys, unread) = validate::check(kind, &mut root, text);
+        faults.extend(of_keys);
+        Ok(Self { root, texts, faults, unread })
     }
 
     /// Adds a fault at the value of `path`, or at the innermost existing table on this path.
@@ -88,33 +90,34 @@ impl Document {
         self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
     }
 
-    /// The struct of the document, or an error with all faults.
-    pub(crate) fn fill<T: DeserializeOwned>(self) -> Result<(T, Node, Texts)> {
-        if !self.faults.is_empty() {
-            return Err(self.texts.refuse(self.faults));
-        }
-        let unfit = |error: toml::de::Error| {
-            self.texts.refuse(vec![Fault::new(Place::new(0, 0..0), error.message(), "")])
-        };
-        let filled = T::deserialize(self.root.plain()).map_err(unfit)?;
-        Ok((filled, self.root, self.texts))
+    /// The struct of the document, with neutral values in place of those that could not be read.
+    pub(crate) fn fill<T: DeserializeOwned>(&self) -> Result<T> {
+        T::deserialize(self.root.plain())
+            .map_err(|error| self.texts.refuse(vec![Fault::new(Place::new(0, 0..0), error.message(), "")]))
+    }
+
+    /// An error with all faults, if there are some.
+    pub(crate) fn refuse(&self) -> Result<()> {
+        if self.faults.is_empty() { Ok(()) } else { Err(self.texts.refuse(self.faults.clone())) }
     }
 }
 
 impl Loaded {
     fn new(text: &str, name: &str, folder: &Path, overrides: &[String], colour: bool) -> Result<Self> {
         let mut document = Document::new(Kind::job(), text, (name, folder), overrides, colour)?;
-        let findings = semantic::check(&document.root);
-        document.faults.extend(findings.faults);
-        let warnings = findings.warnings;
-        let (mut job, root, texts) = document.fill::<Job>()?;
+        let mut job: Job = document.fill()?;
+        let mut findings = Findings::default();
+        check(&job, &mut Table::new(&document.root, &document.unread, &mut findings));
+        document.faults.append(&mut findings.faults);
+        document.refuse()?;
+        let Document { root, texts, .. } = document;
         job.resolve_paths(folder, Path::new(name));
         let unread = surfaces::read(&mut job)
             .into_iter()
             .map(|[key, message, help]| Fault::new(root.deepest(&key).at.clone(), message, "").help(help));
         let faults: Vec<Fault> = unread.collect();
         if faults.is_empty() {
-            Ok(Self { job, warnings, is_trusted: false, root, texts })
+            Ok(Self { job, warnings: findings.warnings, is_trusted: false, root, texts })
         } else {
             Err(texts.refuse(faults))
         }
@@ -149,7 +152,8 @@ impl Loaded {
 
     /// Checks the job against a mesh that was read from a file; adds warnings to [`Loaded::warnings`].
     pub fn check_mesh(&mut self, mesh: MeshNames<'_>) -> Result<()> {
-        let findings = semantic::check_names(&self.root, mesh);
+        let mut findings = Findings::default();
+        check_names(&self.job, &mut Table::new(&self.root, &[], &mut findings), mesh);
         if !findings.faults.is_empty() {
             return Err(self.texts.refuse(findings.faults));
         }

@@ -1,17 +1,18 @@
 //! The job: a TOML document that defines a run.
 //!
 //! A document is parsed with the position of every key (`source`), changed by overrides (`set`), checked against the schema of the
-//! structs (`validate`) and for consistency (`semantic`). All faults are reported at once (`report`); only a document without
-//! faults becomes a [`Job`].
+//! structs (`validate`), and fills them. The filled [`Job`] is checked for consistency, each table by the file of its struct and
+//! tables that refer to each other in `check`. All faults are reported at once (`report`).
 
+mod check;
 mod describe;
 mod document;
 mod effective;
+mod findings;
 mod load;
 mod petsc_options;
 mod report;
 mod schema;
-mod semantic;
 mod set;
 mod source;
 mod surfaces;
@@ -23,7 +24,7 @@ pub use describe::{describe, describe_json, describe_markdown};
 pub(crate) use describe::{describe_kind, markdown_of};
 pub use document::*;
 pub use effective::differing_keys;
+pub use findings::MeshNames;
 pub use load::Loaded;
 pub(crate) use load::{Document, by_extension, normal, read};
 pub(crate) use schema::{Kind, Schema, schema_of};
-pub use semantic::MeshNames;

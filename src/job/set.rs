@@ -50,7 +50,7 @@ fn read_value(text: &str, start: usize, file: usize) -> Result<Node, Fault> {
     match parse_value(text, file, start..end) {
         Ok(node) => Ok(node),
         Err(_) if is_bare(first, &text[start..end]) => {
-            Ok(Node { value: Value::Text(text[start..end].to_owned()), at: place.clone(), key: place })
+            Ok(Node::new(Value::Text(text[start..end].to_owned()), &place))
         }
         Err(fault) => Err(fault.help(help)),
     }
@@ -68,9 +68,9 @@ fn insert(node: &mut Node, parts: &[&str], value: Node, key: &Place) -> Result<(
     };
     // A list that does not exist yet may be created by its entry 0.
     let child = if rest.first() == Some(&"0") {
-        Node { value: Value::Array(Vec::new()), at: key.clone(), key: key.clone() }
+        Node::new(Value::Array(Vec::new()), key)
     } else {
-        empty_table(key)
+        Node::new(Value::Table(Default::default()), key)
     };
     match &mut node.value {
         Value::Table(table) => insert(table.entry((*part).to_owned()).or_insert(child), rest, value, key),
@@ -95,10 +95,6 @@ fn insert(node: &mut Node, parts: &[&str], value: Node, key: &Place) -> Result<(
             Err(Fault::new(key.clone(), message, "").help("delete the last part of the key"))
         }
     }
-}
-
-fn empty_table(at: &Place) -> Node {
-    Node { value: Value::Table(Default::default()), at: at.clone(), key: at.clone() }
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -55,6 +54,11 @@ impl Value {
 }
 
 impl Node {
+    /// A value at this position.
+    pub(super) fn new(value: Value, at: &Place) -> Self {
+        Self { value, at: at.clone(), key: at.clone() }
+    }
+
     /// The node at `path`, whose parts are keys and list positions, joined by dots.
     pub(crate) fn find(&self, path: &str) -> Option<&Node> {
         if path.is_empty() {
@@ -82,25 +86,6 @@ impl Node {
             }
         }
         node
-    }
-
-    /// Number of items of the list at `path`; 0 if there is no list.
-    pub(crate) fn count(&self, path: &str) -> usize {
-        match self.find(path).map(|node| &node.value) {
-            Some(Value::Array(items)) => items.len(),
-            _ => 0,
-        }
-    }
-
-    /// The value at `path` as a `T`; `None` if it does not exist or has another type.
-    pub(crate) fn read<T: DeserializeOwned>(&self, path: &str) -> Option<T> {
-        T::deserialize(self.find(path)?.plain()).ok()
-    }
-
-    /// The choice `name` at `path` as a `T`; other keys beside it are ignored.
-    pub(crate) fn read_choice<T: DeserializeOwned>(&self, path: &str, name: &str) -> Option<T> {
-        let chosen = self.find(path)?.child(name)?.plain();
-        T::deserialize(toml::Value::Table([(name.to_owned(), chosen)].into_iter().collect())).ok()
     }
 
     /// The value without positions.
@@ -159,7 +144,7 @@ fn node(spanned: Spanned<DeValue<'_>>, file: usize, offset: usize) -> Node {
         }
         DeValue::Table(table) => return table_node(table, file, offset, at),
     };
-    Node { value, key: at.clone(), at }
+    Node::new(value, &at)
 }
 
 fn table_node(table: DeTable<'_>, file: usize, offset: usize, at: Place) -> Node {
@@ -172,5 +157,5 @@ fn table_node(table: DeTable<'_>, file: usize, offset: usize, at: Place) -> Node
             (key.into_inner().into_owned(), child)
         })
         .collect();
-    Node { value: Value::Table(children), key: at.clone(), at }
+    Node::new(Value::Table(children), &at)
 }

@@ -1,7 +1,5 @@
 //! Checks every key against the schema: names, types, ranges and choices. All faults are collected.
 
-use std::collections::BTreeMap;
-
 use super::describe;
 use super::report::{Fault, Place};
 use super::schema::{Kind, Schema};
@@ -16,21 +14,45 @@ use crate::laws::{
 const VARIABLES: [(&str, Variable); 4] =
     [("t", Variable::T), ("x", Variable::X), ("y", Variable::Y), ("z", Variable::Z)];
 
-/// The faults of single keys.
-pub(super) fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {
-    let mut walk = Walk { kind, text, faults: Vec::new() };
+/// The faults of single keys, and what could not be read. Where a required key is missing or a value has another type, the document
+/// gets a neutral value, so that it fills its structs; it loses unknown keys.
+pub(super) fn check(kind: Kind, root: &mut Node, text: &str) -> (Vec<Fault>, Vec<String>) {
+    let mut walk = Walk { kind, text, faults: Vec::new(), unread: Vec::new() };
     walk.value(root, kind.root(), "");
-    walk.faults
+    (walk.faults, walk.unread)
 }
 
 struct Walk<'a> {
     kind: Kind,
     text: &'a str,
     faults: Vec<Fault>,
+    unread: Vec<String>,
 }
 
 impl Walk<'_> {
-    fn value(&mut self, node: &Node, schema: Schema, path: &str) {
+    /// Takes a neutral value in place of one that cannot be read.
+    fn repair(&mut self, node: &mut Node, schema: Schema, path: &str) {
+        node.value = neutral(schema, &node.at);
+        self.lack(path);
+    }
+
+    /// Notes that a key could not be read. The keys of a table within a table, such as those of a law, belong together.
+    fn lack(&mut self, path: &str) {
+        let table = path.rsplit_once('.').map(|(table, _)| table);
+        let is_inner =
+            |table: &&str| table.split('.').filter(|part| part.parse::<usize>().is_err()).count() > 1;
+        self.unread.push(table.filter(is_inner).unwrap_or(path).to_owned());
+    }
+
+    /// An item of a list, or a key with a free name: those beside it do not depend on it.
+    fn item(&mut self, node: &mut Node, schema: Schema, path: &str) {
+        let before = self.unread.len();
+        self.value(node, schema, path);
+        let outer = self.unread[before..].iter_mut().filter(|table| table.len() < path.len());
+        outer.for_each(|table| *table = path.to_owned());
+    }
+
+    fn value(&mut self, node: &mut Node, schema: Schema, path: &str) {
         if let Some(variables) = schema.text("variables") {
             self.variables(node, variables, path);
         }
@@ -45,71 +67,95 @@ impl Walk<'_> {
             .iter()
             .find(|one| one.get("const").is_null() && one.tag().is_none() && one.accepts(kind));
         match (&node.value, other) {
-            (Value::Text(word), _) if words.contains(&word.as_str()) => {}
-            (_, Some(other)) => self.value(node, *other, path),
+            (Value::Text(word), _) if words.contains(&word.as_str()) => return,
+            (_, Some(other)) => return self.value(node, *other, path),
             (Value::Text(word), None) if !words.is_empty() => self.unknown_word(node, word, &words, path),
-            (Value::Table(table), None) if !tagged.is_empty() => self.one_of(node, table, schema, path),
+            (Value::Table(_), None) if !tagged.is_empty() => return self.one_of(node, schema, path),
             _ => self.wrong_type(node, schema, path),
         }
+        self.repair(node, schema, path);
     }
 
-    fn plain(&mut self, node: &Node, schema: Schema, path: &str) {
-        match &node.value {
-            Value::Table(table) if schema.accepts("object") => self.table(node, table, schema, path),
-            Value::Array(items) if schema.accepts("array") => self.list(node, items, schema, path),
+    fn plain(&mut self, node: &mut Node, schema: Schema, path: &str) {
+        let fits = match &node.value {
+            Value::Table(_) if schema.accepts("object") => return self.table(node, schema, path),
+            Value::Array(_) if schema.accepts("array") => return self.list(node, schema, path),
             Value::Text(text) if schema.accepts("string") => self.string(node, text, schema, path),
             Value::Integer(number) if schema.accepts("integer") || schema.accepts("number") => {
-                self.number(node, *number as f64, schema, path);
+                self.number(node, *number as f64, schema, path)
             }
             Value::Float(number) if schema.accepts("number") => self.number(node, *number, schema, path),
-            Value::Boolean(_) if schema.accepts("boolean") => {}
-            _ => self.wrong_type(node, schema, path),
+            Value::Boolean(_) if schema.accepts("boolean") => true,
+            _ => {
+                self.wrong_type(node, schema, path);
+                false
+            }
+        };
+        if !fits {
+            self.repair(node, schema, path);
         }
     }
 
-    fn table(&mut self, node: &Node, table: &BTreeMap<String, Node>, schema: Schema, path: &str) {
+    fn table(&mut self, node: &mut Node, schema: Schema, path: &str) {
+        let Node { value: Value::Table(table), key: place, .. } = node else { return };
         let known: Vec<&str> = schema.properties().map(|(key, _)| key.as_str()).collect();
         let mut meant = Vec::new();
-        for (key, child) in table {
+        table.retain(|key, child| {
             let inner = join(path, key);
             match (schema.property(key), schema.items()) {
                 (Some(property), _) => self.value(child, property, &inner),
                 (None, Some(free)) => self.free_key(child, free, schema, &inner),
-                (None, None) => meant.extend(self.unknown_key(child, key, &known, path)),
+                (None, None) => {
+                    let near = self.unknown_key(child, key, &known, path);
+                    near.iter().for_each(|near| self.lack(&join(path, near)));
+                    meant.extend(near);
+                    return false;
+                }
             }
-        }
+            true
+        });
         for key in schema.required() {
-            if !table.contains_key(key) && !meant.contains(&key) {
-                self.missing(node, key, schema.property(key), path);
+            let Some(property) = schema.property(key).filter(|_| !table.contains_key(key)) else { continue };
+            if !meant.contains(&key) {
+                self.missing(place, key, property, path);
             }
+            let child = table.entry(key.to_owned()).or_insert(Node::new(Value::Date, place));
+            self.repair(child, property, &join(path, key));
+        }
+        // In place of an expression: a table whose file could not be read.
+        if schema.text("format") == Some("expression") {
+            self.repair(node, schema, path);
         }
     }
 
     /// Checks a key whose name is free.
-    fn free_key(&mut self, child: &Node, free: Schema, schema: Schema, path: &str) {
+    fn free_key(&mut self, child: &mut Node, free: Schema, schema: Schema, path: &str) {
         let split = matches!(&child.value, Value::Table(inner) if inner.values().any(|node| matches!(node.value, Value::Table(_) | Value::Array(_))));
         match schema.text("key_help").filter(|_| split) {
             Some(help) => {
                 let message = format!("`{path}` is not a complete name");
                 self.faults.push(Fault::new(child.key.clone(), message, "").help(help));
+                child.value = neutral(free, &child.at);
+                self.unread.push(path.to_owned());
             }
-            None => self.value(child, free, path),
+            None => self.item(child, free, path),
         }
     }
 
-    fn one_of(&mut self, node: &Node, table: &BTreeMap<String, Node>, schema: Schema, path: &str) {
+    fn one_of(&mut self, node: &mut Node, schema: Schema, path: &str) {
+        let Node { value: Value::Table(table), key: place, .. } = node else { return };
         let tagged = schema.tagged();
         let choices: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
         // Keys that each of the choices may have beside it.
         let common = schema.properties().map(|(key, _)| key.as_str());
         let known: Vec<&str> = choices.iter().copied().chain(common).collect();
-        let mut present: Vec<(&str, &Node)> = Vec::new();
+        let mut present: Vec<(Place, &str)> = Vec::new();
         let mut meant = None;
-        for (key, child) in table {
+        for (key, child) in table.iter_mut() {
             let inner = join(path, key);
             match (tagged.iter().find(|(name, _)| name == key), schema.property(key)) {
                 (Some((name, branch)), _) => {
-                    present.push((name, child));
+                    present.push((child.key.clone(), name));
                     if let Some(property) = branch.property(name) {
                         self.value(child, property, &inner);
                     }
@@ -118,19 +164,22 @@ impl Walk<'_> {
                 (None, None) => meant = meant.or(self.unknown_key(child, key, &known, path)),
             }
         }
-        present.sort_by_key(|(_, child)| &child.key);
-        for (name, child) in present.iter().skip(1) {
-            let message = format!("`{name}` and `{}` exclude each other", present[0].0);
+        present.sort();
+        for (child, name) in present.iter().skip(1) {
+            let message = format!("`{name}` and `{}` exclude each other", present[0].1);
             let help = format!("give exactly one of {} in {}", list(&choices), header(path));
-            self.faults
-                .push(Fault::new(child.key.clone(), message, "only one of them is allowed").help(help));
+            self.faults.push(Fault::new(child.clone(), message, "only one of them is allowed").help(help));
         }
         if present.is_empty() && meant.is_none() {
             let lacks = if table.is_empty() { "is empty" } else { "is incomplete" };
             let message = format!("{} {lacks}", header(path));
             let help = format!("give exactly one of {}", list(&choices));
-            self.faults.push(Fault::new(node.key.clone(), message, "").help(help));
+            self.faults.push(Fault::new(place.clone(), message, "").help(help));
         }
+        if present.len() != 1 {
+            return self.repair(node, schema, path);
+        }
+        table.retain(|key, _| known.contains(&key.as_str()));
     }
 
     fn unknown_key(
@@ -157,48 +206,50 @@ impl Walk<'_> {
         near
     }
 
-    fn missing(&mut self, node: &Node, key: &str, schema: Option<Schema>, path: &str) {
+    fn missing(&mut self, at: &Place, key: &str, schema: Schema, path: &str) {
         let place = if path.is_empty() { format!("the {}", self.kind.name) } else { header(path) };
         let message = format!("missing key `{key}` in {place}");
         let label = if path.is_empty() { "" } else { "this key is missing here" };
-        let mut fault = Fault::new(node.key.clone(), message, label);
-        if let Some(schema) = schema {
-            let meaning = schema.text("description").unwrap_or_default().replace('\n', " ");
-            fault = fault.help(format!("`{key}`: {meaning}"));
-            match schema.get("examples").get(0) {
-                Some(example) => {
-                    fault = fault.help(format!("for example: {key} = {}", describe::toml(example)))
-                }
-                None if schema.accepts("object") => {
-                    fault = fault.help(format!("add a table {}", header(&join(path, key))))
-                }
-                None => {}
+        let mut fault = Fault::new(at.clone(), message, label);
+        let meaning = schema.text("description").unwrap_or_default().replace('\n', " ");
+        fault = fault.help(format!("`{key}`: {meaning}"));
+        match schema.get("examples").get(0) {
+            Some(example) => fault = fault.help(format!("for example: {key} = {}", describe::toml(example))),
+            None if schema.accepts("object") => {
+                fault = fault.help(format!("add a table {}", header(&join(path, key))))
             }
+            None => {}
         }
         self.faults.push(fault);
     }
 
-    fn list(&mut self, node: &Node, items: &[Node], schema: Schema, path: &str) {
+    fn list(&mut self, node: &mut Node, schema: Schema, path: &str) {
+        let Node { value: Value::Array(items), at, .. } = node else { return };
         let (least, most) = (schema.number("minItems").unwrap_or(0.0), schema.number("maxItems"));
         let count = items.len() as f64;
         if count < least || most.is_some_and(|most| count > most) {
             let wanted = if most == Some(least) { format!("{least}") } else { format!("at least {least}") };
             let message = format!("`{}` has {count} item{}", path, if count == 1.0 { "" } else { "s" });
-            self.faults.push(Fault::new(node.at.clone(), message, format!("{wanted} expected")));
+            self.faults.push(Fault::new(at.clone(), message, format!("{wanted} expected")));
         }
         if let Some(inner) = schema.items() {
-            for (index, item) in items.iter().enumerate() {
-                self.value(item, inner, &join(path, &index.to_string()));
+            for (index, item) in items.iter_mut().enumerate() {
+                self.item(item, inner, &join(path, &index.to_string()));
             }
+        }
+        // Only an array of fixed length has another type with another number of items.
+        if most == Some(least) && count != least {
+            self.repair(node, schema, path);
         }
     }
 
-    fn number(&mut self, node: &Node, number: f64, schema: Schema, path: &str) {
+    /// Whether the number has the type of the key, to which the range of whole numbers belongs.
+    fn number(&mut self, node: &Node, number: f64, schema: Schema, path: &str) -> bool {
         let may_be = number.is_finite() || (number == f64::INFINITY && schema.may_be_infinite());
         if !may_be {
             let message = format!("`{path}` is not a finite number");
             self.faults.push(Fault::new(node.at.clone(), message, "not finite").help("give a number"));
-            return;
+            return true;
         }
         let most = schema
             .number("maximum")
@@ -213,15 +264,17 @@ impl Walk<'_> {
             let help = format!("allowed: {}", describe::range(schema));
             self.faults.push(Fault::new(node.at.clone(), message, label).help(help));
         }
+        inside || !schema.accepts("integer")
     }
 
-    fn string(&mut self, node: &Node, text: &str, schema: Schema, path: &str) {
+    /// Whether the text has the type of the key, even if it is no name.
+    fn string(&mut self, node: &Node, text: &str, schema: Schema, path: &str) -> bool {
         if text.is_empty() && (schema.number("minLength").is_some() || schema.text("format") == Some("path"))
         {
             self.faults.push(Fault::new(node.at.clone(), format!("`{path}` is empty"), "a name is expected"));
         }
         match schema.text("format") {
-            Some("expression") => self.expression(node, text, path),
+            Some("expression") => return self.expression(node, text, path),
             Some("name") => {
                 let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
                 if text.is_empty() || !text.chars().all(fits) {
@@ -232,10 +285,12 @@ impl Walk<'_> {
             }
             _ => {}
         }
+        true
     }
 
-    fn expression(&mut self, node: &Node, text: &str, path: &str) {
-        if let Err(fault) = Expression::parse(text) {
+    fn expression(&mut self, node: &Node, text: &str, path: &str) -> bool {
+        let parsed = Expression::parse(text);
+        if let Err(fault) = &parsed {
             // Within a string without escape sequences the exact position of the fault is known.
             let (start, end) = (node.at.start + 1, node.at.end.saturating_sub(1));
             let at = if node.at.file == 0 && self.text.get(start..end) == Some(text) {
@@ -243,8 +298,9 @@ impl Walk<'_> {
             } else {
                 node.at.clone()
             };
-            self.faults.push(Fault::new(at, format!("in `{path}`: {}", fault.message), "").help(fault.help));
+            self.faults.push(Fault::new(at, format!("in `{path}`: {}", fault.message), "").help(&fault.help));
         }
+        parsed.is_ok()
     }
 
     /// Finds expressions in other variables than these, such as "x, y, z".
@@ -313,6 +369,28 @@ impl Walk<'_> {
     }
 }
 
+/// A value that the schema allows, apart from its range: the default choice, or the last one.
+fn neutral(schema: Schema, at: &Place) -> Value {
+    let node = |schema: Schema| Node::new(neutral(schema, at), at);
+    if let Some(word) = schema.text("const").or(schema.text("default")) {
+        Value::Text(word.to_owned())
+    } else if let Some(last) = schema.alternatives().last() {
+        neutral(*last, at)
+    } else if schema.accepts("number") || schema.accepts("integer") {
+        Value::Integer(schema.number("minimum").unwrap_or(0.0) as i64)
+    } else if schema.accepts("string") {
+        Value::Text(String::new())
+    } else if schema.accepts("boolean") {
+        Value::Boolean(false)
+    } else if schema.accepts("array") {
+        let count = schema.number("minItems").unwrap_or(0.0) as usize;
+        Value::Array(schema.items().into_iter().flat_map(|item| vec![node(item); count]).collect())
+    } else {
+        let keys = schema.required().filter_map(|key| Some((key.to_owned(), node(schema.property(key)?))));
+        Value::Table(keys.collect())
+    }
+}
+
 fn json_kind(value: &Value) -> &'static str {
     match value {
         Value::Text(_) => "string",
@@ -330,4 +408,60 @@ fn join(path: &str, key: &str) -> String {
 
 fn list(names: &[&str]) -> String {
     names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{Diagonal, Job, MeshSource, source::parse};
+    use serde::Deserialize;
+
+    fn filled(text: &str) -> (Job, Vec<String>, usize) {
+        let mut root = parse(text).expect("TOML");
+        let (faults, unread) = check(Kind::job(), &mut root, text);
+        (Job::deserialize(root.plain()).expect("a job"), unread, faults.len())
+    }
+
+    #[test]
+    fn keys_that_can_be_read_fill_the_job_beside_others() {
+        let (job, unread, faults) = filled(
+            "material = { density = 2, damage = 1, elastcity = {} }\n\
+             mesh.rectangle = { size = [1, 2, 3], cells = [4, -1], diagonal = \"rigth\" }\n\
+             time = { end = \"1\", step = -0.5 }\nsolver.petsc = { a = 1, b = \"2\" }\n\
+             [[support]]\non = [1, \"left\"]\nfix = \"al\"\n[[support]]\n[[support]]\non = \"left\"\nfix = [\"x\"]\n\
+             [[traction]]\non = [\"top\"]\nvalue = [\"1 +\", 3, { table = \"none.csv\" }]\n",
+        );
+        assert_eq!(faults, 13);
+        assert_eq!((job.time.end, job.time.step), (0.0, -0.5), "only the range of the step is wrong");
+        assert!(job.material.density.is_some() && job.material.damage.is_some(), "keys stay present");
+        let MeshSource::Rectangle(mesh) = job.mesh.source else { panic!("not a rectangle") };
+        assert_eq!((mesh.size, mesh.cells, mesh.diagonal), ([0.0; 2], [4, 1], Diagonal::Right));
+        assert_eq!(job.solver.petsc["b"], "2");
+        let on: Vec<_> = job.support.iter().map(|support| support.on.join(" ")).collect();
+        assert_eq!(on, [" left", "", ""]);
+        assert_eq!(job.traction[0].value[1].evaluate(0.0, &[]), 3.0);
+        for table in [
+            "material.damage",
+            "material.elasticity",
+            "mesh.rectangle",
+            "time.end",
+            "solver.petsc.a",
+            "support.0.fix",
+            "support.0.on.0",
+            "support.1.on",
+            "traction.0.value.0",
+        ] {
+            assert!(unread.iter().any(|path| path == table), "{table} is not in {unread:?}");
+        }
+        assert!(!unread.iter().any(|path| path == "solver" || path == "traction.0"), "{unread:?}");
+    }
+
+    #[test]
+    fn any_choice_that_is_missing_or_made_twice_fills_the_job() {
+        for mesh in ["", "mesh = {}", "mesh.file = 1", "mesh = { file = \"a\", box = 1 }", "mesh.order = 2"] {
+            let (job, unread, faults) = filled(&format!("{mesh}\n[[contact]]\nnormal.graph = 1\n"));
+            assert!(faults >= 4 && unread.iter().any(|path| path.starts_with("mesh")), "{mesh}: {unread:?}");
+            assert_eq!(job.contact[0].normal.name(), "graph");
+        }
+    }
 }

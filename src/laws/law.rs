@@ -1,9 +1,9 @@
 //! Shared by all families of laws: faults of their keys, a root finder for scalar equations, and the dispatch to the chosen law.
 
-/// A fault of a key of a law.
+/// A fault of a key of a law, or of another table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LawFault {
-    /// The dotted key, relative to the table that was checked.
+    /// The dotted key, relative to the table that was checked; empty for this table.
     pub key: String,
     /// Whether the key should be absent; otherwise its value is wrong.
     pub is_at_key: bool,
@@ -26,7 +26,8 @@ impl LawFault {
 
     /// The same fault, with its key relative to the table that contains `table`.
     pub fn within(self, table: &str) -> Self {
-        Self { key: format!("{table}.{}", self.key), ..self }
+        let key = if self.key.is_empty() { table.to_owned() } else { format!("{table}.{}", self.key) };
+        Self { key, ..self }
     }
 }
 

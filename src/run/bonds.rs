@@ -74,9 +74,7 @@ fn longest_edge<const D: usize>(corners: &[Vector<D>; D]) -> f64 {
 fn modulus_behind<const D: usize>(job: &Job, mesh: &Mesh<D>, facet: u32) -> Option<f64> {
     let cell = mesh.facet_cells[facet as usize] as usize;
     let name = &mesh.regions[usize::from(mesh.cell_regions[cell])];
-    let region = job.region.iter().find(|region| region.name == *name);
-    let material = region.map_or(&job.material, |region| &region.material);
-    let law = material.elasticity.as_ref()?;
+    let law = job.material_of(name).elasticity.as_ref()?;
     let modulus = law.youngs_modulus.evaluate(0.0, &mesh.facet_corners(facet)[0]);
     let is_plane_stress = job.material.hypothesis == Some(Hypothesis::PlaneStress);
     Some(if is_plane_stress { modulus } else { modulus / (1.0 - law.poisson_ratio * law.poisson_ratio) })

@@ -171,10 +171,8 @@ fn extent<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Vec<[f64; 2]> {
 fn may_conserve<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) -> bool {
     let names = body.effect_names();
     let supports = ["damage", "adhesion", "contact_memory"].iter().all(|name| !names.contains(name));
-    let mut materials = job.region.iter().map(|region| &region.material).chain([&job.material]);
-    let is_inertial = materials.all(|material| material.density.is_some());
-    let turns =
-        job.contact.iter().filter_map(|contact| contact.obstacle_load.as_ref()?.moment.as_ref()).count() > 0;
+    let is_inertial = job.materials().all(|(_, material)| material.density.is_some());
+    let turns = job.contact.iter().any(|contact| contact.moment().is_some());
     supports && is_inertial && !turns && job.time.adaptive.is_none() && body.support_motion.is_none()
 }
 

@@ -29,8 +29,7 @@ pub(super) struct Materials {
 impl Materials {
     /// The materials of a job. Collective.
     pub(super) fn new<const D: usize>(session: &Session, job: &Job, mesh: &Mesh<D>) -> Result<Self, Agreed> {
-        let given: Vec<&job::Material> =
-            std::iter::once(&job.material).chain(job.region.iter().map(|r| &r.material)).collect();
+        let given: Vec<(String, &job::Material)> = job.materials().collect();
         let of_name = |name: &String| job.region.iter().position(|r| r.name == *name).map_or(0, |at| at + 1);
         let named: Vec<usize> = mesh.regions.iter().map(of_name).collect();
         let mut counts = vec![0; given.len()];
@@ -44,10 +43,10 @@ impl Materials {
             of_region,
             of_cells: Vec::new(),
         };
-        let tables: Vec<(&job::Material, String)> = used.iter().map(|&at| (given[at], path_of(at))).collect();
+        let tables: Vec<(String, &job::Material)> = used.iter().map(|&at| given[at].clone()).collect();
         let cells = found.add_cells(mesh, &tables);
         let cells = session.agree(cells)?;
-        let of_tables = tables.iter().enumerate().map(|(table, (material, _))| {
+        let of_tables = tables.iter().enumerate().map(|(table, (_, material))| {
             if !material.has_expressions() {
                 return material.with(material.numbers_at(&[]));
             }
@@ -72,16 +71,16 @@ impl Materials {
     fn add_cells<const D: usize>(
         &mut self,
         mesh: &Mesh<D>,
-        tables: &[(&job::Material, String)],
+        tables: &[(String, &job::Material)],
     ) -> Result<Vec<(usize, Material<f64>)>, Error> {
         let mut found: Vec<(usize, Material<f64>)> = Vec::new();
-        if !tables.iter().any(|(material, _)| material.has_expressions()) {
+        if !tables.iter().any(|(_, material)| material.has_expressions()) {
             return Ok(found);
         }
         let mut numbers = HashMap::new();
         for cell in 0..mesh.cell_count() {
             let table = self.table_of_cell(mesh, cell);
-            let (material, path) = &tables[table];
+            let (path, material) = &tables[table];
             if !material.has_expressions() {
                 self.of_cells.push(table as u32);
                 continue;
@@ -115,9 +114,4 @@ impl Materials {
     pub(super) fn table_of_cell<const D: usize>(&self, mesh: &Mesh<D>, cell: usize) -> usize {
         self.of_region[usize::from(mesh.cell_regions[cell])]
     }
-}
-
-/// The path in the job of the main material, or of that of a region.
-fn path_of(at: usize) -> String {
-    at.checked_sub(1).map_or_else(|| "material".to_owned(), |region| format!("region.{region}.material"))
 }

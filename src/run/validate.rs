@@ -3,7 +3,7 @@
 use crate::{
     error::Result,
     fem::{body::Body, effect::Contact},
-    job::{Job, Loaded, Material, MeshNames},
+    job::{Loaded, MeshNames},
     mesh::{Mesh, free_motions},
     parallel::{agreement::Agreed, session::Session},
 };
@@ -66,7 +66,7 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
 ) -> Result<(), Agreed> {
     let mesh = &body.mesh;
     let has_mass: Vec<bool> =
-        mesh.regions.iter().map(|region| material_of(&loaded.job, region).density.is_some()).collect();
+        mesh.regions.iter().map(|region| loaded.job.material_of(region).density.is_some()).collect();
     if has_mass.iter().all(|&has| has) {
         return Ok(());
     }
@@ -94,16 +94,11 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
     )))
 }
 
-/// The material of a region of the mesh.
-fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
-    job.region.iter().find(|r| r.name == region).map_or(&job.material, |r| &r.material)
-}
-
 /// Refuses materials whose velocity the scheme can't determine.
 fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Result<()> {
     let scheme = loaded.job.time.scheme;
     for region in &mesh.regions {
-        let material = material_of(&loaded.job, region);
+        let material = loaded.job.material_of(region);
         let place = if loaded.job.region.is_empty() { "" } else { &*format!(" of region \"{region}\"") };
         if scheme.is_midpoint() && material.density.is_none() {
             return Err(loaded.fault(

@@ -6,6 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::job::Scalar;
+use crate::job::findings::{MeshNames, Table};
+use crate::laws::material::Hypothesis;
 
 /// A support: boundaries with fixed or prescribed components of the displacement, or with springs and dashpots. A support has
 /// `fix`, or one or more of `stiffness`, `damping` and `absorbing`.
@@ -205,4 +207,174 @@ pub struct InitialStress {
     #[serde(skip_serializing_if = "is_zero")]
     #[schemars(extend("variables" = "x, y, z", "unit" = "Pa"))]
     pub xz: Scalar,
+}
+
+impl Fix {
+    /// The number of components that are fixed in a body of this dimension.
+    fn count(&self, dimension: usize) -> usize {
+        match self {
+            Self::Keyword(FixedDirections::All) => dimension,
+            Self::Keyword(FixedDirections::Normal) => 1,
+            Self::Axes(axes) => axes.len(),
+        }
+    }
+
+    fn axes(&self) -> &[Axis] {
+        if let Self::Axes(axes) = self { axes } else { &[] }
+    }
+
+    /// Whether all components are fixed in a body of this dimension.
+    fn is_complete(&self, dimension: usize) -> bool {
+        let axes = [Axis::X, Axis::Y, Axis::Z];
+        *self == Self::Keyword(FixedDirections::All)
+            || axes[..dimension].iter().all(|axis| self.axes().contains(axis))
+    }
+}
+
+impl Support {
+    /// Whether no component of its whole boundaries is free in a body of this dimension.
+    pub(in crate::job) fn holds_all(&self, dimension: usize) -> bool {
+        self.part.is_none() && self.fix.as_ref().is_some_and(|fix| fix.is_complete(dimension))
+    }
+
+    /// Whether it moves the components that it fixes, by which key.
+    pub(in crate::job) fn motions(&self) -> impl Iterator<Item = (&'static str, &[Scalar])> {
+        let motions = [("displacement", &self.displacement), ("velocity", &self.velocity)];
+        motions.into_iter().filter_map(|(key, values)| Some((key, values.as_deref()?)))
+    }
+
+    /// A support either determines components or gives way.
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
+        table.refuse_repeats("on", "boundary");
+        table.refuse_repeats("fix", "axis");
+        let gives = [
+            ("stiffness", self.stiffness.is_some()),
+            ("damping", self.damping.is_some()),
+            ("absorbing", self.absorbing),
+        ];
+        match (&self.fix, gives.into_iter().find(|(_, gives)| *gives)) {
+            (Some(_), Some((key, _))) => {
+                let help = "give springs and dashpots a [[support]] of their own";
+                table.fault_at_key(key, format!("a support with `fix` can't have `{key}`"), help);
+            }
+            (None, None) => {
+                let help =
+                    "add fix = \"all\", or stiffness, damping or absorbing for a support that gives way";
+                table.fault("", "this support has neither `fix` nor springs or dashpots", help);
+            }
+            _ => {}
+        }
+        for (key, _) in self.motions().filter(|_| self.fix.is_none()) {
+            let message = format!("`{key}` moves the components of `fix`, which is absent");
+            table.fault_at_key(key, message, "add `fix`");
+        }
+        if self.motions().count() == 2 {
+            let message = "a support has a displacement or a velocity, not both";
+            table.fault_at_key("velocity", message, "delete one");
+        }
+    }
+
+    /// A motion has one value for each component that the support determines.
+    pub(in crate::job) fn check_names(&self, table: &mut Table<'_>, mesh: MeshNames<'_>) {
+        check_on(table, &self.on, self.fix.as_ref(), mesh);
+        table.check_flat("where", self.part.as_ref(), mesh.dimension);
+        let Some(fix) = self.fix.as_ref().filter(|_| !table.is_unread("fix")) else { return };
+        let needed = fix.count(mesh.dimension);
+        for (key, values) in self.motions() {
+            if values.len() != needed {
+                let (path, count) = (table.path(key), values.len());
+                let message = format!("`{path}` has {count} value(s), but `fix` has {needed} component(s)");
+                table.fault(key, message, "give one value for each component, in the order of `fix`");
+            }
+            for (index, value) in values.iter().enumerate() {
+                table.check_flat(&format!("{key}.{index}"), value, mesh.dimension);
+            }
+        }
+        for (index, _) in fix.axes().iter().enumerate().filter(|(_, axis)| axis.index() >= mesh.dimension) {
+            table.fault(&format!("fix.{index}"), "a 2D body has no z component", "allowed: x, y");
+        }
+    }
+}
+
+/// Checks the names in the list `on` of a table. All tables may name boundaries, supports that hold nodes also points and curves.
+pub(in crate::job) fn check_on(table: &mut Table<'_>, on: &[String], fix: Option<&Fix>, mesh: MeshNames<'_>) {
+    for (index, name) in on.iter().enumerate() {
+        let (key, name) = (format!("on.{index}"), name.as_str());
+        let what = "is the name of points or curves";
+        if mesh.boundaries.contains(&name) || !mesh.points.contains(&name) {
+            let points = if fix.is_some() { mesh.points } else { &[] };
+            table.check_place(&key, name, mesh, points);
+        } else if fix.is_none() {
+            let message = format!("\"{name}\" {what}: only a support with `fix` acts on them");
+            table.fault(&key, message, "name a boundary");
+        } else if fix == Some(&Fix::Keyword(FixedDirections::Normal)) {
+            let message = format!("\"{name}\" {what}, which have no normal");
+            table.fault(&key, message, "fix all components or a list of axes");
+        }
+    }
+}
+
+impl Traction {
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
+        table.refuse_repeats("on", "boundary");
+        match (table.has("value"), &self.pressure) {
+            (true, Some(_)) => {
+                let help = "delete one, or write two tables";
+                table.fault_at_key("pressure", "a traction has a value or a pressure, not both", help);
+            }
+            (true, None) if self.value.is_empty() => {
+                let help = "give a number or an expression for each axis";
+                table.fault("value", "this value has no components", help);
+            }
+            (false, None) => {
+                let help = "add value = [..], or pressure = .. against the normal";
+                table.fault("", "this traction has neither `value` nor `pressure`", help);
+            }
+            _ => {}
+        }
+    }
+
+    pub(in crate::job) fn check_names(&self, table: &mut Table<'_>, mesh: MeshNames<'_>) {
+        check_on(table, &self.on, None, mesh);
+        table.check_vector("value", &self.value, mesh.dimension);
+        table.check_flat("pressure", self.pressure.as_ref(), mesh.dimension);
+    }
+}
+
+impl Initial {
+    /// The vectors at time 0 that are given.
+    fn vectors(&self) -> impl Iterator<Item = (&'static str, &[Scalar])> {
+        let vectors = [("displacement", &self.displacement), ("velocity", &self.velocity)];
+        vectors.into_iter().filter_map(|(key, vector)| Some((key, vector.as_deref()?)))
+    }
+
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
+        for (key, _) in self.vectors().filter(|_| self.from.is_some()) {
+            table.fault_at_key(key, "`from` gives the whole initial state", "delete this key, or `from`");
+        }
+    }
+
+    /// Checks vectors and the initial stress, which has the components of the dimension.
+    pub(in crate::job) fn check_in_body(
+        &self,
+        table: &mut Table<'_>,
+        (dimension, hypothesis): (usize, Option<Hypothesis>),
+    ) {
+        for (key, vector) in self.vectors() {
+            table.check_vector(key, vector, dimension);
+        }
+        let Some(InitialStress { xx, yy, zz, xy, yz, xz }) = &self.stress else { return };
+        let absent: &[&str] = match (dimension, hypothesis) {
+            (2, Some(Hypothesis::PlaneStress)) => &["zz", "yz", "xz"],
+            (2, _) => &["yz", "xz"],
+            _ => &[],
+        };
+        for (component, value) in [("xx", xx), ("yy", yy), ("zz", zz), ("xy", xy), ("yz", yz), ("xz", xz)] {
+            let key = format!("stress.{component}");
+            table.check_flat(&key, value, dimension);
+            if absent.contains(&component) && table.has(&key) {
+                table.fault_at_key(&key, format!("this body has no stress {component}"), "delete it");
+            }
+        }
+    }
 }

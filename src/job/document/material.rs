@@ -3,7 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::laws::material::Material;
+use super::mesh::Mesh;
+use crate::job::findings::Table;
+use crate::laws::law::header;
+use crate::laws::material::{Hypothesis, Material};
 
 /// A part of the body with its own material. The region inherits no effect from the table `[material]`: its own table contains all
 /// effects.
@@ -15,4 +18,69 @@ pub struct Region {
     pub name: String,
     /// The material of the region. The hypothesis applies to the whole body and is allowed in the table `[material]` only.
     pub material: Material,
+}
+
+/// Poisson's ratio above which linear elements lock.
+const LOCKING: f64 = 0.45;
+
+/// Checks a material of the job.
+pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>, may_be_empty: bool) {
+    let named = |table: &Table<'_>, key| header(&table.path(key));
+    if !may_be_empty && !material.resists() {
+        let [whole, elasticity, viscosity] = ["", "elasticity", "viscosity"].map(|key| named(table, key));
+        let message = format!("{whole} has no density, no elasticity and no viscosity");
+        table.fault("", message, format!("add density, {elasticity} or {viscosity}"));
+    }
+    for (key, message) in material.laws_that_require_elasticity() {
+        if material.elasticity.is_none() {
+            table.fault(key, message, format!("add {}", named(table, "elasticity")));
+        }
+    }
+    table.refuse(material.constant().fault_of_flow());
+}
+
+impl Region {
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
+        check_material(&self.material, &mut table.table("material"), false);
+        if self.material.hypothesis.is_some() {
+            let message = "the hypothesis applies to the whole body";
+            table.fault("material.hypothesis", message, "give it in [material] only");
+        }
+    }
+}
+
+/// Checks a material in a body of this dimension and hypothesis.
+pub(in crate::job) fn check_in_body(
+    material: &Material,
+    table: &mut Table<'_>,
+    (mesh, dimension, hypothesis): (&Mesh, usize, Option<Hypothesis>),
+) {
+    for (key, value) in material.variables() {
+        table.check_flat(&key, value, dimension);
+    }
+    table.refuse(material.constant().fault_of_viscosity(dimension));
+    if hypothesis == Some(Hypothesis::PlaneStress) || mesh.order == 2 {
+        return;
+    }
+    let path = table.path("");
+    let remedy = if dimension == 2 {
+        "[mesh] order = 2 does not lock, nor does a rectangle with diagonal = \"crossed\" (docs/stability.md)"
+    } else {
+        "[mesh] order = 2 hardly locks (docs/stability.md)"
+    };
+    if let Some(ratio) =
+        material.elasticity.as_ref().map(|law| law.poisson_ratio).filter(|ratio| *ratio > LOCKING)
+    {
+        table.warn(format!(
+            "{path}.elasticity.poisson_ratio = {ratio}: linear elements lock above {LOCKING}; expect displacements that are too small; \
+             {remedy}"
+        ));
+    }
+    let flow = material.viscoplasticity.as_ref();
+    if !mesh.is_crossed() && flow.is_some_and(|law| law.with_yield_stress(0.0).keeps_volume()) {
+        table.warn(format!(
+            "{path}.viscoplasticity conserves volume: linear elements lock where they and their neighbours flow, for any Poisson's ratio; \
+             expect a load capacity that is too high, by 10 to 30 % on common meshes; {remedy}"
+        ));
+    }
 }

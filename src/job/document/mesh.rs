@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
+use crate::job::findings::{MeshNames, Table};
+
 /// The mesh of the body: a generated rectangle or box, or a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mesh {
@@ -171,4 +173,102 @@ fn positive_items(schema: &mut Schema) {
     if let Some(items) = schema.get_mut("items").and_then(|items| items.as_object_mut()) {
         items.insert("exclusiveMinimum".into(), 0.into());
     }
+}
+
+const RECTANGLE: MeshNames<'static> = generated(2, &["left", "right", "bottom", "top"]);
+const CUBOID: MeshNames<'static> = generated(3, &["left", "right", "front", "back", "bottom", "top"]);
+
+const fn generated(dimension: usize, boundaries: &'static [&'static str]) -> MeshNames<'static> {
+    MeshNames { dimension, boundaries, regions: &["body"], points: &[], inner: &[] }
+}
+
+impl Mesh {
+    /// The names of a generated mesh; `None` for a file.
+    pub(in crate::job) fn names(&self) -> Option<MeshNames<'static>> {
+        match self.source {
+            MeshSource::Rectangle(_) => Some(RECTANGLE),
+            MeshSource::Box(_) => Some(CUBOID),
+            MeshSource::File(_) => None,
+        }
+    }
+
+    /// The lengths of a generated body; empty for a file.
+    pub(in crate::job) fn size(&self) -> &[f64] {
+        match &self.source {
+            MeshSource::Rectangle(mesh) => &mesh.size,
+            MeshSource::Box(mesh) => &mesh.size,
+            MeshSource::File(_) => &[],
+        }
+    }
+
+    /// Whether its cells are pairs of triangles with both diagonals.
+    pub(in crate::job) fn is_crossed(&self) -> bool {
+        matches!(&self.source, MeshSource::Rectangle(Rectangle { diagonal: Diagonal::Crossed, .. }))
+    }
+
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
+        match &self.source {
+            MeshSource::Rectangle(Rectangle { cells, grading, .. }) => {
+                self.check_count(&mut table.table("rectangle"), cells);
+                let RectangleGrading { x, y, toward } = grading;
+                check_grading(&mut table.table("rectangle.grading"), toward, RECTANGLE, &[*x, *y]);
+            }
+            MeshSource::Box(Cuboid { cells, grading, .. }) => {
+                self.check_count(&mut table.table("box"), cells);
+                let CuboidGrading { x, y, z, toward } = grading;
+                check_grading(&mut table.table("box.grading"), toward, CUBOID, &[*x, *y, *z]);
+            }
+            MeshSource::File(_) => {}
+        }
+    }
+
+    /// The number of unknowns of a generated mesh must not exceed the limit.
+    fn check_count(&self, table: &mut Table<'_>, cells: &[u32]) {
+        // Quadratic cells have the nodes of a grid of twice as many lines, and four more in each crossed rectangle.
+        let [per_cell, of_centres] = if self.order == 2 { [2, 4] } else { [1, 1] };
+        let product = |more: u64| {
+            let along = |count: u32| per_cell * u64::from(count) + more;
+            cells.iter().try_fold(cells.len() as u64, |all, &count| all.checked_mul(along(count)))
+        };
+        let inside = |bricks: u64| (bricks / per_cell.pow(cells.len() as u32)).checked_mul(of_centres);
+        let centres = if self.is_crossed() { product(0).and_then(inside) } else { Some(0) };
+        let unknowns = product(1).zip(centres).and_then(|(corners, centres)| corners.checked_add(centres));
+        let most = most_unknowns(cells.len() as u64);
+        if unknowns.is_none_or(|unknowns| unknowns > most) {
+            let help = format!("at most {most} are possible");
+            table.fault("cells", "this mesh has too many unknowns", help);
+        }
+    }
+}
+
+/// Each side in `toward` must be a side of the mesh at an end of a graded axis, and each graded axis needs a side.
+fn check_grading(table: &mut Table<'_>, toward: &[String], names: MeshNames<'_>, powers: &[f64]) {
+    if toward.is_empty() {
+        return;
+    }
+    table.refuse_repeats("toward", "side");
+    for (index, side) in toward.iter().enumerate() {
+        table.check_name(&format!("toward.{index}"), side, names.boundaries, "boundary");
+    }
+    let ends = names.boundaries.chunks_exact(2);
+    for ((axis, &power), ends) in ["x", "y", "z"].into_iter().zip(powers).zip(ends) {
+        let named = toward.iter().enumerate().filter(|(_, side)| ends.contains(&side.as_str()));
+        for (index, side) in named.clone().filter(|_| (0.0..=1.0).contains(&power)) {
+            let message =
+                format!("cells cannot be smaller near \"{side}\": the exponent along {axis} is {power}");
+            let help = format!("give {axis} an exponent above 1, such as 2, in `{}`", table.path(""));
+            table.fault(&format!("toward.{index}"), message, help);
+        }
+        if power != 1.0 && named.count() == 0 {
+            let [low, high] = [ends[0], ends[1]];
+            let help = format!("add \"{low}\" or \"{high}\" or both to `toward`, or delete {axis}");
+            table.fault_at_key(axis, format!("`toward` names neither end of {axis}"), help);
+        }
+    }
+}
+
+/// Largest number of unknowns in this dimension, limited by the indices of PETSc and by node ids of 31 bits.
+fn most_unknowns(dimension: u64) -> u64 {
+    let nodes = i32::MAX as u64;
+    if cfg!(petsc_64bit) { dimension * nodes } else { nodes }
 }

@@ -5,6 +5,7 @@
 //! `validate` checks before these structs are filled.
 
 mod boundary;
+mod contact;
 mod material;
 mod mesh;
 mod output;
@@ -18,7 +19,9 @@ pub use crate::laws::{
 pub use boundary::{
     Axis, BodyForce, Fix, FixedDirections, Gravity, Initial, InitialStress, Resistance, Support, Traction,
 };
+pub(super) use contact::{check_contact, check_names as check_contact_names};
 pub use material::Region;
+pub(super) use material::{check_in_body as check_material_in_body, check_material};
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, MeshSource, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, FurtherField, Output, Probe, Profile};
 pub use time::{Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Solver, Time};

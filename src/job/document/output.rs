@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::time::check_times;
+use crate::job::findings::{MeshNames, Table};
+
 /// The output folder and its contents.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -142,4 +145,54 @@ pub struct Checkpoint {
 
 fn keep() -> u32 {
     2
+}
+
+impl Output {
+    /// Checks the keys of a run that ends at this time in s.
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>, end: f64) {
+        for (list, every) in [("fields", &self.fields), ("profiles", &self.profiles)] {
+            if let Some(Every::At(times)) = every {
+                check_times(table, (&format!("{list}.at"), times), end, true);
+            }
+        }
+        let probes = self.probe.iter().map(|probe| &*probe.name);
+        table.refuse_same(("probe", "name"), probes, ["probes are called", "delete one, or change it"]);
+        let profiles = self.profile.iter().map(|profile| &*profile.on);
+        table.refuse_same(("profile", "on"), profiles, ["profiles are along", "delete one, or change it"]);
+        if self.profiles.is_some() && self.profile.is_empty() {
+            let help = "name a boundary with [[output.profile]] on = \"...\", or leave the key out";
+            table.fault_at_key("profiles", "there are no profiles to write", help);
+        }
+        table.refuse_repeats("also", "field");
+    }
+
+    /// Checks the keys with the names in the mesh. A generated body reaches from the origin to its size.
+    pub(in crate::job) fn check_names(&self, table: &mut Table<'_>, mesh: MeshNames<'_>, size: &[f64]) {
+        let is_known = size.iter().all(|length| *length > 0.0);
+        table.each("probe", &self.probe, |Probe { point, .. }, table| {
+            if point.len() != mesh.dimension {
+                let message = format!("`{}` has {} coordinate(s)", table.path("point"), point.len());
+                table.fault("point", message, format!("a {0}D body needs {0}", mesh.dimension));
+            } else if is_known && point.iter().zip(size).any(|(x, length)| *x < 0.0 || *x > *length) {
+                let help = format!("the body reaches from the origin to {size:?}");
+                table.fault("point", "this probe lies outside the body", help);
+            }
+        });
+        table.each("profile", &self.profile, |Profile { on }, table| table.check_place("on", on, mesh, &[]));
+    }
+}
+
+impl Checkpoint {
+    /// Checks the keys of a run that ends at this time in s.
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>, end: f64) {
+        check_times(table, ("at", &self.at), end, false);
+        if self.every.is_some() && self.interval.is_some() {
+            table.fault("interval", "`interval` and `every` exclude each other", "delete one of them");
+        }
+        let times = [self.interval, self.wall_limit, self.margin];
+        if self.every.is_none() && self.at.is_empty() && times.iter().all(Option::is_none) {
+            let help = "add every = 64 (steps) or interval = 1800.0 (seconds of wall time)";
+            table.fault("", "[checkpoint] does not state when to save", help);
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::laws::schemes::Scheme;
+use crate::{job::findings::Table, laws::schemes::Scheme};
 
 /// The end of the run, the steps and the time scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -174,4 +174,73 @@ pub enum Accept {
     Uniqueness,
     /// Run although the step exceeds explicit_step_bound, so that errors may grow.
     ExplicitStability,
+}
+
+/// Largest accepted number of fixed steps.
+const MOST_STEPS: f64 = 1e12;
+
+impl Time {
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
+        self.check_steps(table);
+        check_times(table, ("land_on", &self.land_on), self.end, false);
+    }
+
+    fn check_steps(&self, table: &mut Table<'_>) {
+        let valid = |number: f64| Some(number).filter(|number| number.is_finite() && *number > 0.0);
+        let (end, step) = (valid(self.end), valid(self.step));
+        let adaptive = self.adaptive.as_ref();
+        let smallest = adaptive.and_then(|adaptive| valid(adaptive.smallest_step));
+        let largest = adaptive.and_then(|adaptive| valid(adaptive.largest_step));
+        if let (Some(end), Some(step)) = (end, step) {
+            if step > end {
+                table.fault("step", "the step is longer than the whole run", format!("at most {end}"));
+            } else if end / step > MOST_STEPS {
+                let message = format!("this run would take {:.0e} steps", end / step);
+                table.fault("step", message, "choose a longer step or an earlier end");
+            }
+        }
+        if let (Some(smallest), Some(largest)) = (smallest, largest)
+            && smallest > largest
+        {
+            let message = "the smallest step is longer than the largest";
+            table.fault("adaptive.smallest_step", message, format!("at most {largest}"));
+        } else if let (Some(smallest), Some(step)) = (smallest, step)
+            && step < smallest
+        {
+            let message = "the first step is shorter than the smallest";
+            table.fault("step", message, format!("at least {smallest}"));
+        } else if let (Some(largest), Some(step)) = (largest, step)
+            && step > largest
+        {
+            table.fault("step", "the first step is longer than the largest", format!("at most {largest}"));
+        }
+    }
+}
+
+/// Times in a list must ascend and lie within the run, which ends at the given time; those of outputs may begin with 0.
+pub(super) fn check_times(table: &mut Table<'_>, (list, times): (&str, &[f64]), end: f64, may_be_zero: bool) {
+    let mut before = 0.0;
+    for (at, &time) in times.iter().enumerate() {
+        let place = format!("{list}.{at}");
+        let is_start = at == 0 && may_be_zero && time == 0.0;
+        if !(time > before || is_start) {
+            let least = if may_be_zero { "at least" } else { "above" };
+            let message = format!("these times must be {least} 0 and in ascending order");
+            table.fault(&place, message, format!("give a time after {before}, or delete it"));
+        } else if time > end && end > 0.0 {
+            table.fault(&place, "this time is after the end of the run", format!("at most {end}"));
+        }
+        before = before.max(time);
+    }
+}
+
+impl Solver {
+    pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
+        for key in self.petsc.keys() {
+            if key.is_empty() || key.starts_with('-') || key.contains(char::is_whitespace) {
+                let help = "write it as PETSc does, without the leading dash: snes_monitor = \"\"";
+                table.fault_at_name(("petsc", key), format!("`{key}` is not a PETSc option"), help);
+            }
+        }
+    }
 }

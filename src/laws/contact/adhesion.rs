@@ -23,9 +23,9 @@
 //! M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput. Methods Appl.
 //! Mech. Engrg. 177 (1999), 383-399.)
 
-use super::{interface::Interface, laws::NormalLaw};
+use super::interface::Interface;
 use crate::{
-    laws::law::{LawFault, header},
+    laws::law::LawFault,
     linear_algebra::tensor::{Vector, add_scaled, dot, norm},
 };
 use schemars::JsonSchema;
@@ -157,11 +157,11 @@ impl Adhesion {
 
     /// The faults of the parameters, and of tables that adhesion cannot be combined with. Bonds connect a boundary that touches from the start to an
     /// obstacle at rest. Keys are those of the table of the contact.
-    pub fn faults(&self, interface: &Interface) -> Vec<LawFault> {
-        let help = format!("delete it, or {}", header(&format!("{}.adhesion", interface.path)));
-        let gap = interface.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
+    pub(super) fn faults(&self, interface: Interface<'_>) -> Vec<LawFault> {
+        let help = "delete it, or [contact.adhesion]";
+        let gap = interface.normal.gap_key().map(|gap| {
             let message = "adhesion requires contact from the start: no gap is allowed";
-            LawFault::at_value(gap, message, help.as_str())
+            LawFault::at_value(gap, message, help)
         });
         let obstacle = interface.obstacle_moves.then(|| {
             let message =

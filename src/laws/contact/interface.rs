@@ -1,15 +1,13 @@
 use super::laws::{FrictionLaw, NormalLaw};
 
-/// Normal law, friction law and obstacle of a `[[contact]]` table, as far as they can be read. Adhesion and memory check whether
-/// they can be combined with these.
-#[derive(Debug, Clone)]
-pub struct Interface {
-    /// The path of the table in the job, such as `contact.0`, for messages.
-    pub path: String,
+/// Normal law, friction law and obstacle of a `[[contact]]` table. Adhesion, memory, wear and loads of obstacles check whether they can
+/// be combined with these.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Interface<'a> {
     /// The normal law.
-    pub normal: Option<NormalLaw>,
+    pub normal: &'a NormalLaw,
     /// The friction law.
-    pub friction: Option<FrictionLaw>,
+    pub friction: Option<&'a FrictionLaw>,
     /// Whether an obstacle replaces the gap.
     pub has_obstacle: bool,
     /// Whether the obstacle moves.

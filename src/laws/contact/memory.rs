@@ -12,8 +12,8 @@
 //! damping in the normal law or in the body has to dissipate. (M. Sofonea, F. Pătrulescu, Analysis of a
 //! history-dependent frictionless contact problem, Math. Mech. Solids 18 (2013), 409-430.)
 
-use super::{interface::Interface, laws::NormalLaw};
-use crate::laws::law::{LawFault, header};
+use super::interface::Interface;
+use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,23 +34,23 @@ pub struct Memory {
 impl Memory {
     /// The faults of tables that memory cannot be combined with. Memory depends on the indentation of a foundation that touches the
     /// body from the start; friction uses the pressure of the normal law only. Keys are those of the table of the contact.
-    pub fn faults(interface: &Interface) -> Vec<LawFault> {
+    pub(super) fn faults(Interface { normal, friction, has_obstacle, .. }: Interface<'_>) -> Vec<LawFault> {
         let mut faults = Vec::new();
         let mut refuse = |key: String, message: &str, other: &str| {
-            let help = format!("delete it, or {}{other}", header(&format!("{}.memory", interface.path)));
+            let help = format!("delete it, or [contact.memory]{other}");
             faults.push(LawFault::at_key(key, message, help));
         };
-        if let Some(wall) = interface.normal.as_ref().filter(|law| law.is_bound()) {
+        if normal.is_bound() {
             let message = "memory requires a foundation that can be indented: a rigid obstacle has no memory";
-            refuse(wall.table(), message, "");
-        } else if let Some(gap) = interface.normal.as_ref().and_then(NormalLaw::gap_key) {
+            refuse(normal.table(), message, "");
+        } else if let Some(gap) = normal.gap_key() {
             refuse(gap, "memory requires contact from the start: no gap is allowed", "");
         }
-        if interface.has_obstacle {
+        if has_obstacle {
             let message = "memory requires a foundation at rest: no obstacle is allowed";
             refuse("obstacle".into(), message, "");
         }
-        if let Some(friction) = interface.friction.as_ref().filter(|law| law.follows_pressure()) {
+        if let Some(friction) = friction.filter(|law| law.follows_pressure()) {
             let message = "this friction law depends on the pressure of the normal law only and would ignore the memory pressure";
             refuse(friction.table().into(), message, ", or use tresca");
         }

@@ -2,7 +2,7 @@
 
 use super::obstacle_motion::{Rate, axis_of};
 use crate::{
-    laws::expression::Scalar,
+    laws::{expression::Scalar, law::LawFault},
     linear_algebra::tensor::{Vector, norm},
 };
 
@@ -15,14 +15,24 @@ pub(super) struct Prescribed<'a> {
     pub facing: &'a [Scalar],
     /// Angular velocity in rad/s.
     pub rotation: Option<&'a Scalar>,
-    /// The direction of the axis of rotation in space; empty where none is given.
-    pub axis: &'a [f64],
+    /// The direction of the axis of rotation in space, if it is given.
+    pub axis: Option<&'a [f64]>,
 }
 
 /// A rigid obstacle that a job may choose. The defaults are those of one that turns about an axis through its centre.
 pub(super) trait Obstacle {
     /// Its motion.
     fn prescribed(&self) -> Prescribed<'_>;
+
+    /// The key of the place that moves with it.
+    fn place_key(&self) -> &'static str {
+        "centre"
+    }
+
+    /// The faults of its keys, which are those of its table.
+    fn own_faults(&self) -> Vec<LawFault> {
+        Vec::new()
+    }
 
     /// The length in m at `time` of the ray from a place along the unit `normal` to the surface: negative from inside of the obstacle,
     /// infinite if the ray does not meet it, no number if the keys are wrong.
@@ -39,7 +49,7 @@ pub(super) trait Obstacle {
     /// Angular velocity in rad/s at the end of a step.
     fn angular_velocity(&self, rate: &Rate) -> Vector<3> {
         let Prescribed { rotation, axis, .. } = self.prescribed();
-        let (rotation, axis) = (rotation_rate(rotation, rate.time), axis_of(axis));
+        let (rotation, axis) = (rotation_rate(rotation, rate.time), axis_of(axis.unwrap_or_default()));
         if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) }
     }
 
@@ -59,18 +69,27 @@ pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector
 
 /// The choice of obstacles, defined by their list: the enum of the job, and the dispatch to the chosen obstacle.
 macro_rules! obstacles {
-    ($($(#[$about:meta])* $obstacle:ident,)*) => {
+    ($($(#[$about:meta])* $obstacle:ident = $name:literal,)*) => {
         /// A rigid obstacle that may move. Friction acts on the velocity relative to the obstacle, averaged over a step. The gap is the
         /// distance from the undeformed position of a boundary point to the obstacle along the outward normal of the undeformed boundary;
         /// if this ray does not meet the obstacle, there is no contact.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(rename_all = "snake_case")]
         #[schemars(rename = "Obstacle")]
         pub enum Gap {
             /// The gap in m itself, as a function of time and undeformed coordinates.
             #[serde(skip)]
             Distance(Scalar),
-            $($(#[$about])* $obstacle($obstacle),)*
+            $($(#[$about])* #[serde(rename = $name)] $obstacle($obstacle),)*
+        }
+
+        impl Gap {
+            /// The name of the obstacle in the job; empty where the gap is given.
+            pub fn name(&self) -> &'static str {
+                match self {
+                    Self::Distance(_) => "",
+                    $(Self::$obstacle(_) => $name,)*
+                }
+            }
         }
 
         macro_rules! each_obstacle {

@@ -52,7 +52,7 @@ fn is_zero(value: &f64) -> bool {
 
 impl ObstacleLoad {
     /// The faults of the keys, which are those of the table of the contact.
-    pub(super) fn faults(&self, interface: &Interface) -> Vec<LawFault> {
+    pub(super) fn faults(&self, interface: Interface<'_>) -> Vec<LawFault> {
         let mut faults = Vec::new();
         let mut at_key = |key: &str, message, help| faults.push(LawFault::at_key(key, message, help));
         if !interface.has_obstacle {

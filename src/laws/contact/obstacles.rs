@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    laws::expression::Scalar,
+    laws::{expression::Scalar, law::LawFault},
     linear_algebra::tensor::{Vector, add_scaled},
 };
 use schemars::JsonSchema;
@@ -30,12 +30,12 @@ use serde::{Deserialize, Serialize};
 
 obstacles! {
     /// A half-space bounded by a plane; in 2D a half-plane bounded by a line.
-    Plane,
+    Plane = "plane",
     /// A sphere, in 2D a disc.
-    Sphere,
+    Sphere = "sphere",
     /// Any shape, given by the distance from its surface, such as a cylinder, a cone or a punch with round edges, or by a
     /// triangulated surface.
-    Shape,
+    Shape = "shape",
 }
 
 impl Default for Gap {
@@ -87,6 +87,48 @@ impl Gap {
         vec![centre, facing, rotation.map_or(&[], std::slice::from_ref)]
     }
 
+    /// A key of the obstacle, relative to the table of the contact.
+    fn key(&self, key: &str) -> String {
+        format!("obstacle.{}.{key}", self.name())
+    }
+
+    /// The vectors of the obstacle in m and without a unit, each with its key relative to the table of the contact.
+    pub fn vectors(&self) -> [(String, &[Scalar]); 2] {
+        let Prescribed { centre, facing, .. } = self.prescribed();
+        let place = each_obstacle!(self, _ => "", obstacle => obstacle.place_key());
+        [(self.key(place), centre), (self.key("normal"), facing)]
+    }
+
+    /// The direction of the axis of rotation as given, with its key.
+    pub fn given_axis(&self) -> Option<(String, &[f64])> {
+        self.prescribed().axis.map(|axis| (self.key("axis"), axis))
+    }
+
+    /// The key of the rotation, if it is given.
+    pub(super) fn rotation_key(&self) -> Option<String> {
+        self.prescribed().rotation.map(|_| self.key("rotation"))
+    }
+
+    /// The faults of the obstacle's own keys, which are those of the table of the contact.
+    pub(super) fn own_faults(&self) -> Vec<LawFault> {
+        let own = each_obstacle!(self, _ => Vec::new(), obstacle => obstacle.own_faults());
+        let mut faults: Vec<LawFault> =
+            own.into_iter().map(|fault| fault.within(self.name()).within("obstacle")).collect();
+        if let Some((key, axis)) = self.given_axis()
+            && !axis.is_empty()
+            && axis.iter().all(|&x| x == 0.0)
+        {
+            let help = "give the direction of the axis of rotation";
+            faults.push(LawFault::at_value(key, "the axis is the zero vector", help));
+        }
+        let [_, (key, normal)] = self.vectors();
+        if !normal.is_empty() && normal.iter().all(|x| *x == Scalar::default()) {
+            let help = "give the normal that points out of the obstacle toward the body";
+            faults.push(LawFault::at_value(key, "the normal is the zero vector", help));
+        }
+        faults
+    }
+
     /// The motion of the obstacle; none without an obstacle.
     fn prescribed(&self) -> Prescribed<'_> {
         each_obstacle!(self, _ => Prescribed::default(), obstacle => obstacle.prescribed())
@@ -126,7 +168,7 @@ impl Gap {
 
     /// The direction of the axis of rotation of a sphere or shape; in the plane z.
     pub fn axis(&self) -> Vector<3> {
-        axis_of(self.prescribed().axis)
+        axis_of(self.prescribed().axis.unwrap_or_default())
     }
 
     /// The motion of the obstacle at the end of a step; zero without an obstacle.
@@ -188,6 +230,17 @@ pub(super) mod tests {
         // Along a normal at 60 degrees the way to the floor is twice as long.
         let slanted = [0.75f64.sqrt(), -0.5];
         assert!((floor(-0.5).at(0.0, &[1.0, 0.0], &slanted).unwrap() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn faults_have_the_key_of_the_obstacle() {
+        let without_normal = plane(numbers(&[0.0, 0.0]), numbers(&[0.0, 0.0]));
+        let round =
+            Sphere { centre: vec![], radius: 1.0, hollow: false, rotation: None, axis: Some(vec![0.0; 3]) };
+        let obstacles =
+            [without_normal, Gap::Sphere(round), Gap::Shape(Shape::default()), disc([0.0, 0.0], true)];
+        let keys: Vec<String> = obstacles.iter().flat_map(Gap::own_faults).map(|fault| fault.key).collect();
+        assert_eq!(keys, ["obstacle.plane.normal", "obstacle.sphere.axis", "obstacle.shape"]);
     }
 
     #[test]

@@ -1,10 +1,15 @@
-//! Faults of the laws of a `[[contact]]` table, of each law and of their combinations.
+//! The table `[[contact]]`, and the faults of its laws and of their combinations.
 
 use super::{
-    adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory, obstacle_load::ObstacleLoad,
+    adhesion::Adhesion,
+    interface::Interface,
+    laws::{FrictionLaw, NormalLaw},
+    memory::Memory,
+    obstacle_load::ObstacleLoad,
+    obstacles::Gap,
     wear::Wear,
 };
-use crate::laws::law::LawFault;
+use crate::laws::{expression::Scalar, law::LawFault};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,52 +25,161 @@ pub enum Quadrature {
     Gauss,
 }
 
-/// The contents of a `[[contact]]` table, as far as they can be read.
-#[derive(Debug, Clone)]
-pub struct ContactTable {
-    /// Normal law, friction law and obstacle.
-    pub interface: Interface,
+/// Boundaries that may touch an obstacle, and their contact laws.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// The names of the boundaries.
+    #[schemars(length(min = 1), example = ["bottom"])]
+    pub on: Vec<String>,
+    /// The part of these boundaries to which the contact applies: the facets at whose centre this expression in x, y, z is not 0. A
+    /// boundary may be in several contact tables if each has a `where`, and no facet belongs to two; a node between them belongs to the
+    /// one with the larger part of its area. A product of conditions holds where all hold, their `max` where one holds. Absent: the
+    /// whole boundaries.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
+    #[schemars(extend("variables" = "x, y, z"), example = "x < 1", example = "(x > 1)*(x < 2)")]
+    pub part: Option<Scalar>,
     /// The points of a facet at which the contact laws are evaluated.
+    #[serde(default)]
     pub quadrature: Quadrature,
-    /// The force that moves the obstacle.
+    /// The normal law: the contact pressure -sigma_nu as a function of the normal velocity or the normal displacement.
+    pub normal: NormalLaw,
+    /// Whether the mass of the cells at these boundaries is moved to nodes behind them (mass redistribution), so that the boundary
+    /// loses no kinetic energy in impacts and the contact pressure does not oscillate. Total mass, centre of mass and moments of
+    /// inertia stay the same; gravity and body forces move with the mass. Requires an implicit scheme.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub redistribute_mass: bool,
+    /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;
+    /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<Gap>,
+    /// A force that moves the obstacle (indentation), or a moment that turns it (rolling). Its displacement and velocity, angle and
+    /// angular velocity are in `resultants.csv`. Absent: the obstacle moves as its keys prescribe.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle_load: Option<ObstacleLoad>,
-    /// Bonds to the obstacle.
-    pub adhesion: Option<Adhesion>,
-    /// Memory of the foundation.
-    pub memory: Option<Memory>,
-    /// Wear of the surface.
+    /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<FrictionLaw>,
+    /// Wear: the body's surface recedes where it slides under pressure, so that the gap widens. The depth grows by `coefficient`
+    /// times the contact pressure times the length of sliding relative to the obstacle (Archard's law); fields have it as `wear`.
+    /// Requires a friction law and a normal law with a gap. Absent: no wear.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wear: Option<Wear>,
+    /// Adhesion to an obstacle at rest: bonds that form at displacement zero, resist opening and sliding, and break. The bonding b
+    /// at a node, 1 for intact and 0 for broken bonds, starts at 1 and decreases as `viscosity b' = -max(b (stiffness R(opening)^2
+    /// + tangential_stiffness R(sliding)^2) - energy, 0)`, where R(s) = min(s, length). Broken bonds are not restored. The traction
+    /// is `b^2 stiffness R(opening)` along the normal and `b^2 tangential_stiffness R(sliding)` against the sliding. The output
+    /// `contact_pressure` is the pressure of the normal law without the traction of adhesion. Absent: no adhesion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adhesion: Option<Adhesion>,
+    /// Memory of the foundation: a pressure that depends on the history of the normal displacement and is added to the pressure of
+    /// the normal law, `integral from 0 to t of stiffness_rate exp(-(t - s) / decay_time) max(normal displacement(s), 0) ds`. Field
+    /// files contain it as `memory_pressure`; the output `contact_pressure` is the pressure of the normal law only. The work of
+    /// both pressures is part of `contact_dissipation`, which is negative while the foundation returns energy. Absent: no memory.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Memory>,
 }
 
-impl ContactTable {
+impl Contact {
+    fn interface(&self) -> Interface<'_> {
+        let moves = self.obstacle.as_ref().is_some_and(Gap::surface_may_move);
+        Interface {
+            normal: &self.normal,
+            friction: self.friction.as_ref(),
+            has_obstacle: self.obstacle.is_some(),
+            obstacle_moves: moves || self.obstacle_load.is_some(),
+        }
+    }
+
+    /// The moment that turns the obstacle.
+    pub fn moment(&self) -> Option<&Scalar> {
+        self.obstacle_load.as_ref().and_then(|load| load.moment.as_ref())
+    }
+
     /// The faults of the laws and of their combinations; keys are those of the table.
     pub fn faults(&self) -> Vec<LawFault> {
-        let Interface { normal, friction, has_obstacle, .. } = &self.interface;
-        let mut faults = Vec::new();
-        if let Some(law) = normal {
-            faults.extend(law.own_faults().into_iter().map(|fault| fault.within(&law.table())));
-            faults.extend(has_obstacle.then(|| law.faults_beside_obstacle()).into_iter().flatten());
+        let (normal, interface) = (&self.normal, self.interface());
+        let mut faults: Vec<LawFault> =
+            normal.own_faults().into_iter().map(|fault| fault.within(&normal.table())).collect();
+        if let Some(obstacle) = &self.obstacle {
+            faults.extend(normal.faults_beside_obstacle());
+            faults.extend(obstacle.own_faults());
+            faults.extend(self.faults_of_moment(obstacle));
         }
-        if let Some(law) = friction {
+        if let Some(law) = &self.friction {
             faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
         }
-        faults.extend(self.obstacle_load.iter().flat_map(|load| load.faults(&self.interface)));
-        faults.extend(self.adhesion.iter().flat_map(|law| law.faults(&self.interface)));
-        faults.extend(self.memory.iter().flat_map(|_| Memory::faults(&self.interface)));
+        faults.extend(self.obstacle_load.iter().flat_map(|load| load.faults(interface)));
+        faults.extend(self.adhesion.iter().flat_map(|law| law.faults(interface)));
+        faults.extend(self.memory.iter().flat_map(|_| Memory::faults(interface)));
         let has_histories = self.adhesion.is_some() || self.memory.is_some();
-        faults.extend(self.wear.iter().flat_map(|_| Wear::faults(&self.interface, has_histories)));
+        faults.extend(self.wear.iter().flat_map(|_| Wear::faults(interface, has_histories)));
         if self.quadrature == Quadrature::Gauss {
-            let nodal = normal.as_ref().is_some_and(NormalLaw::needs_nodes);
             let not_there = [
-                (friction.is_some(), "friction is not available at Gauss points"),
+                (self.friction.is_some(), "friction is not available at Gauss points"),
                 (self.adhesion.is_some(), "adhesion is not available at Gauss points"),
                 (self.memory.is_some(), "memory is not available at Gauss points"),
-                (nodal, "this contact law is not available at Gauss points"),
+                (normal.needs_nodes(), "this contact law is not available at Gauss points"),
             ];
             let help = "use \"nodal\", or delete the key";
             let not_there = not_there.into_iter().filter(|(is_there, _)| *is_there);
             faults.extend(not_there.map(|(_, message)| LawFault::at_value("quadrature", message, help)));
         }
         faults
+    }
+
+    /// A moment turns what has a centre and does not turn otherwise.
+    fn faults_of_moment(&self, obstacle: &Gap) -> impl Iterator<Item = LawFault> {
+        let moment = self.moment().map(|_| obstacle);
+        let of_plane = moment.filter(|obstacle| matches!(obstacle, Gap::Plane(_))).map(|_| {
+            let message = "a moment turns a sphere or a shape about its centre, not a plane";
+            let help = "use a sphere or a shape, or give the plane a `rotation`";
+            LawFault::at_key("obstacle_load.moment", message, help)
+        });
+        let twice = moment.and_then(Gap::rotation_key).map(|key| {
+            let message = "the obstacle turns by a moment or by its `rotation`, not both";
+            LawFault::at_key(key, message, "delete one of them")
+        });
+        of_plane.into_iter().chain(twice)
+    }
+
+    /// The fault of the rotation of the obstacle of a body of this dimension: in 2D a disc or shape rotates about its centre, and a line
+    /// does not rotate; in 3D a sphere or shape needs an axis.
+    pub fn fault_of_rotation(&self, dimension: usize) -> Option<LawFault> {
+        let obstacle = self.obstacle.as_ref()?;
+        let (rotation, axis) = (obstacle.rotation_key(), obstacle.given_axis().map(|(key, _)| key));
+        if let Gap::Plane(_) = obstacle {
+            let message = "in 2D a plane cannot rotate about its normal";
+            let help = "delete it; for a belt, let `point` move along the line; for a tilting line, let `normal` depend on t";
+            return rotation.filter(|_| dimension == 2).map(|key| LawFault::at_value(key, message, help));
+        }
+        let turning = rotation.or_else(|| self.moment().map(|_| "obstacle_load.moment".to_owned()));
+        match (axis, turning) {
+            (Some(axis), _) if dimension == 2 => {
+                let message = format!("in 2D a {} has no axis: it rotates about its centre", obstacle.name());
+                Some(LawFault::at_value(axis, message, "delete the axis"))
+            }
+            (None, Some(key)) if dimension == 3 => {
+                let help = "add `axis = [x, y, z]`, the direction of the axis of rotation";
+                Some(LawFault::at_value(key, "in 3D a rotation needs an axis", help))
+            }
+            (Some(axis), None) => {
+                let help = "add `rotation`, or delete the axis";
+                Some(LawFault::at_value(axis, "an axis without `rotation` has no effect", help))
+            }
+            _ => None,
+        }
+    }
+
+    /// Warnings, each beginning with a key.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        let of_bonds = self.adhesion.as_ref().and_then(Adhesion::warning);
+        let rotation = self.obstacle.as_ref().filter(|_| self.friction.is_none()).and_then(Gap::rotation_key);
+        let rotation = rotation.map(|key| {
+            format!(
+                "{key}: the rotation of an obstacle affects friction only, and this contact has no friction"
+            )
+        });
+        of_bonds.map(|words| format!("adhesion: {words}")).into_iter().chain(rotation)
     }
 }

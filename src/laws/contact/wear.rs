@@ -40,22 +40,23 @@ const VERTICAL: f64 = 1e-4;
 
 impl Wear {
     /// What is missing beside it, and what it cannot be combined with; keys are those of the table of the contact.
-    pub(super) fn faults(interface: &Interface, has_histories: bool) -> Vec<LawFault> {
+    pub(super) fn faults(
+        Interface { normal, friction, .. }: Interface<'_>,
+        has_histories: bool,
+    ) -> Vec<LawFault> {
         let fault = |message: &str, help: &str| LawFault::at_key("wear", message, help);
-        let normal = interface.normal.as_ref();
-        let without_gap = normal.is_some_and(|law| !law.has_gap()).then(|| {
+        let without_gap = (!normal.has_gap()).then(|| {
             fault(
                 "the normal law has no gap that wear could widen",
                 "use normal.unilateral or normal.compliance",
             )
         });
-        let decreases =
-            normal.and_then(|law| law.response().ok()).filter(|law| law.depends_on_displacement());
+        let decreases = normal.response().ok().filter(|law| law.depends_on_displacement());
         let decreases = decreases.filter(|law| law.monotonicity_constant(1.0) > 0.0).map(|_| {
             let help = "use normal.unilateral, normal.compliance, or a graph that does not decrease";
             fault("wear cannot be combined with a pressure that decreases with the penetration", help)
         });
-        let without_friction = interface.friction.is_none().then(|| {
+        let without_friction = friction.is_none().then(|| {
             let help = "add friction.coulomb, with coefficient = 0 if the surface is smooth";
             fault("wear needs a friction law, whose sliding velocity it uses", help)
         });

@@ -16,10 +16,21 @@ const VOLUMETRIC: usize = 2;
 pub type Numbers = [Option<f64>; COUNT];
 
 impl Material {
-    /// The keys of properties that may be expressions, relative to the table of the material.
-    pub fn variable_keys() -> impl Iterator<Item = String> {
-        let of_flow = |(law, key): &(&str, Option<&str>)| Some(format!("viscoplasticity.{law}.{}", (*key)?));
-        KEYS.into_iter().map(str::to_owned).chain(Viscoplasticity::YIELD_STRESSES.iter().filter_map(of_flow))
+    /// The properties that may be expressions, with their keys relative to the table of the material.
+    pub fn variables(&self) -> impl Iterator<Item = (String, &Scalar)> {
+        let given = self.properties().into_iter().enumerate();
+        given.filter_map(|(number, value)| Some((self.key(number), value?)))
+    }
+
+    /// The material without the laws that contain an expression.
+    pub fn constant(&self) -> Material<f64> {
+        let number = |value: Option<&Scalar>| match value {
+            Some(Scalar::Number(number)) => Some(*number),
+            _ => None,
+        };
+        let constant = self.with(self.properties().map(number));
+        let has_constant_flow = !matches!(self.properties(), [.., Some(Scalar::Expression(_))]);
+        Material { viscoplasticity: constant.viscoplasticity.filter(|_| has_constant_flow), ..constant }
     }
 
     fn properties(&self) -> [Option<&Scalar>; COUNT] {
@@ -76,13 +87,8 @@ impl Material {
             ));
         }
         let material = self.with(numbers);
-        if let Some(fault) = material.viscosity.and_then(|law| law.fault(place.len())) {
-            return Err(fault.within("viscosity"));
-        }
-        match material.viscoplasticity.and_then(|law| Some((law, law.fault()?))) {
-            Some((law, fault)) => Err(fault.within(law.name()).within("viscoplasticity")),
-            None => Ok(material),
-        }
+        let fault = material.fault_of_viscosity(place.len()).or_else(|| material.fault_of_flow());
+        fault.map_or(Ok(material), Err)
     }
 
     /// The material with these numbers; properties that are absent stay absent.
@@ -103,6 +109,17 @@ impl Material {
 }
 
 impl Material<f64> {
+    /// The fault of the viscosity in this dimension; its key is that of the table of the material.
+    pub fn fault_of_viscosity(&self, dimension: usize) -> Option<LawFault> {
+        Some(self.viscosity?.fault(dimension)?.within("viscosity"))
+    }
+
+    /// The fault of the viscoplastic law; its key is that of the table of the material.
+    pub fn fault_of_flow(&self) -> Option<LawFault> {
+        let law = self.viscoplasticity?;
+        Some(law.fault()?.within(law.name()).within("viscoplasticity"))
+    }
+
     /// The numbers of its properties.
     pub fn numbers(&self) -> Numbers {
         [
@@ -178,11 +195,9 @@ mod tests {
         let cone = Material { viscoplasticity: Some(Viscoplasticity::DruckerPrager(cone)), ..graded() };
         assert_eq!(cone.at(&[1.0, 0.0]).expect("a material").numbers()[4], Some(2.0));
         assert_eq!(cone.key(4), "viscoplasticity.drucker_prager.cohesion");
-        let keys: Vec<String> = Material::variable_keys().collect();
-        assert_eq!(
-            keys[4..],
-            ["viscoplasticity.perzyna.yield_stress", "viscoplasticity.drucker_prager.cohesion"]
-        );
+        let keys: Vec<String> = cone.variables().map(|(key, _)| key).collect();
+        assert_eq!(keys.last().map(String::as_str), Some("viscoplasticity.drucker_prager.cohesion"));
+        assert!(cone.constant().viscoplasticity.is_none() && cone.constant().elasticity.is_none());
     }
 
     #[test]

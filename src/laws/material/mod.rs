@@ -59,7 +59,15 @@ pub struct Material<N = Scalar> {
 }
 
 impl Material {
-    /// The keys of laws that require elasticity, with the message where it is absent.
-    pub const REQUIRING_ELASTICITY: [(&str, &str); 2] =
-        [("viscoplasticity", Viscoplasticity::WITHOUT_ELASTICITY), ("damage", Damage::WITHOUT_ELASTICITY)];
+    /// Whether it resists motion: no body consists of a material without density, elasticity and viscosity.
+    pub fn resists(&self) -> bool {
+        self.density.is_some() || self.elasticity.is_some() || self.viscosity.is_some()
+    }
+
+    /// The keys of its laws that require elasticity, with the message where it is absent.
+    pub fn laws_that_require_elasticity(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let flow =
+            self.viscoplasticity.as_ref().map(|_| ("viscoplasticity", Viscoplasticity::WITHOUT_ELASTICITY));
+        flow.into_iter().chain(self.damage.map(|_| ("damage", Damage::WITHOUT_ELASTICITY)))
+    }
 }

@@ -75,9 +75,6 @@ macro_rules! laws {
             /// The message where elasticity is missing.
             pub const WITHOUT_ELASTICITY: &'static str = "viscoplasticity requires elasticity: it relaxes the elastic stress";
 
-            /// The names of the laws in the job.
-            pub const NAMES: &'static [&'static str] = &[$($name,)*];
-
             /// The names of the laws, each with the key of its yield stress.
             pub const YIELD_STRESSES: &'static [(&'static str, Option<&'static str>)] =
                 &[$(($name, <$law as InPlaces<f64>>::YIELD_STRESS),)*];

@@ -89,14 +89,14 @@ impl Plan {
     /// Reads the study in the file `path`, applies `overrides`, and loads the jobs of all runs.
     pub fn load(path: &Path, overrides: &[String], colour: bool) -> Result<Self> {
         let (text, folder) = read(kind(), path)?;
-        let document =
+        let mut document =
             Document::new(kind(), &text, (&path.display().to_string(), &folder), overrides, colour)?;
-        let (study, root, texts) = document.fill::<Study>()?;
-        let mut document = Document { root, texts, faults: Vec::new() };
+        document.refuse()?;
+        let study: Study = document.fill()?;
         let base = Job::load_coloured(&normal(&folder.join(&study.base.job)), &study.base.set, colour)?;
         let derived = products(study.product.as_ref()).len().saturating_add(sweep::count(&study.sweep));
         check(&study, &base.job, derived, &mut document);
-        let (study, ..) = document.fill::<Study>()?;
+        document.refuse()?;
 
         let name = path.file_stem().map_or("study".into(), |stem| stem.to_string_lossy().into_owned());
         let below = study.output.folder.clone().unwrap_or_else(|| Path::new("out").join(&name));

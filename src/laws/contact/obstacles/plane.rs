@@ -40,7 +40,11 @@ pub struct Plane {
 impl Obstacle for Plane {
     fn prescribed(&self) -> Prescribed<'_> {
         let Self { point, normal, rotation } = self;
-        Prescribed { centre: point, facing: normal, rotation: rotation.as_ref(), axis: &[] }
+        Prescribed { centre: point, facing: normal, rotation: rotation.as_ref(), axis: None }
+    }
+
+    fn place_key(&self) -> &'static str {
+        "point"
     }
 
     fn ray<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {

@@ -11,6 +11,7 @@ use crate::{
             obstacle_surface::TriangulatedSurface,
         },
         expression::Scalar,
+        law::LawFault,
     },
     linear_algebra::tensor::{Vector, add_scaled, larger, norm},
 };
@@ -89,8 +90,28 @@ const DEEPEST: f64 = 0.1;
 
 impl Obstacle for Shape {
     fn prescribed(&self) -> Prescribed<'_> {
-        let axis = self.axis.as_deref().unwrap_or_default();
-        Prescribed { centre: &self.centre, rotation: self.rotation.as_ref(), axis, ..Prescribed::default() }
+        let (rotation, axis) = (self.rotation.as_ref(), self.axis.as_deref());
+        Prescribed { centre: &self.centre, rotation, axis, ..Prescribed::default() }
+    }
+
+    fn own_faults(&self) -> Vec<LawFault> {
+        let fault = match (&self.distance, &self.surface) {
+            (None, None) => {
+                let help = "add distance = \"..\", an expression, or surface = \"..\", an STL file";
+                LawFault::at_value("", "this shape has neither `distance` nor `surface`", help)
+            }
+            (Some(_), Some(_)) => LawFault::at_key(
+                "surface",
+                "a shape has a distance or a surface, not both",
+                "delete one of them",
+            ),
+            (Some(_), None) if self.scale.is_some() => {
+                let help = "delete it, or write the unit into the expression";
+                LawFault::at_key("scale", "only a `surface` has a scale", help)
+            }
+            _ => return Vec::new(),
+        };
+        vec![fault]
     }
 
     fn ray<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {

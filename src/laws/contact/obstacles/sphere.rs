@@ -45,8 +45,8 @@ pub struct Sphere {
 
 impl Obstacle for Sphere {
     fn prescribed(&self) -> Prescribed<'_> {
-        let axis = self.axis.as_deref().unwrap_or_default();
-        Prescribed { centre: &self.centre, rotation: self.rotation.as_ref(), axis, ..Prescribed::default() }
+        let (rotation, axis) = (self.rotation.as_ref(), self.axis.as_deref());
+        Prescribed { centre: &self.centre, rotation, axis, ..Prescribed::default() }
     }
 
     fn ray<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {

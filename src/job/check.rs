@@ -1,0 +1,248 @@
+//! Checks of a job: each table by itself, and tables that refer to each other.
+
+use super::document::{
+    Contact, Job, Method, check_contact, check_contact_names, check_material, check_material_in_body,
+};
+use super::findings::{MeshNames, Table};
+use crate::laws::law::header;
+use crate::laws::material::Material;
+
+impl Job {
+    /// All materials with their paths: the main one, then those of the regions.
+    pub fn materials(&self) -> impl Iterator<Item = (String, &Material)> {
+        let regions = self.region.iter().enumerate();
+        let regions = regions.map(|(index, region)| (format!("region.{index}.material"), &region.material));
+        std::iter::once(("material".to_owned(), &self.material)).chain(regions)
+    }
+
+    /// The material of the cells of a region of the mesh.
+    pub fn material_of(&self, region: &str) -> &Material {
+        self.region.iter().find(|named| named.name == region).map_or(&self.material, |named| &named.material)
+    }
+}
+
+/// All checks that are possible before a mesh file is read.
+pub(super) fn check(job: &Job, table: &mut Table<'_>) {
+    check_material(&job.material, &mut table.table("material"), !job.region.is_empty());
+    table.each("region", &job.region, |region, table| region.check(table));
+    let names = job.region.iter().map(|region| &*region.name);
+    table.refuse_same(("region", "name"), names, ["regions have the name", "give each region its own name"]);
+    table.each("support", &job.support, |support, table| support.check(table));
+    check_claims(job, table);
+    table.each("traction", &job.traction, |traction, table| traction.check(table));
+    check_density_and_elasticity(job, table);
+    if let Some(initial) = &job.initial {
+        initial.check(&mut table.table("initial"));
+    }
+    check_method(job, table);
+    check_strengths(job, table);
+    table.each("contact", &job.contact, |contact, table| check_contact(contact, table, job.time.scheme));
+    job.time.check(&mut table.table("time"));
+    if let Some(checkpoint) = &job.checkpoint {
+        checkpoint.check(&mut table.table("checkpoint"), job.time.end);
+    }
+    check_midpoint(job, table);
+    job.solver.check(&mut table.table("solver"));
+    job.output.check(&mut table.table("output"), job.time.end);
+    check_expected(job, table);
+    if let Some(names) = job.mesh.names() {
+        job.mesh.check(&mut table.table("mesh"));
+        check_names(job, table, names);
+    }
+}
+
+/// The checks that need the dimension and the names of the mesh.
+pub(super) fn check_names(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>) {
+    check_hypothesis(job, table, mesh.dimension);
+    for (path, material) in job.materials() {
+        check_material_in_body(
+            material,
+            &mut table.table(&path),
+            (&job.mesh, mesh.dimension, job.material.hypothesis),
+        );
+    }
+    check_regions(job, table, mesh);
+    table.each("support", &job.support, |support, table| support.check_names(table, mesh));
+    table.each("traction", &job.traction, |traction, table| traction.check_names(table, mesh));
+    table.each("contact", &job.contact, |contact, table| check_contact_names(contact, table, mesh));
+    table.each("body_force", &job.body_force, |force, table| {
+        table.check_vector("value", &force.value, mesh.dimension);
+    });
+    if let Some(gravity) = &job.gravity {
+        table.check_vector("gravity.acceleration", &gravity.acceleration, mesh.dimension);
+    }
+    if let Some(initial) = &job.initial {
+        initial.check_in_body(&mut table.table("initial"), (mesh.dimension, job.material.hypothesis));
+    }
+    job.output.check_names(&mut table.table("output"), mesh, job.mesh.size());
+    warn_of_inner_facets(job, table, mesh);
+}
+
+fn check_hypothesis(job: &Job, table: &mut Table<'_>, dimension: usize) {
+    let is_given = job.material.hypothesis.is_some();
+    if dimension == 2 && !is_given {
+        let help = "add hypothesis = \"plane_stress\" or \"plane_strain\" to [material]";
+        table.fault("material", "a 2D body needs a hypothesis", help);
+    }
+    if dimension == 3 && is_given {
+        table.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
+    }
+}
+
+/// Regions are those of the mesh. Cells of others have the main material, which may be empty only if there are none.
+fn check_regions(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>) {
+    table.each("region", &job.region, |region, table| {
+        table.check_name("name", &region.name, mesh.regions, "region");
+    });
+    let other = mesh.regions.iter().find(|name| !job.region.iter().any(|region| region.name == **name));
+    if let Some(other) = other.filter(|_| !job.region.is_empty() && !job.material.resists()) {
+        let message = format!(
+            "the region \"{other}\" of the mesh has the material of [material], which has no density, no elasticity and no viscosity"
+        );
+        let help = "add density, elasticity or viscosity, or a [[region]] for it";
+        table.fault("material", message, help);
+    }
+}
+
+/// A boundary without free components cannot have a contact, and a boundary may occur in one contact table only.
+fn check_claims(job: &Job, table: &mut Table<'_>) {
+    let dimension = job.dimension().unwrap_or(3);
+    let holds = |name: &String| {
+        job.support.iter().any(|support| support.on.contains(name) && support.holds_all(dimension))
+    };
+    for (number, contact) in job.contact.iter().enumerate() {
+        let is_rival = |other: &&Contact| contact.part.is_none() || other.part.is_none();
+        let taken = |name| job.contact[..number].iter().filter(is_rival).any(|other| other.on.contains(name));
+        for (index, name) in contact.on.iter().enumerate() {
+            let path = format!("contact.{number}.on.{index}");
+            if holds(name) {
+                let message =
+                    format!("the boundary \"{name}\" has a contact, but a support fixes all its components");
+                table.fault(&path, message, "remove it from one of the two tables");
+            }
+            if taken(name) {
+                let message = format!("the boundary \"{name}\" is in two [[contact]] tables");
+                let help = "a boundary has one contact law: remove it from one of them, or give each its part by `where`";
+                table.fault(&path, message, help);
+            }
+        }
+    }
+    for (number, traction) in job.traction.iter().enumerate() {
+        for (index, name) in traction.on.iter().enumerate().filter(|(_, name)| holds(name)) {
+            table.warn(format!(
+                "traction.{number}.on.{index}: a support fixes all components on \"{name}\"; the traction has no effect"
+            ));
+        }
+    }
+}
+
+/// Gravity acts on materials with a density, an initial stress and the error indicator require elasticity.
+fn check_density_and_elasticity(job: &Job, table: &mut Table<'_>) {
+    if job.gravity.is_some() && job.materials().all(|(_, material)| material.density.is_none()) {
+        let message = "gravity requires a material with a density, but no material has one";
+        let help = "give [material] density; for a body without inertia, write the weight as [[body_force]]";
+        table.fault_at_key("gravity", message, help);
+    }
+    let has_stress = job.initial.as_ref().is_some_and(|initial| initial.stress.is_some());
+    if has_stress && job.materials().all(|(_, material)| material.elasticity.is_none()) {
+        let message = "an initial stress requires an elastic material";
+        table.fault_at_key("initial.stress", message, "add [material.elasticity]");
+    }
+    let rigid = job.materials().filter(|(_, material)| material.elasticity.is_none());
+    for (path, _) in rigid.filter(|_| job.output.error_indicator) {
+        let elasticity = header(&format!("{path}.elasticity"));
+        let region =
+            job.region.iter().enumerate().find(|(index, _)| path == format!("region.{index}.material"));
+        let whose = region.map_or(String::new(), |(_, region)| format!(" of region \"{}\"", region.name));
+        let message = format!("the error indicator needs {elasticity}{whose}");
+        let help =
+            "it measures stress errors in the elastic energy norm: add elasticity, or delete error_indicator";
+        table.fault("output.error_indicator", message, help);
+    }
+}
+
+/// PETSc's solver for variational inequalities supports bounds only.
+fn check_method(job: &Job, table: &mut Table<'_>) {
+    let has_bounds =
+        job.contact.iter().all(|contact| contact.normal.is_bound() && contact.friction.is_none());
+    if job.solver.method == Method::Vinewtonrsls && (job.contact.is_empty() || !has_bounds) {
+        let message = "this method requires that every contact is frictionless and `unilateral`";
+        table.fault("solver.method", message, "use \"newton\", or delete the key");
+    }
+}
+
+/// Where boundaries meet, the bonds of a node break together: by one rule.
+fn check_strengths(job: &Job, table: &mut Table<'_>) {
+    let contacts = job.contact.iter().enumerate();
+    let mut bonded =
+        contacts.filter_map(|(number, contact)| Some((number, contact.adhesion?.strength.is_some())));
+    let Some((_, first)) = bonded.next() else { return };
+    for (number, _) in bonded.filter(|(_, has_strength)| *has_strength != first) {
+        let message = "either all adhesion tables of a job have a `strength` or none has";
+        let help = "give all of them a strength, or delete the key everywhere";
+        table.fault_at_key(&format!("contact.{number}.adhesion"), message, help);
+    }
+}
+
+/// What cannot be extrapolated from the midpoint of a step is refused: histories that change in one direction only, and velocities that
+/// jump.
+fn check_midpoint(job: &Job, table: &mut Table<'_>) {
+    let scheme = job.time.scheme;
+    if !scheme.is_midpoint() {
+        return;
+    }
+    let mut refuse = |path: &str, is_there: bool| {
+        if is_there {
+            let message = format!("`{path}` is not available with scheme \"{}\"", scheme.name());
+            table.fault_at_key(path, message, "use [time] scheme = \"bdf2\", or delete the key");
+        }
+    };
+    job.materials().for_each(|(path, material)| refuse(&format!("{path}.damage"), material.damage.is_some()));
+    for (number, contact) in job.contact.iter().enumerate() {
+        refuse(&format!("contact.{number}.adhesion"), contact.adhesion.is_some());
+        refuse(&format!("contact.{number}.memory"), contact.memory.is_some());
+    }
+    for (number, support) in job.support.iter().enumerate() {
+        support.motions().for_each(|(key, _)| refuse(&format!("support.{number}.{key}"), true));
+    }
+    refuse("time.adaptive", job.time.adaptive.is_some());
+    for (number, _) in job.contact.iter().enumerate().filter(|(_, contact)| !contact.redistribute_mass) {
+        let message = format!(
+            "with scheme \"{}\" nodes with mass would rebound from the obstacle in each step",
+            scheme.name()
+        );
+        let help = "add redistribute_mass = true, or use another scheme";
+        table.fault_at_key(&format!("contact.{number}"), message, help);
+    }
+}
+
+/// An expected result has a tolerance, and belongs to a probe that exists.
+fn check_expected(job: &Job, table: &mut Table<'_>) {
+    for (quantity, expected) in &job.check {
+        if expected.relative.is_none() && expected.absolute.is_none() {
+            let message = format!("\"{quantity}\" has no tolerance");
+            let help = "add relative = 1e-6, or absolute in the quantity's own unit";
+            table.fault_at_name(("check", quantity), message, help);
+        }
+        let name = quantity.strip_prefix("probe.").and_then(|rest| rest.split('.').next());
+        if let Some(name) = name.filter(|name| !job.output.probe.iter().any(|probe| probe.name == *name)) {
+            table.warn(format!("[check] \"{quantity}\": the job has no probe \"{name}\""));
+        }
+    }
+}
+
+/// Physical groups of facets inside the body that no table names are ignored.
+fn warn_of_inner_facets(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>) {
+    let lists = job.support.iter().map(|support| &support.on);
+    let lists = lists.chain(job.traction.iter().map(|traction| &traction.on));
+    let lists = lists.chain(job.contact.iter().map(|contact| &contact.on));
+    let profiles = job.output.profile.iter().map(|profile| &profile.on);
+    let named: Vec<&String> = lists.flatten().chain(profiles).collect();
+    for [name, place] in mesh.inner {
+        if mesh.points.contains(name) || !named.iter().any(|other| other == name) {
+            table.warn(format!(
+                "the physical group \"{name}\" has facets inside the body, for example around {place}: it is not a boundary, and is ignored"
+            ));
+        }
+    }
+}
