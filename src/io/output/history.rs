@@ -1,32 +1,24 @@
 //! `history.csv`, with one row per step.
 
-use super::csv::{CsvFile, Number, Numbers, Time};
+use super::{
+    columns::{BEFORE_IMBALANCE, HISTORY},
+    csv::{CsvFile, Number, Numbers, Time},
+};
 use crate::{
     error::Result,
-    fem::effect::{CONTACT, ENERGIES, Energy, EnergyKind, Peaks, Role},
+    fem::effect::{CONTACT, ENERGIES, Energy, Peaks, Role},
     linear_algebra::tensor::larger,
     solver::stepping::{StepLevel, StepOutcome},
 };
 use serde::{Deserialize, Serialize};
 use std::{cmp::Ordering, path::Path};
 
-const STEP_COLUMNS: &str =
-    "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual";
-
-/// All columns.
-pub(crate) fn columns() -> impl Iterator<Item = &'static str> {
-    STEP_COLUMNS.split(',').chain(in_columns(|kind| kind.column, || "energy_imbalance"))
-}
-
-/// Number of energy columns before the column of the imbalance.
-const BEFORE_IMBALANCE: usize = 6;
-
 /// Energies in the order of the file.
-fn in_columns<T>(energy: impl Fn(EnergyKind) -> T, imbalance: impl Fn() -> T) -> [T; ENERGIES.len() + 1] {
+fn in_columns(totals: &Totals) -> [f64; ENERGIES.len() + 1] {
     std::array::from_fn(|at| match at.cmp(&BEFORE_IMBALANCE) {
-        Ordering::Less => energy(ENERGIES[at]),
-        Ordering::Equal => imbalance(),
-        Ordering::Greater => energy(ENERGIES[at - 1]),
+        Ordering::Less => totals.energy[ENERGIES[at]],
+        Ordering::Equal => totals.energy_imbalance,
+        Ordering::Greater => totals.energy[ENERGIES[at - 1]],
     })
 }
 
@@ -223,8 +215,9 @@ pub struct History(CsvFile);
 impl History {
     /// Creates the file, or continues it after this step.
     pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
-        let path = folder.join("history.csv");
-        let header = columns().collect::<Vec<_>>().join(",");
+        let path = folder.join(HISTORY.file);
+        // All columns are the same in the plane and in space.
+        let header = HISTORY.header(3, &[true; 2]);
         Ok(Self(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?))
     }
 
@@ -245,7 +238,7 @@ impl History {
             outcome.linear_iterations,
             outcome.active_changes,
             Number(outcome.inclusion_residual),
-            Numbers(&in_columns(|kind| totals.energy[kind], || totals.energy_imbalance))
+            Numbers(&in_columns(totals))
         ))
     }
 

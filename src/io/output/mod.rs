@@ -4,6 +4,7 @@ pub mod checkpoint;
 pub mod checkpoint_file;
 pub mod checkpoint_folder;
 pub mod checksum;
+pub(crate) mod columns;
 mod contact_points;
 pub(crate) mod csv;
 pub mod error_indicator;

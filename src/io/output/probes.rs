@@ -1,6 +1,9 @@
 //! `probes.csv`: displacement and velocity at points of the body, with one row per step and probe.
 
-use super::csv::{CsvFile, Numbers, Time, entry};
+use super::{
+    columns::PROBES,
+    csv::{CsvFile, Numbers, Time, entry},
+};
 use crate::{
     error::{Error, Result},
     fem::{space::Simplex, state::State},
@@ -64,11 +67,9 @@ impl<const D: usize> Probes<D> {
         if self.is_empty() {
             return Ok(());
         }
-        let path = folder.join("probes.csv");
-        let axes = &["x", "y", "z"][..D];
-        let columns = |what: &str| axes.iter().map(|a| format!(",{what}_{a}")).collect::<String>();
-        let header = format!("step,time,probe{}{}", columns("displacement"), columns("velocity"));
-        self.file = Some(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?);
+        let path = folder.join(PROBES.file);
+        self.file =
+            Some(CsvFile::open(&path, &PROBES.header(D, &[true]), goes_on_after.map(|step| step as f64))?);
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! `profiles.csv`: values along boundaries, with one row per facet node, output time and profile.
 
 use super::{
+    columns::PROFILES,
     contact_points::contact_points,
     csv::{CsvFile, Numbers, Time, entry},
     output_field::Converged,
@@ -83,21 +84,8 @@ impl<const D: usize> Profiles<D> {
         if self.profiles.is_empty() {
             return Ok(());
         }
-        let path = folder.join("profiles.csv");
-        let axes = ["x", "y", "z"][..D].join(",");
-        let vector = |name: &str| -> String {
-            ["x", "y", "z"][..D].iter().map(|axis| format!(",{name}_{axis}")).collect()
-        };
-        let gap = if self.with.gap { ",gap" } else { "" };
-        let friction = if self.with.friction {
-            vector("friction_traction") + &vector("sliding_velocity")
-        } else {
-            String::new()
-        };
-        let tangential = vector("tangential_displacement");
-        let header = format!(
-            "time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{gap}{friction}{tangential}"
-        );
+        let path = folder.join(PROFILES.file);
+        let header = PROFILES.header(D, &[true, self.with.gap, self.with.friction, true]);
         self.file = Some(CsvFile::open(&path, &header, goes_on_after)?);
         Ok(())
     }

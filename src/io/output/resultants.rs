@@ -1,6 +1,9 @@
 //! `resultants.csv`: forces and moments on the body, with one row per step and source.
 
-use super::csv::{CsvFile, Numbers, Time, entry};
+use super::{
+    columns::RESULTANTS,
+    csv::{CsvFile, Numbers, Time, entry},
+};
 use crate::{
     error::Result,
     fem::{
@@ -24,18 +27,9 @@ pub(crate) struct ResultantTable<const D: usize> {
     resultants: Resultants<D>,
     /// A name for each source, no two alike, as entries of the table.
     names: Vec<String>,
-    /// Whether there are columns of contacts, and of friction.
-    with: Columns,
+    /// The groups of columns that there are.
+    with: [bool; 5],
     file: Option<CsvFile>,
-}
-
-/// The columns beside forces and moments.
-#[derive(Debug, Clone, Copy)]
-struct Columns {
-    contact: bool,
-    friction: bool,
-    /// Motion of an obstacle that a force moves, and of one that a moment turns.
-    motions: [bool; 2],
 }
 
 impl<const D: usize> ResultantTable<D> {
@@ -56,26 +50,15 @@ impl<const D: usize> ResultantTable<D> {
         let names = names.iter().map(|name| entry(name)).collect();
         let friction = job.contact.iter().any(|contact| contact.friction.is_some());
         let loads = || job.contact.iter().filter_map(|contact| contact.obstacle_load.as_ref());
-        let motions =
-            [loads().any(|load| !load.direction.is_empty()), loads().any(|load| load.moment.is_some())];
-        let with = Columns { contact: !job.contact.is_empty(), friction, motions };
+        let moves = loads().any(|load| !load.direction.is_empty());
+        let turns = loads().any(|load| load.moment.is_some());
+        let with = [true, !job.contact.is_empty(), friction, moves, turns];
         Ok(Self { resultants, names, with, file: None })
     }
 
     /// Opens the file on rank 0; continues it after this step if one is given.
     pub(crate) fn open(&mut self, folder: &Path, goes_on_after: Option<u64>) -> Result<()> {
-        let forces = ["x", "y", "z"][..D].iter().map(|axis| format!(",force_{axis}"));
-        let moments = moment_axes::<D>().iter().map(|axis| format!(",moment_{axis}"));
-        let columns: String = forces.chain(moments).collect();
-        let contact =
-            if self.with.contact { ",touching_area,open_area,mean_pressure,largest_pressure" } else { "" };
-        let friction = if self.with.friction { ",sticking_area,slipping_area" } else { "" };
-        let of_motions =
-            [",obstacle_displacement,obstacle_velocity", ",obstacle_rotation,obstacle_angular_velocity"];
-        let there = of_motions.into_iter().zip(self.with.motions).filter(|(_, is_there)| *is_there);
-        let obstacle: String = there.map(|(columns, _)| columns).collect();
-        let header = format!("step,time,source{columns}{contact}{friction}{obstacle}");
-        let path = folder.join("resultants.csv");
+        let (path, header) = (folder.join(RESULTANTS.file), RESULTANTS.header(D, &self.with));
         self.file = Some(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?);
         Ok(())
     }
@@ -95,23 +78,24 @@ impl<const D: usize> ResultantTable<D> {
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
             let rows = resultants.sources().iter().zip(resultants.rows());
             for (name, (source, (resultant, areas))) in names.iter().zip(rows) {
-                let areas = Areas { areas, with: *with };
                 let obstacle = match source {
                     Source::Contact(at) => body.contacts[*at].obstacle.as_ref(),
                     _ => None,
                 };
                 let motions = obstacle.map_or([None; 2], |obstacle| obstacle.motions());
-                let [path, turn] = [0, 1].map(|number| ObstaclePath {
-                    motion: motions[number].map(|motion| motion.balanced()),
-                    is_there: with.motions[number],
-                });
-                let moment = &resultant.moment[3 - moment_axes::<D>().len()..];
+                let [path, turn] = [0, 1].map(|number| motions[number].map(|motion| motion.balanced()));
+                let moment = &resultant.moment[if D == 2 { 2 } else { 0 }..];
+                let [_, of_contacts, of_friction, of_path, of_turn] = *with;
                 file.row(format_args!(
-                    "{},{},{name},{},{}{areas}{path}{turn}",
+                    "{},{},{name},{},{}{}{}{}{}",
                     state.step,
                     Time(time),
                     Numbers(&resultant.force),
                     Numbers(moment),
+                    Cells(areas.map(contact_cells), of_contacts),
+                    Cells(areas.map(|areas| [areas.sticking, areas.slipping]), of_friction),
+                    Cells(path, of_path),
+                    Cells(turn, of_turn),
                 ))?;
             }
             Ok(())
@@ -128,11 +112,6 @@ impl<const D: usize> ResultantTable<D> {
     pub(crate) fn flush(&mut self) -> Result<()> {
         self.file.as_mut().map_or(Ok(()), CsvFile::flush)
     }
-}
-
-/// The axes of moments.
-fn moment_axes<const D: usize>() -> &'static [&'static str] {
-    if D == 2 { &["z"] } else { &["x", "y", "z"] }
 }
 
 /// The kind of a source and its boundaries.
@@ -156,38 +135,22 @@ pub(crate) fn source_names(job: &Job) -> Vec<String> {
     supports.chain(contacts).chain(tractions).chain(others).map(|source| name(job, source)).collect()
 }
 
-/// The columns of the motion of an obstacle, each after a comma; empty where no force moves one.
-struct ObstaclePath {
-    motion: Option<[f64; 2]>,
-    is_there: bool,
-}
+/// The cells of a group of columns, if it is there, each after a comma; empty for a source without these values.
+struct Cells<const N: usize>(Option<[f64; N]>, bool);
 
-impl Display for ObstaclePath {
+impl<const N: usize> Display for Cells<N> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self.motion {
-            Some(motion) => write!(f, ",{}", Numbers(&motion)),
-            None if self.is_there => f.write_str(",,"),
-            None => Ok(()),
+        match self {
+            Self(_, false) => Ok(()),
+            Self(Some(values), true) => write!(f, ",{}", Numbers(values)),
+            Self(None, true) => (0..N).try_for_each(|_| f.write_str(",")),
         }
     }
 }
 
-/// The columns of contacts, each after a comma; empty where the source is no contact.
-struct Areas {
-    areas: Option<ContactAreas>,
-    with: Columns,
-}
-
-impl Display for Areas {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Columns { contact, friction, .. } = self.with;
-        let Some(areas) = self.areas else {
-            let count = if contact { 4 } else { 0 } + if friction { 2 } else { 0 };
-            return (0..count).try_for_each(|_| f.write_str(","));
-        };
-        let ContactAreas { touching, open, sticking, slipping, pressure, largest_pressure } = areas;
-        let pressures = if touching == 0.0 { [0.0; 2] } else { [pressure / touching, largest_pressure] };
-        write!(f, ",{},{}", Numbers(&[touching, open]), Numbers(&pressures))?;
-        if friction { write!(f, ",{}", Numbers(&[sticking, slipping])) } else { Ok(()) }
-    }
+/// Touching and open area, mean and largest pressure.
+fn contact_cells(areas: ContactAreas) -> [f64; 4] {
+    let ContactAreas { touching, open, pressure, largest_pressure, .. } = areas;
+    let [mean, largest] = if touching == 0.0 { [0.0; 2] } else { [pressure / touching, largest_pressure] };
+    [touching, open, mean, largest]
 }

@@ -3,7 +3,10 @@
 use super::table::{ROUNDING, Table};
 use crate::{
     error::{Error, Result},
-    io::output::field_snapshot::Snapshot,
+    io::output::{
+        columns::{HISTORY, PROBES, PROFILES, RESULTANTS},
+        field_snapshot::Snapshot,
+    },
     job::{Job, Loaded},
 };
 use serde_json::Value;
@@ -17,7 +20,7 @@ const MOST: usize = 12;
 const MOST_CELLS: usize = 2_000_000;
 
 /// Files that only a run creates; a folder without any of them does not belong to a run.
-const SIGNS: [&str; 5] = ["job.toml", "summary.json", "history.csv", "probes.csv", "profiles.csv"];
+const SIGNS: [&str; 5] = ["job.toml", "summary.json", HISTORY.file, PROBES.file, PROFILES.file];
 
 /// A file that is missing or cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,18 +81,18 @@ impl Found {
                 .ok_or_else(|| Error::unreadable(path, "it is not a JSON object"))
         });
         found.history =
-            found.take("history.csv", "energies, steps and iterations", |path| Table::read(path, ""));
-        found.resultants = found.take("resultants.csv", "forces of supports, contacts and loads", |path| {
+            found.take(HISTORY.file, "energies, steps and iterations", |path| Table::read(path, ""));
+        found.resultants = found.take(RESULTANTS.file, "forces of supports, contacts and loads", |path| {
             Ok(Table::read(path, "source")?.without_unfinished("step").without_rounding())
         });
         let wants = |there: fn(&Job) -> bool, job: &Option<Job>| job.as_ref().is_none_or(there);
-        if folder.join("probes.csv").exists() || wants(|job| !job.output.probe.is_empty(), &found.job) {
-            found.probes = found.take("probes.csv", "probes over time", |path| {
+        if folder.join(PROBES.file).exists() || wants(|job| !job.output.probe.is_empty(), &found.job) {
+            found.probes = found.take(PROBES.file, "probes over time", |path| {
                 Ok(Table::read(path, "probe")?.without_unfinished("step").without_rounding())
             });
         }
-        if folder.join("profiles.csv").exists() || wants(|job| !job.output.profile.is_empty(), &found.job) {
-            found.profiles = found.take("profiles.csv", "values along boundaries", |path| {
+        if folder.join(PROFILES.file).exists() || wants(|job| !job.output.profile.is_empty(), &found.job) {
+            found.profiles = found.take(PROFILES.file, "values along boundaries", |path| {
                 Ok(Table::read(path, "profile")?.without_unfinished("time").without_rounding())
             });
         }

@@ -16,6 +16,7 @@ use super::{
 use crate::{
     error::Result,
     io::output::{
+        columns::PROFILES,
         field_list::{CONTACT_STATUS, FIELDS},
         field_snapshot::Snapshot,
         fields::{Place, Shape},
@@ -466,7 +467,7 @@ impl<'a> Boundary<'a> {
             };
             let arrows: Vec<[[f64; 2]; 2]> =
                 (0..feet.len()).step_by(feet.len().div_ceil(MOST_ARROWS)).map(arrow).collect();
-            let unit = unit_by_name(column);
+            let unit = PROFILES.unit(column, self.dimension);
             let heading = format!("longest arrow {} {unit}, {}", number(largest), body.magnified());
             let time = number(self.time);
             out.push(Picture::new(
@@ -486,7 +487,7 @@ impl<'a> Boundary<'a> {
 }
 
 fn is_quantity(column: &str) -> bool {
-    !["time", "profile", "x", "y", "z"].contains(&column)
+    !PROFILES.keys.contains(&column) && !["x", "y", "z"].contains(&column)
 }
 
 #[cfg(test)]

@@ -5,12 +5,13 @@ use super::{
     markup::capital,
     page::Pictures,
     picture::Picture,
-    scale::{extent, number, unit_by_name},
+    scale::{extent, number},
     table::Table,
 };
 use crate::{
     error::Result,
     fem::effect::{ENERGIES, Role},
+    io::output::columns::{HISTORY, PROBES, RESULTANTS},
 };
 
 /// Number of probes in one chart above which lines cannot be distinguished.
@@ -21,10 +22,10 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
     let names = table.names();
     let tables: Vec<Table> = names.iter().take(MOST_PROBES).map(|name| table.of(name)).collect();
     let mut out = Pictures::default();
-    for column in table.header().iter().filter(|name| !["step", "time", "probe"].contains(&name.as_str())) {
+    for column in table.header().iter().filter(|name| !PROBES.keys.contains(&name.as_str())) {
         let curves: Vec<Vec<[f64; 2]>> = tables.iter().map(|table| table.curve("time", column)).collect();
         let quantity = column.replace('_', " ");
-        let unit = unit_by_name(column);
+        let unit = PROBES.unit(column, 3);
         let last = |curve: &[[f64; 2]]| curve.last().map_or(0.0, |point| point[1]);
         let range = |curve: &Vec<[f64; 2]>| extent(curve.iter().map(|point| point[1]));
         if curves.iter().filter_map(range).all(is_constant) {
@@ -70,7 +71,6 @@ struct Columns<'a> {
 
 /// The components of the force of each source; of each contact the area by state, the pressure and the motion of its obstacle.
 pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
-    let of = |unit: [&'static str; 2]| unit[dimension - 2];
     let axes = ["x", "y", "z"];
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
     let forces: Vec<&str> = forces.iter().map(String::as_str).collect();
@@ -85,19 +85,20 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
         let is_felt =
             |force: &&str| rows.column(force).is_some_and(|values| values.iter().any(|value| *value != 0.0));
         let (felt, unfelt): (Vec<&str>, Vec<&str>) = forces.iter().copied().partition(is_felt);
-        let unit = of(["N/m", "N"]);
+        let unit = RESULTANTS.unit("force_x", dimension);
         let none = unfelt.iter().map(|force| format!("{} of {what}: 0 {unit}", force.replace('_', " ")));
         out.constant.extend(none);
         let name = format!("force_{number}");
         let drawn = Columns { name: &name, what, source: what, quantity, unit, columns: &felt };
         draw(&rows, &drawn, &mut out)?;
         if source.starts_with("contact") {
-            for (name, quantity, unit, columns) in [
-                ("area", "area", of(["m", "m²"]), &areas[..]),
-                ("pressure", "contact pressure", "Pa", &["mean_pressure", "largest_pressure"]),
-                ("obstacle_displacement", "displacement of the obstacle", "m", &["obstacle_displacement"]),
-                ("obstacle_rotation", "rotation of the obstacle", "rad", &["obstacle_rotation"]),
+            for (name, quantity, columns) in [
+                ("area", "area", &areas[..]),
+                ("pressure", "contact pressure", &["mean_pressure", "largest_pressure"]),
+                ("obstacle_displacement", "displacement of the obstacle", &["obstacle_displacement"]),
+                ("obstacle_rotation", "rotation of the obstacle", &["obstacle_rotation"]),
             ] {
+                let unit = RESULTANTS.unit(columns[0], dimension);
                 let name = format!("{name}_{number}");
                 let what = format!("{source}, {quantity}");
                 draw(
@@ -129,7 +130,6 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
         Curve {
             column: "energy_imbalance",
             quantity: "energy imbalance",
-            unit: "",
             caption: "Energy imbalance of each step: error of its energy balance relative to the largest energy exchanged so far",
             is_logarithmic: true,
             tolerance: None,
@@ -184,13 +184,13 @@ fn draw(table: &Table, columns: &Columns<'_>, out: &mut Pictures) -> Result<()> 
 /// Properties of the steps: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.
 pub(super) fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture>> {
     let mut out = Vec::new();
-    for (column, quantity, unit, caption) in [
-        ("newton_iterations", "Newton iterations", "", "Newton iterations of each step"),
-        ("linear_iterations", "linear iterations", "", "Iterations of the linear solver in each step"),
-        ("dt", "step", "s", "Length of the steps"),
-        ("active_changes", "nodes", "", "Contact points that changed their branch in each step"),
+    for (column, quantity, caption) in [
+        ("newton_iterations", "Newton iterations", "Newton iterations of each step"),
+        ("linear_iterations", "linear iterations", "Iterations of the linear solver in each step"),
+        ("dt", "step", "Length of the steps"),
+        ("active_changes", "nodes", "Contact points that changed their branch in each step"),
     ] {
-        let curve = Curve { column, quantity, unit, caption, is_logarithmic: false, tolerance: None };
+        let curve = Curve { column, quantity, caption, is_logarithmic: false, tolerance: None };
         out.extend(over_time(table, curve)?);
     }
     out.extend(over_time(
@@ -198,7 +198,6 @@ pub(super) fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture
         Curve {
             column: "inclusion_residual",
             quantity: "inclusion residual",
-            unit: "",
             caption: "Inclusion residual of each step: scaled distance of velocity and pressure to the contact law",
             is_logarithmic: true,
             tolerance,
@@ -211,7 +210,6 @@ pub(super) fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture
 struct Curve<'a> {
     column: &'a str,
     quantity: &'a str,
-    unit: &'a str,
     caption: &'a str,
     is_logarithmic: bool,
     /// A constant value that is drawn as a line.
@@ -220,7 +218,8 @@ struct Curve<'a> {
 
 /// A column over time; none if it is constant.
 fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
-    let Curve { column, quantity, unit, caption, is_logarithmic, tolerance } = curve;
+    let Curve { column, quantity, caption, is_logarithmic, tolerance } = curve;
+    let unit = HISTORY.unit(column, 3);
     let points = table.curve("time", column);
     let Some((low, high)) = extent(points.iter().map(|p| p[1])) else { return Ok(None) };
     // No picture of what is constant, such as the length of the steps of most runs.

@@ -2,7 +2,7 @@
 
 use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values};
 use crate::{
-    io::output::{field_list::FIELDS, history::columns, resultants::source_names},
+    io::output::{columns::RunTable, field_list::FIELDS, resultants::source_names},
     job::{Document, Job},
     laws::nearest::nearest,
 };
@@ -145,23 +145,6 @@ fn check_exact(exact: &Exact, of: Quantity, base: &Job, path: &str, document: &m
     }
 }
 
-/// Columns of `resultants.csv`, beside those of forces and moments.
-const OF_RESULTANTS: [&str; 10] = [
-    "touching_area",
-    "open_area",
-    "mean_pressure",
-    "largest_pressure",
-    "sticking_area",
-    "slipping_area",
-    "obstacle_displacement",
-    "obstacle_velocity",
-    "obstacle_rotation",
-    "obstacle_angular_velocity",
-];
-
-/// Columns of `profiles.csv`, beside those of coordinates and vectors.
-const OF_PROFILES: [&str; 4] = ["normal_displacement", "normal_velocity", "contact_pressure", "gap"];
-
 /// The numbers of `summary.json`, beside those in objects.
 const OF_SUMMARY: [&str; 19] = [
     "ranks",
@@ -187,28 +170,12 @@ const OF_SUMMARY: [&str; 19] = [
 
 /// The names that the last part of a response may have, if they are known before the runs.
 fn known_columns(parts: &[&str], base: &Job) -> Vec<String> {
-    let axes = &["x", "y", "z"][..base.dimension().unwrap_or(3)];
-    let vectors = |names: &[&str]| -> Vec<String> {
-        names.iter().flat_map(|name| axes.iter().map(move |axis| format!("{name}_{axis}"))).collect()
-    };
-    let plain = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-    let mut known = match parts {
-        ["probe", ..] => vectors(&["displacement", "velocity"]),
-        ["profile", ..] => vectors(&["friction_traction", "sliding_velocity", "tangential_displacement"]),
-        ["resultant", ..] => vectors(&["force"]),
-        _ => Vec::new(),
-    };
-    known.extend(match parts {
-        ["profile", ..] => [plain(axes), plain(&OF_PROFILES)].concat(),
-        ["resultant", ..] => [plain(&["moment_x", "moment_y", "moment_z"]), plain(&OF_RESULTANTS)].concat(),
-        ["history", ..] => columns().map(str::to_owned).collect(),
-        [_] => {
-            let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.names);
-            OF_SUMMARY.iter().chain(figures).map(|name| (*name).to_owned()).collect()
-        }
-        _ => Vec::new(),
-    });
-    known
+    if let Some(table) = parts.first().and_then(|word| RunTable::of(word)) {
+        return table.columns(base.dimension().unwrap_or(3)).map(|(name, _)| name).collect();
+    }
+    let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.names);
+    let of_summary = OF_SUMMARY.iter().chain(figures).filter(|_| parts.len() == 1);
+    of_summary.map(|name| (*name).to_owned()).collect()
 }
 
 /// Checks that the quantity is one of a known form, that the base job has its probe or profile, and that it is a column of its table.
@@ -239,8 +206,7 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
             true
         }
         ["history", _] | ["history", "max" | "min", _] => true,
-        ["probe" | "profile" | "history" | "resultant", ..] => false,
-        ref parts => parts.iter().all(|part| !part.is_empty()),
+        ref parts => RunTable::of(parts[0]).is_none() && parts.iter().all(|part| !part.is_empty()),
     };
     let parts: Vec<&str> = name.split('.').collect();
     let known = known_columns(&parts, base);

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    io::output::csv::records,
+    io::output::{columns::PROBES, csv::records},
     linear_algebra::tensor::larger,
     parallel::session::Session,
 };
@@ -238,7 +238,7 @@ fn value_at(rows: &[(f64, f64)], time: f64) -> Option<f64> {
 
 /// Time and value in the rows of a probe.
 fn column(folder: &Path, probe: &ProbeError) -> Result<Vec<(f64, f64)>> {
-    let path = folder.join("probes.csv");
+    let path = folder.join(PROBES.file);
     let bytes = std::fs::read(&path).map_err(|error| Error::unreadable(&path, error))?;
     let mut rows = records(&bytes).map(|record| record.entries);
     let header = rows.next().unwrap_or_default();

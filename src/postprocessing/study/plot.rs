@@ -12,8 +12,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::effect::{ENERGIES, Energy},
-    io::output::field_snapshot::Snapshot,
+    io::output::{columns::RunTable, field_snapshot::Snapshot},
     job::Job,
     postprocessing::drawing::{
         body::{Body, Coloured},
@@ -220,28 +219,13 @@ fn response(
 
 /// The unit of a response of bodies of this dimension; empty for numbers without one.
 fn unit_of_response(name: &str, dimension: usize) -> &'static str {
-    let of = |units: [&'static str; 2]| units[dimension - 2];
     let (source, column) = (name.split('.').next(), name.rsplit('.').next().unwrap_or(name));
-    if source == Some("history") {
-        let is_energy = ENERGIES.iter().any(|kind| kind.column == column);
-        return if is_energy { Energy::unit(dimension) } else { unit_by_name(column) };
+    if let Some(table) = source.and_then(RunTable::of) {
+        return table.unit(column, dimension);
     }
-    let known = [
-        ("force_", of(["N/m", "N"])),
-        ("moment_", of(["N", "N m"])),
-        ("_area", of(["m", "m²"])),
-        ("angular_velocity", "rad/s"),
-        ("rotation", "rad"),
-        ("von_mises", "Pa"),
-        ("_seconds", "s"),
-        ("_bytes", "bytes"),
-    ];
+    let known = [("time", "s"), ("von_mises", "Pa"), ("_seconds", "s"), ("_bytes", "bytes")];
     let unit = known.iter().find(|(word, _)| column.contains(word)).map(|(_, unit)| *unit);
-    match column {
-        "x" | "y" | "z" => "m",
-        "time" | "dt" => "s",
-        _ => unit.unwrap_or_else(|| unit_by_name(column)),
-    }
+    unit.unwrap_or_else(|| unit_by_name(column))
 }
 
 /// The unit of a quantity whose norm is taken: that of the strain or the strain rate in V.

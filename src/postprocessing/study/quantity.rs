@@ -1,6 +1,9 @@
 //! Quantities of a finished run by name, as in `[check]` of a job.
 
-use crate::{io::output::csv::records, linear_algebra::tensor::larger};
+use crate::{
+    io::output::{columns::RunTable, csv::records},
+    linear_algebra::tensor::larger,
+};
 use std::path::Path;
 
 /// The quantity in the output folder of a run, if it exists.
@@ -10,28 +13,25 @@ use std::path::Path;
 /// boundary or at its first point, at the last output. With `.max.` or `.min.` before the column, the others are over all steps.
 pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
     let parts: Vec<&str> = name.split('.').collect();
-    // A column at the last step, or over all steps.
-    let of_steps = |table: &str, filter: Option<(&str, &str)>, words: &[&str]| match words {
-        [field] => column(folder, table, filter, field)?.pop(),
-        [side, field] => extreme(side, column(folder, table, filter, field)?.into_iter()),
-        _ => None,
+    let Some(table) = RunTable::of(parts[0]) else {
+        let text = std::fs::read_to_string(folder.join("summary.json")).ok()?;
+        let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
+        return summary.pointer(&format!("/{}", parts.join("/")))?.as_f64();
     };
-    match parts[..] {
-        ["probe", name, ref words @ ..] => of_steps("probes.csv", Some(("probe", name)), words),
-        ["resultant", source, ref words @ ..] => of_steps("resultants.csv", Some(("source", source)), words),
-        ["history", ref words @ ..] => of_steps("history.csv", None, words),
-        ["profile", boundary, side, field] => {
-            let filter = Some(("profile", boundary));
-            let times = column(folder, "profiles.csv", filter, "time")?;
-            let values = column(folder, "profiles.csv", filter, field)?;
-            let rows = times.iter().zip(values).filter(|(time, _)| Some(*time) == times.last());
+    let (filter, words) = match table.keys.last() {
+        Some(names) => (Some((*names, *parts.get(1)?)), &parts[2..]),
+        None => (None, &parts[1..]),
+    };
+    let numbers = |name: &str| column(folder, table.file, filter, name);
+    match *words {
+        [side, field] if table.keys.first() == Some(&"time") => {
+            let times = numbers("time")?;
+            let rows = times.iter().zip(numbers(field)?).filter(|(time, _)| Some(*time) == times.last());
             extreme(side, rows.map(|(_, value)| value))
         }
-        _ => {
-            let text = std::fs::read_to_string(folder.join("summary.json")).ok()?;
-            let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
-            summary.pointer(&format!("/{}", parts.join("/")))?.as_f64()
-        }
+        [field] if table.keys.first() != Some(&"time") => numbers(field)?.pop(),
+        [side, field] => extreme(side, numbers(field)?.into_iter()),
+        _ => None,
     }
 }
 

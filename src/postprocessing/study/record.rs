@@ -3,6 +3,7 @@
 use super::{document::Take, plan::Planned};
 use crate::{
     error::{Error, Result},
+    io::output::columns::{HISTORY, PROBES, PROFILES, RESULTANTS},
     parallel::session::Session,
     run::version,
 };
@@ -13,7 +14,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 /// Files from which errors and responses are computed.
 const RESULTS: [&str; 6] =
-    ["fields.vtkhdf", "probes.csv", "profiles.csv", "resultants.csv", "history.csv", "summary.json"];
+    ["fields.vtkhdf", PROBES.file, PROFILES.file, RESULTANTS.file, HISTORY.file, "summary.json"];
 /// Name of the file in the folder of the run.
 const FILE: &str = "run.json";
 

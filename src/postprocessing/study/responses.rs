@@ -1,7 +1,11 @@
 //! Responses: quantities of the finished runs.
 
 use super::{plan::Plan, quantity::quantity, results::Results};
-use crate::{io::output::csv::records, laws::nearest::nearest, parallel::session::Session};
+use crate::{
+    io::output::{columns::RunTable, csv::records},
+    laws::nearest::nearest,
+    parallel::session::Session,
+};
 use std::path::Path;
 
 /// Adds the responses of the completed runs; a quantity that a run does not have is an error of this run. Collective.
@@ -38,19 +42,12 @@ fn near(folder: &Path, name: &str) -> Option<String> {
     let read = |file: &str| std::fs::read_to_string(folder.join(file)).unwrap_or_default();
     let mut known: Vec<String> = Vec::new();
     let (prefix, column) = name.rsplit_once('.').unwrap_or(("", name));
-    let table = match prefix.split('.').next() {
-        Some("history") => "history.csv",
-        Some("probe") => "probes.csv",
-        Some("profile") => "profiles.csv",
-        Some("resultant") => "resultants.csv",
-        _ => "",
-    };
-    if table.is_empty() {
+    let Some(table) = prefix.split('.').next().and_then(RunTable::of) else {
         let summary = serde_json::from_str(&read("summary.json")).unwrap_or_default();
         numbers(&summary, "", &mut known);
         return nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
-    }
-    known.extend(records(read(table).as_bytes()).next().into_iter().flat_map(|header| header.entries));
+    };
+    known.extend(records(read(table.file).as_bytes()).next().into_iter().flat_map(|header| header.entries));
     nearest(column, known.iter().map(String::as_str)).map(|near| format!("{prefix}.{near}"))
 }
 
