@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::laws::{lines::wrapped, nearest::nearest};
 
 /// A table of the document and its keys.
-struct Table {
+struct DescribedTable {
     /// Keys joined by dots.
     path: String,
     /// Whether the table is written with two brackets and may occur several times.
@@ -41,7 +41,7 @@ pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
             return Ok(format!("[{path}]\n{}", found.text()));
         }
     }
-    let shown: Vec<&Table> = all
+    let shown: Vec<&DescribedTable> = all
         .iter()
         .filter(|table| {
             wanted.is_empty()
@@ -84,7 +84,7 @@ pub(crate) fn markdown_of(kind: Kind) -> String {
     page
 }
 
-fn unknown_table(kind: Kind, wanted: &str, all: &[Table]) -> Error {
+fn unknown_table(kind: Kind, wanted: &str, all: &[DescribedTable]) -> Error {
     let help = match nearest(wanted, all.iter().map(|table| table.path.as_str())) {
         Some(near) => format!("did you mean `{near}`?"),
         None => match tables_with(kind, wanted) {
@@ -111,7 +111,7 @@ pub(super) fn tables_with(kind: Kind, key: &str) -> Option<String> {
     (!found.is_empty()).then(|| found.join(", "))
 }
 
-fn tables(kind: Kind) -> Vec<Table> {
+fn tables(kind: Kind) -> Vec<DescribedTable> {
     let mut all = Vec::new();
     let document = kind.root();
     let required: Vec<&str> = document.required().collect();
@@ -121,7 +121,7 @@ fn tables(kind: Kind) -> Vec<Table> {
     all
 }
 
-fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
+fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<DescribedTable>) {
     let several = schema.accepts("array");
     let body = if several { schema.items().unwrap_or(schema) } else { schema };
     let mut meaning = flat(schema.text("description").unwrap_or_default());
@@ -165,7 +165,7 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
             if free.accepts("array") { "\"name\" = [..]".to_owned() } else { format!("[{path}.\"name\"]") };
         meaning.push_str(&format!(" Each: {other} or \"name\" = {{ .. }}."));
     }
-    all.insert(at, Table { path: path.to_owned(), several, keys, meaning });
+    all.insert(at, DescribedTable { path: path.to_owned(), several, keys, meaning });
 }
 
 /// Whether it is a table of keys; an expression, in place of which a table over time may stand, is a value.
@@ -177,7 +177,7 @@ fn is_tables(schema: Schema) -> bool {
     schema.accepts("array") && schema.items().is_some_and(is_table)
 }
 
-impl Table {
+impl DescribedTable {
     /// Its name in brackets, as in a document.
     fn title(&self) -> String {
         if self.several { format!("[[{}]]", self.path) } else { format!("[{}]", self.path) }

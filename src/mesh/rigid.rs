@@ -17,12 +17,12 @@ pub(super) struct Skeleton<const D: usize> {
     /// Components held at each point by an immovable body.
     pub held: Vec<[bool; D]>,
     /// The bodies, by number.
-    pub bodies: Vec<Body<D>>,
+    pub bodies: Vec<RigidBody<D>>,
 }
 
 /// The constraints on the rigid motions of a body.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Body<const D: usize> {
+pub(super) struct RigidBody<const D: usize> {
     /// Linear constraints on its motions.
     pub rows: Vec<Motion>,
     /// The points that it shares with other bodies.
@@ -72,7 +72,7 @@ impl<const D: usize> Skeleton<D> {
     }
 }
 
-impl<const D: usize> Body<D> {
+impl<const D: usize> RigidBody<D> {
     /// An orthonormal basis of the free motions.
     fn free(&self, points: &[Vector<D>], held: &[[bool; D]]) -> Vec<Motion> {
         let rows = || {
@@ -228,7 +228,7 @@ mod tests {
             let centre = points.iter().fold([0.0; D], |sum, &p| add_scaled(&sum, share, &mesh.nodes[p]));
             let distance = |&p: &usize| norm(&add_scaled(&mesh.nodes[p], -1.0, &centre));
             let radius = points.iter().map(distance).fold(0.0, f64::max);
-            Body { rows: Vec::new(), points, centre, radius }
+            RigidBody { rows: Vec::new(), points, centre, radius }
         };
         let skeleton = Skeleton {
             points: mesh.nodes.clone(),

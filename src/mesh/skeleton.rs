@@ -2,7 +2,7 @@
 
 use super::{
     Mesh,
-    rigid::{Body, Motion, Skeleton, absent, extend},
+    rigid::{Motion, RigidBody, Skeleton, absent, extend},
     shape::{centroid, signed_measure},
     surface::Bodies,
 };
@@ -107,7 +107,7 @@ fn frames<const D: usize>(
     mesh: &Mesh<D>,
     bodies: &Bodies,
     nodes: &[Vec<u32>],
-) -> Result<Vec<Body<D>>, Agreed> {
+) -> Result<Vec<RigidBody<D>>, Agreed> {
     let mut sums = vec![0.0; bodies.count * (D + 1)];
     for (cell, &body) in bodies.of_cell.iter().enumerate() {
         let corners = mesh.corners(cell);
@@ -128,7 +128,7 @@ fn frames<const D: usize>(
     for ranks in gather(session.world(), &own)?.chunks_exact(bodies.count.max(1)) {
         radii.iter_mut().zip(ranks).for_each(|(radius, reach)| *radius = reach.max(*radius));
     }
-    let body = |(centre, radius)| Body { rows: Vec::new(), points: Vec::new(), centre, radius };
+    let body = |(centre, radius)| RigidBody { rows: Vec::new(), points: Vec::new(), centre, radius };
     Ok(centres.into_iter().zip(radii).map(body).collect())
 }
 

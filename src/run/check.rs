@@ -65,7 +65,7 @@ pub struct Report {
     warnings: Vec<String>,
     output_folder: String,
     #[serde(skip)]
-    motion: Motion,
+    motion: Dynamics,
     #[serde(skip)]
     header: Vec<String>,
 }
@@ -148,9 +148,9 @@ fn report<const D: usize, const S: usize>(
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
         motion: match body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
-            _ if !body.has_form(Form::Mass) => Motion::Slow,
-            true => Motion::Impacts { may_conserve: may_conserve(job, body) },
-            false => Motion::Inertia,
+            _ if !body.has_form(Form::Mass) => Dynamics::Slow,
+            true => Dynamics::Impacts { may_conserve: may_conserve(job, body) },
+            false => Dynamics::Inertia,
         },
         header: header::lines(session, loaded, ready)?,
     })
@@ -177,24 +177,24 @@ fn may_conserve<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) ->
 }
 
 /// Up to which step the scheme of a job is stable, and which scheme suits the job.
-fn advice(scheme: &str, bound: Option<f64>, motion: Motion) -> [String; 2] {
+fn advice(scheme: &str, bound: Option<f64>, motion: Dynamics) -> [String; 2] {
     let own = match bound {
         Some(bound) => format!("{scheme} is stable with steps below {bound:.4e} s"),
         None => format!("{scheme} is stable with steps of any length"),
     };
     let suits = match motion {
-        Motion::Impacts { may_conserve: true } => {
+        Dynamics::Impacts { may_conserve: true } => {
             "contact may close in an impact: midpoint with [[contact]] redistribute_mass = true conserves the energy, implicit_euler damps \
              it; bdf2 suits bodies that touch from the start and move smoothly"
         }
-        Motion::Impacts { may_conserve: false } => {
+        Dynamics::Impacts { may_conserve: false } => {
             "contact may close in an impact: implicit_euler damps it; bdf2 suits bodies that touch from the start and move smoothly"
         }
-        Motion::Inertia => {
+        Dynamics::Inertia => {
             "no impacts: bdf2, of second order where loads are smooth; lagged_euler, the scheme of Wang and Cheng (2022), has the \
              cheapest steps, but they must be short enough to be stable"
         }
-        Motion::Slow => {
+        Dynamics::Slow => {
             "no inertia: bdf2, of second order where loads and contact change smoothly; implicit_euler where they jump"
         }
     };
@@ -203,7 +203,7 @@ fn advice(scheme: &str, bound: Option<f64>, motion: Motion) -> [String; 2] {
 
 /// The kind of motion, as far as the job tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Motion {
+enum Dynamics {
     /// Bodies with mass and contact that opens and closes, and whether the scheme that conserves energy is available.
     Impacts { may_conserve: bool },
     /// Bodies with mass without such a contact.
@@ -324,11 +324,14 @@ mod tests {
     #[test]
     fn the_scheme_that_suits_a_job_depends_on_its_motion() {
         let suits = |motion| advice("lagged_euler", Some(0.12), motion);
-        assert_eq!(suits(Motion::Slow)[0], "stability  lagged_euler is stable with steps below 1.2000e-1 s");
-        let impacts = |may_conserve| suits(Motion::Impacts { may_conserve })[1].clone();
+        assert_eq!(
+            suits(Dynamics::Slow)[0],
+            "stability  lagged_euler is stable with steps below 1.2000e-1 s"
+        );
+        let impacts = |may_conserve| suits(Dynamics::Impacts { may_conserve })[1].clone();
         assert!(impacts(true).contains("midpoint with [[contact]] redistribute_mass = true"));
         assert!(!impacts(false).contains("midpoint") && impacts(false).contains("implicit_euler damps it"));
-        assert!(suits(Motion::Inertia)[1].contains("no impacts: bdf2"));
+        assert!(suits(Dynamics::Inertia)[1].contains("no impacts: bdf2"));
     }
 
     #[test]

@@ -12,7 +12,7 @@ pub(super) struct StepLine<'a> {
     pub time: f64,
     pub outcome: &'a StepOutcome,
     /// The columns of the run.
-    pub has: Columns,
+    pub has: ShownColumns,
     pub imbalance: f64,
     /// Wall time to the end in s.
     pub left: f64,
@@ -20,7 +20,7 @@ pub(super) struct StepLine<'a> {
 
 /// The columns that mean something in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Columns {
+pub(super) struct ShownColumns {
     pub contact: bool,
     pub friction: bool,
     pub newton: bool,
@@ -128,9 +128,9 @@ impl Display for ClockTime {
 mod tests {
     use super::*;
 
-    const ALL: Columns = Columns { contact: true, friction: true, newton: true, iterative: true };
+    const ALL: ShownColumns = ShownColumns { contact: true, friction: true, newton: true, iterative: true };
 
-    fn line(outcome: &StepOutcome, has: Columns, [step, last]: [u64; 2], left: f64) -> String {
+    fn line(outcome: &StepOutcome, has: ShownColumns, [step, last]: [u64; 2], left: f64) -> String {
         let mut line = String::new();
         StepLine { step, last, time: 0.5, outcome, has, imbalance: 1e-9, left }.write(&mut line);
         line
@@ -147,7 +147,7 @@ mod tests {
             "step  3/64  t = 0.5 s  2 touch, 3 open, 0 stick, 2 slip  Newton 2  linear 31  3 min 05 s left"
         );
         assert_eq!(
-            line(&outcome, Columns::default(), [3, 64], 7.0),
+            line(&outcome, ShownColumns::default(), [3, 64], 7.0),
             "step  3/64  t = 0.5 s  energy error 1e-9  7 s left",
             "no contact, no Newton iterations"
         );

@@ -9,7 +9,7 @@ use super::{
     phases,
     restored::{candidates, restore},
     setup::{Setup, setup},
-    step_line::{Columns, Short, StepLine},
+    step_line::{Short, ShownColumns, StepLine},
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -77,7 +77,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let mut outputs = session.agree(Outputs::open(session, contents, body, state, &mut log))?;
     session.agree(outputs.at_start(session, body, state))?;
     let setup = clock.began.elapsed() - clock.launched;
-    let columns = Columns {
+    let columns = ShownColumns {
         contact: !simulation.body.contacts.is_empty(),
         friction: simulation.body.contacts.iter().any(|contact| contact.friction().is_some()),
         newton: simulation.scheme.is_nonlinear(),
@@ -125,7 +125,7 @@ struct Run<'a, const D: usize, const S: usize> {
     outputs: Outputs<D, S>,
     log: Log,
     /// What lines of the log tell of a step.
-    columns: Columns,
+    columns: ShownColumns,
     /// The line of the log after a step, kept to reuse its memory.
     line: String,
     clock: Clock,

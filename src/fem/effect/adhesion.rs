@@ -99,7 +99,7 @@ impl<const D: usize> Adhesion<D> {
 
     /// Books the energy in J that bonds at the points of a node release in a step of this length in which the bonding falls from the
     /// first value to the second.
-    fn book(
+    fn record_energy(
         &self,
         group: &[(usize, SurfacePoint<D>)],
         bondings: [f64; 2],
@@ -139,7 +139,7 @@ impl<const D: usize> Adhesion<D> {
             let (drive, toughness) = self.drive(group, displacement);
             [*after, _] = toughness.relax(*before, drive, step.length);
             let released = (before * before - *after * *after) * self.potential(group, displacement);
-            self.book(group, [*before, *after], (released, step.length), energy);
+            self.record_energy(group, [*before, *after], (released, step.length), energy);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&point.value(displacement), &point.normal);
                 point.add(point.weight * *after * *after, &traction, forces);
@@ -262,7 +262,7 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
             let ends = [nodal.previous_displacement, nodal.displacement];
             let potentials = ends.map(|displacement| self.potential(group, displacement));
             let released = (before - after) * 0.5 * (potentials[0] + potentials[1]);
-            self.book(group, [*bonding, *next], (released, step.length), energy);
+            self.record_energy(group, [*bonding, *next], (released, step.length), energy);
             energy[NUMERICAL] += 0.5 * (before + after) * (potentials[1] - potentials[0]);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&point.value(nodal.displacement), &point.normal);

@@ -1,7 +1,7 @@
 //! The contents of the checkpoints of a run, and their restoration.
 
 use super::{
-    checkpoint_file::{self, Checkpoint, RowSet, Table},
+    checkpoint_file::{self, Checkpoint, IdTable, RowSet},
     history::Totals,
     seal,
 };
@@ -144,14 +144,14 @@ pub fn save<const D: usize, const S: usize>(
     let [displacement, velocity, previous] =
         [state.displacement.owned()?, state.velocity.owned()?, state.previous_velocity.owned()?];
     let nodal = [("displacement", &displacement), ("velocity", &velocity), ("previous_velocity", &previous)];
-    let mut tables: Vec<Table> =
-        nodal.into_iter().map(|(name, values)| Table { name, set: "nodes", width: D, values }).collect();
+    let mut tables: Vec<IdTable> =
+        nodal.into_iter().map(|(name, values)| IdTable { name, set: "nodes", width: D, values }).collect();
     let traction = state.contact_traction.as_ref().map(DistributedVector::owned).transpose()?;
-    let traction = traction.as_deref().map(|t| Table { name: TRACTION, set: "nodes", width: D, values: t });
+    let traction = traction.as_deref().map(|t| IdTable { name: TRACTION, set: "nodes", width: D, values: t });
     tables.extend(traction);
     let previous = state.previous_displacement.as_ref().map(DistributedVector::owned).transpose()?;
     let previous = previous.as_deref();
-    tables.extend(previous.map(|p| Table {
+    tables.extend(previous.map(|p| IdTable {
         name: "previous_displacement",
         set: "nodes",
         width: D,
@@ -162,7 +162,7 @@ pub fn save<const D: usize, const S: usize>(
     for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
         let table = |h| {
             let History { width, values, .. }: &History = h;
-            Table { name: h.name(), set, width: *width, values }
+            IdTable { name: h.name(), set, width: *width, values }
         };
         tables.extend(histories.iter().map(table));
     }

@@ -35,7 +35,7 @@ pub struct RowSet<'a> {
 
 /// A table with a row for each id of a set.
 #[derive(Debug, Clone, Copy)]
-pub struct Table<'a> {
+pub struct IdTable<'a> {
     /// Name of the table.
     pub name: &'a str,
     /// Name of the set its rows belong to.
@@ -53,7 +53,7 @@ pub fn write(
     communicator: &impl Communicator,
     header: &[u8],
     sets: &[RowSet],
-    tables: &[Table],
+    tables: &[IdTable],
 ) -> Result<(), Agreed> {
     agree(communicator, check(path, sets, tables))?;
     let part = part_name(path);
@@ -78,7 +78,7 @@ fn write_part(
     communicator: &impl Communicator,
     header: &[u8],
     sets: &[RowSet],
-    tables: &[Table],
+    tables: &[IdTable],
 ) -> Result<(), Agreed> {
     let file = ParallelFile::create_behind(part, seal::SEAL_BYTES, communicator)?;
     let written = write_content(&file, communicator, header, sets, tables);
@@ -97,7 +97,7 @@ fn part_name(path: &Path) -> PathBuf {
     name.into()
 }
 
-fn check(path: &Path, sets: &[RowSet], tables: &[Table]) -> Result<()> {
+fn check(path: &Path, sets: &[RowSet], tables: &[IdTable]) -> Result<()> {
     for table in tables {
         let rows = sets.iter().find(|set| set.name == table.set).map(|set| set.ids.len());
         if rows.map(|rows| rows * table.width) != Some(table.values.len()) || table.width == 0 {
@@ -119,7 +119,7 @@ fn write_content(
     communicator: &impl Communicator,
     header: &[u8],
     sets: &[RowSet],
-    tables: &[Table],
+    tables: &[IdTable],
 ) -> Result<(), Agreed> {
     let rows = file.create_rows::<u8>("header", header.len() as u64, 1)?;
     rows.write(0, if communicator.rank() == 0 { header } else { &[] })?;

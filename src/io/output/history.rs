@@ -49,12 +49,12 @@ mod by_column {
     }
 
     pub(super) fn deserialize<'de, T: Deserializer<'de>>(deserializer: T) -> Result<Energy, T::Error> {
-        deserializer.deserialize_struct("Energy", &COLUMNS, Columns)
+        deserializer.deserialize_struct("Energy", &COLUMNS, EnergyVisitor)
     }
 
-    struct Columns;
+    struct EnergyVisitor;
 
-    impl<'de> Visitor<'de> for Columns {
+    impl<'de> Visitor<'de> for EnergyVisitor {
         type Value = Energy;
 
         fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -34,7 +34,7 @@ struct Profile<const D: usize> {
 
 /// The columns that only some contacts have.
 #[derive(Debug, Clone, Copy)]
-struct Columns {
+struct OptionalColumns {
     /// A law of the displacement acts on one of the profiles.
     gap: bool,
     friction: bool,
@@ -47,7 +47,7 @@ const SAME_SIDE: f64 = 0.7;
 #[derive(Debug)]
 pub struct Profiles<const D: usize> {
     profiles: Vec<Profile<D>>,
-    with: Columns,
+    with: OptionalColumns,
     file: Option<CsvFile>,
 }
 
@@ -67,7 +67,7 @@ impl<const D: usize> Profiles<D> {
             Ok(Profile { name: entry(name), facets, points, contacts: contacts.clone() })
         };
         let contacts = || boundaries.iter().flat_map(|(_, contacts)| contacts).map(|at| &body.contacts[*at]);
-        let with = Columns {
+        let with = OptionalColumns {
             gap: contacts().any(|contact| contact.law.depends_on_displacement()),
             friction: contacts().any(|contact| contact.friction().is_some()),
         };
@@ -147,7 +147,7 @@ impl<const D: usize> Profile<D> {
         &self,
         Converged { body, state, stress, .. }: Converged<'_, D, S>,
         states: &[(usize, PointState<D>)],
-        with: Columns,
+        with: OptionalColumns,
     ) -> Result<Vec<f64>> {
         let by_stress =
             if self.contacts.is_empty() { self.pressure_of_stress(body, state, stress)? } else { vec![] };

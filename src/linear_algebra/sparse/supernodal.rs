@@ -42,7 +42,7 @@ impl<R: Real> SupernodalFactor<R> {
     pub(super) fn new(analysis: &Analysis, lower: Lower, last: usize, partial: bool) -> Result<Option<Self>> {
         let (order, nodes) = (&analysis.order, analysis.supernodes());
         let end = if partial { order.len() - last } else { order.len() };
-        let Some(columns) = Columns::<R>::of(order, &lower) else { return Ok(None) };
+        let Some(columns) = Panels::<R>::of(order, &lower) else { return Ok(None) };
         drop(lower);
         let count = (0..nodes.len()).map(|node| nodes.panel(node).len()).sum();
         let no_memory = |_| {
@@ -199,14 +199,14 @@ fn eliminated(columns: Range<usize>, end: usize) -> Range<usize> {
 }
 
 /// The scaled matrix in the order of elimination, by columns from the diagonal down.
-struct Columns<R> {
+struct Panels<R> {
     starts: Vec<usize>,
     rows: Vec<u32>,
     values: Vec<R>,
     scales: Vec<f64>,
 }
 
-impl<R: Real> Columns<R> {
+impl<R: Real> Panels<R> {
     /// `None` where a diagonal entry is not positive.
     fn of(order: &[u32], lower: &Lower) -> Option<Self> {
         let mut place = vec![0u32; order.len()];
@@ -283,7 +283,7 @@ impl UpdateLists {
 
 /// The left-looking supernodal factorisation (Ng and Peyton 1993): each supernode receives the updates of earlier ones, and is then
 /// factored as a dense matrix. Columns from position `end` on only receive updates.
-fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, values: &mut [R]) -> Option<()> {
+fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Panels<R>, end: usize, values: &mut [R]) -> Option<()> {
     let mut lists = UpdateLists::new(nodes);
     let mut line = vec![0u32; lists.of_column.len()];
     let (mut update, mut lines) = (Vec::new(), Vec::new());

@@ -32,7 +32,7 @@ const THINNEST: f64 = 0.2;
 
 /// The drawing of a body.
 #[derive(Clone)]
-pub struct Body<'a> {
+pub struct DrawnBody<'a> {
     snapshot: &'a Snapshot,
     look: Look,
     common: Option<&'a Common>,
@@ -130,7 +130,7 @@ struct Values<'a> {
     regions: Option<Cow<'a, [f64]>>,
 }
 
-impl<'a> Body<'a> {
+impl<'a> DrawnBody<'a> {
     /// Prepares the drawing of a body.
     pub fn new(snapshot: &'a Snapshot) -> Self {
         let magnification = magnification(snapshot).unwrap_or(1.0);
@@ -599,7 +599,7 @@ mod tests {
     }
 
     #[track_caller]
-    fn picture(body: &Body, field: &OutputField) -> Picture {
+    fn picture(body: &DrawnBody, field: &OutputField) -> Picture {
         match body.of_field(field).expect("drawn").expect(field.name) {
             Drawn::Picture(picture) => picture,
             Drawn::Uniform(words) => panic!("{words}"),
@@ -615,7 +615,7 @@ mod tests {
             (0.0, 1.0, "to scale"),
         ] {
             let snapshot = square(displacement);
-            let body = Body::new(&snapshot);
+            let body = DrawnBody::new(&snapshot);
             assert_eq!(body.magnification, factor);
             let picture = picture(&body, &VELOCITY);
             assert!(picture.svg.contains(words) && picture.caption.contains(words), "{}", picture.caption);
@@ -629,23 +629,23 @@ mod tests {
         // The right side moves to the left by 0.01 m: the body would be flat at a factor of 100, and 0.16 m are visible at 16.
         let moved = |x: &[f64; 3]| [if x[0] == 1.0 { -0.01 } else { 0.0 }, 0.0, 0.0];
         snapshot.fields.insert("displacement", snapshot.nodes.iter().flat_map(moved).collect());
-        assert_eq!(Body::new(&snapshot).magnification, 10.0);
+        assert_eq!(DrawnBody::new(&snapshot).magnification, 10.0);
         let large = |x: &[f64; 3]| [if x[0] == 1.0 { -0.5 } else { 5e-3 * x[1] }, 0.0, 0.0];
         snapshot.fields.insert("displacement", snapshot.nodes.iter().flat_map(large).collect());
-        assert_eq!(Body::new(&snapshot).magnification, 1.0);
+        assert_eq!(DrawnBody::new(&snapshot).magnification, 1.0);
         // A cell of a hundredth of the size that is halved: at a factor of 2 it would be flat.
         snapshot.nodes.extend([[1.01, 0.0, 0.0]]);
         snapshot.cells.extend([1, 4, 2]);
         let mut few = [[0.0; 3]; 5];
         few[4][0] = -0.005;
         snapshot.fields.insert("displacement", few.concat());
-        assert_eq!(Body::new(&snapshot).magnification, 1.0);
+        assert_eq!(DrawnBody::new(&snapshot).magnification, 1.0);
     }
 
     #[test]
     fn fields_that_a_file_lacks_are_not_drawn() {
         let bare = square(0.0).without_fields();
-        let body = Body::new(&bare);
+        let body = DrawnBody::new(&bare);
         assert!(FIELDS.iter().all(|field| body.of_field(field).expect("nothing to draw").is_none()));
         assert_eq!(body.magnified(), "undeformed");
     }
@@ -655,7 +655,7 @@ mod tests {
         let mut snapshot = square(0.0);
         snapshot.fields.insert("von_mises", vec![3.0; 2]);
         snapshot.fields.insert("velocity", vec![0.0; 12]);
-        let body = Body::new(&snapshot);
+        let body = DrawnBody::new(&snapshot);
         for (field, expected) in [(&VON_MISES, "von Mises stress: 3 Pa"), (&VELOCITY, "speed: 0 m/s")] {
             match body.of_field(field).expect("drawn") {
                 Some(Drawn::Uniform(words)) => assert_eq!(words, expected),
@@ -669,8 +669,8 @@ mod tests {
         let [low, mut high] = [square(0.04), square(0.02)];
         high.fields.insert("von_mises", vec![2.0, 7.0]);
         high.fields.insert("velocity", vec![0.0; 12]);
-        let bodies = [&low, &high].map(Body::new);
-        let common = Body::in_common("both", &[&bodies[0], &bodies[1]], true);
+        let bodies = [&low, &high].map(DrawnBody::new);
+        let common = DrawnBody::in_common("both", &[&bodies[0], &bodies[1]], true);
         let drawn = |name| bodies.clone().map(|body| picture(&body.with_common(&common), name));
         let ticks = |picture: &Picture| picture.svg.split("shades)").nth(1).expect("a bar").to_owned();
         let stresses = drawn(&VON_MISES);
@@ -685,7 +685,7 @@ mod tests {
 
     /// The values that are drawn at the corners of each face.
     fn corners(snapshot: &Snapshot, look: Look) -> Vec<[f64; 3]> {
-        let body = Body::new(snapshot).with_look(look);
+        let body = DrawnBody::new(snapshot).with_look(look);
         let values = snapshot.values(&VON_MISES).expect("stress").into();
         let (scale, regions, common) = (linear(None), body.regions(), None);
         body.at_corners(&Values { values, place: Place::Cell, scale, is_clipped: false, common, regions })
@@ -703,7 +703,7 @@ mod tests {
         assert_eq!(corners(&snapshot, several), cells);
         snapshot.fields.insert("region", vec![2.0, 2.0]);
         assert_eq!(corners(&snapshot, several)[0], [1.75, 1.0, 1.75]);
-        let picture = picture(&Body::new(&snapshot), &VON_MISES);
+        let picture = picture(&DrawnBody::new(&snapshot), &VON_MISES);
         let words = "from 1 to 2.5 Pa in the cells, drawn as means at the nodes.";
         assert!(picture.caption.contains(words), "{}", picture.caption);
         assert!(picture.svg.contains("von Mises stress / Pa") && picture.svg.contains("x / m"));
@@ -716,7 +716,7 @@ mod tests {
         let mut values: Vec<f64> = (0..400).map(|n| f64::from(n) / 399.0).collect();
         values[399] = 1e6;
         snapshot.fields.insert("von_mises", values);
-        let picture = picture(&Body::new(&snapshot), &VON_MISES);
+        let picture = picture(&DrawnBody::new(&snapshot), &VON_MISES);
         let words = "from 0 to 1 × 10⁶ Pa in the cells, drawn as means at the nodes; colours from 0.010025 to 0.98997 Pa, the 1st to \
                      the 99th percentile.";
         assert!(picture.caption.contains(words), "{}", picture.caption);

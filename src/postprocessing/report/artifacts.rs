@@ -24,7 +24,7 @@ const SIGNS: [&str; 5] = ["job.toml", "summary.json", HISTORY.file, PROBES.file,
 
 /// A file that is missing or cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Gap {
+pub(super) struct MissingFile {
     /// Its name.
     pub file: &'static str,
     /// The reason, as text.
@@ -35,7 +35,7 @@ pub(super) struct Gap {
 
 /// The contents of the files.
 #[derive(Debug, Default)]
-pub(super) struct Found {
+pub(super) struct RunFiles {
     /// The folder.
     pub folder: PathBuf,
     /// Text of the effective job.
@@ -57,10 +57,10 @@ pub(super) struct Found {
     /// The largest number of each field at the times that are drawn.
     pub largest: BTreeMap<String, f64>,
     /// Files that are missing.
-    pub gaps: Vec<Gap>,
+    pub gaps: Vec<MissingFile>,
 }
 
-impl Found {
+impl RunFiles {
     /// Reads the available files. A folder that does not belong to a run is refused.
     pub(super) fn read(folder: &Path) -> Result<Self> {
         refuse_other_paths(folder)?;
@@ -134,7 +134,7 @@ impl Found {
         } else {
             "it does not exist".into()
         };
-        self.gaps.push(Gap { file, why, lacking });
+        self.gaps.push(MissingFile { file, why, lacking });
         None
     }
 }

@@ -2,10 +2,10 @@
 
 use super::{
     arc::along_curve,
-    body::{Body, Coloured},
+    body::{Coloured, DrawnBody},
     chart::{Axis, Band, Chart, Look, Series},
     colour::{CIVIDIS, LINES, lightened},
-    friction::{self, Rubbing},
+    friction::{self, SlidingNode},
     law::Law,
     markup::{capital, table},
     page::Pictures,
@@ -45,7 +45,7 @@ pub(super) struct Boundary<'a> {
     points: Vec<[f64; 3]>,
     arc: Vec<f64>,
     dimension: usize,
-    behind: Option<Behind<'a>>,
+    behind: Option<BodyBehind<'a>>,
     /// Whether the laws act at each node.
     is_in_contact: Vec<bool>,
     /// The boundary, or the part of it on which its laws act, in words.
@@ -53,7 +53,7 @@ pub(super) struct Boundary<'a> {
 }
 
 /// The body at the same time, with the numbers of the boundary's nodes and the outward normals there.
-struct Behind<'a> {
+struct BodyBehind<'a> {
     snapshot: &'a Snapshot,
     nodes: Vec<usize>,
     normals: Vec<[f64; 3]>,
@@ -108,7 +108,7 @@ impl<'a> Boundary<'a> {
         if let Some(snapshot) = snapshot.filter(|snapshot| snapshot.time == time) {
             boundary.behind = boundary.nodes_of(snapshot).map(|nodes| {
                 let normals = super::view::normals(snapshot, &nodes);
-                Behind { snapshot, nodes, normals }
+                BodyBehind { snapshot, nodes, normals }
             });
         }
         // The gap is empty at nodes without a contact.
@@ -137,7 +137,7 @@ impl<'a> Boundary<'a> {
     fn inside(&self, part: Option<&Scalar>) -> Vec<bool> {
         let Some(part) = part else { return vec![true; self.points.len()] };
         let holds = |point: &[f64; 3]| part.evaluate(0.0, &point[..self.dimension]) != 0.0;
-        let Some(Behind { snapshot, nodes, .. }) = &self.behind else {
+        let Some(BodyBehind { snapshot, nodes, .. }) = &self.behind else {
             return self.points.iter().map(holds).collect();
         };
         let places: HashMap<u32, usize> = (0..).zip(nodes).map(|(at, node)| (*node as u32, at)).collect();
@@ -197,7 +197,7 @@ impl<'a> Boundary<'a> {
 
     /// Fields and histories with a number at each node that only nodes of contacts have, where the profile does not have them.
     fn fields_of_nodes(&self) -> Vec<(&str, Vec<f64>)> {
-        let Some(Behind { snapshot, nodes, .. }) = &self.behind else { return Vec::new() };
+        let Some(BodyBehind { snapshot, nodes, .. }) = &self.behind else { return Vec::new() };
         let is_meant =
             |field: &&OutputField| field.place == Place::Node && matches!(field.shape, Shape::Scalar);
         let fields = FIELDS.iter().filter(is_meant);
@@ -311,7 +311,7 @@ impl<'a> Boundary<'a> {
         let flat = Snapshot { time: self.time, nodes, cells, corners: 3, ..Snapshot::default() };
         let look = Coloured { name, quantity, unit, shades: CIVIDIS };
         let axes = ["x", "y", "z"];
-        let body = Body::new(&flat).with_axes([axes[first], axes[second]]);
+        let body = DrawnBody::new(&flat).with_axes([axes[first], axes[second]]);
         let (low, high) = extent(values.iter().copied()).unwrap_or_default();
         let figures = format!("from {} to {} {unit}", number(low), number(high));
         let mut picture = body.nodal(look, values)?;
@@ -426,9 +426,9 @@ impl<'a> Boundary<'a> {
             return Ok(None);
         }
         let rubbing = pressure.into_iter().zip(traction).zip(speed).zip(&self.is_in_contact);
-        let rubbing: Vec<Rubbing> = rubbing
+        let rubbing: Vec<SlidingNode> = rubbing
             .filter(|(_, is_in_contact)| **is_in_contact)
-            .map(|(((pressure, traction), speed), _)| Rubbing { speed, traction, pressure })
+            .map(|(((pressure, traction), speed), _)| SlidingNode { speed, traction, pressure })
             .collect();
         friction::picture((self.name, &self.place), self.time, law, &rubbing)
     }
@@ -439,8 +439,8 @@ impl<'a> Boundary<'a> {
     }
 
     /// The deformed mesh of a 2D body with the boundary's normal velocity and contact pressure as arrows.
-    pub(super) fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
-        let Some(Behind { nodes, normals, .. }) =
+    pub(super) fn arrows(&self, body: &DrawnBody) -> Result<Vec<Picture>> {
+        let Some(BodyBehind { nodes, normals, .. }) =
             self.behind.as_ref().filter(|behind| behind.nodes.len() > 1)
         else {
             return Ok(Vec::new());

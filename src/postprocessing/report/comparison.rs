@@ -1,8 +1,8 @@
 //! The page of two runs side by side.
 
 use super::{
-    artifacts::Found,
-    body::Body,
+    artifacts::RunFiles,
+    body::DrawnBody,
     facts,
     markup::{escape, paragraph, table},
     page::Page,
@@ -15,14 +15,14 @@ use std::collections::BTreeMap;
 
 /// The keys in which the jobs differ, pictures of the same name beside each other on the same scales, and the members of both
 /// summaries in one table.
-pub(super) fn page(found: &[Found; 2], options: Options) -> Result<Page> {
+pub(super) fn page(found: &[RunFiles; 2], options: Options) -> Result<Page> {
     let names = [0, 1].map(|run| found[run].folder.display().to_string());
     let titles = [0, 1].map(|run| title(&found[run]));
     let [left, right] = [0, 1].map(|run| format!("{} ({})", titles[run], names[run]));
     let mut page = Page::new(&titles.join(" and "), paragraph(&format!("Left: {left}. Right: {right}.")));
     page.section("Jobs", &differences(found, &names), vec![]);
     let bodies = [0, 1].map(|run| drawn_body(&found[run], options));
-    let common = Body::in_common("the other run", &bodies.iter().flatten().collect::<Vec<_>>(), false);
+    let common = DrawnBody::in_common("the other run", &bodies.iter().flatten().collect::<Vec<_>>(), false);
     let bodies = bodies.map(|body| body.map(|body| body.with_common(&common)));
     let [left, right] = [0, 1].map(|run| drawn_sections(&found[run], bodies[run].as_ref()));
     let (left, right) = (left?, right?);
@@ -87,7 +87,7 @@ fn figure(side: usize, picture: Option<Picture>) -> String {
 }
 
 /// A table of the keys in which the effective jobs differ, apart from the output folder.
-fn differences(found: &[Found; 2], names: &[String; 2]) -> String {
+fn differences(found: &[RunFiles; 2], names: &[String; 2]) -> String {
     let [left, right] = [0, 1].map(|run| {
         let mut keys = BTreeMap::new();
         let job = found[run].text.as_ref().and_then(|text| text.parse::<toml::Table>().ok());

@@ -1,7 +1,7 @@
 //! The numbers of a run as text: status, sizes, certificates, times.
 
 use super::{
-    artifacts::Found,
+    artifacts::RunFiles,
     colour::{LINES, hex},
     markup::{escape, facts, paragraph, table},
     picture::Picture,
@@ -129,7 +129,7 @@ pub(super) fn warnings(summary: &Value) -> String {
 }
 
 /// The certificates and their meaning for the run.
-pub(super) fn certificates(found: &Found) -> String {
+pub(super) fn certificates(found: &RunFiles) -> String {
     let Some(object) = found.summary.as_ref().and_then(|summary| summary.get("certificates")) else {
         return paragraph("No certificates: summary.json is missing or does not contain them.");
     };

@@ -19,7 +19,7 @@ const GREY: Colour = [0x55; 3];
 
 /// Friction at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rubbing {
+pub(super) struct SlidingNode {
     /// Sliding velocity in m/s, not negative.
     pub speed: f64,
     /// Friction traction in Pa, not negative.
@@ -34,17 +34,18 @@ pub(super) fn picture(
     (name, place): (&str, &str),
     time: f64,
     law: &FrictionLaw,
-    nodes: &[Rubbing],
+    nodes: &[SlidingNode],
 ) -> Result<Option<Picture>> {
-    let touching: Vec<&Rubbing> =
+    let touching: Vec<&SlidingNode> =
         nodes.iter().filter(|node| !law.follows_pressure() || node.pressure > 0.0).collect();
     // Nodes with different histories have different graphs.
     if touching.is_empty() || law.history().is_some() {
         return Ok(None);
     }
-    let ordinate = |node: &Rubbing| node.traction / if law.follows_pressure() { node.pressure } else { 1.0 };
+    let ordinate =
+        |node: &SlidingNode| node.traction / if law.follows_pressure() { node.pressure } else { 1.0 };
     let fastest = extent(touching.iter().map(|node| node.speed)).map_or(0.0, |range| range.1);
-    let (sticking, slipping): (Vec<&Rubbing>, Vec<&Rubbing>) =
+    let (sticking, slipping): (Vec<&SlidingNode>, Vec<&SlidingNode>) =
         touching.iter().partition(|node| node.speed <= STICKING * fastest);
     let along = if fastest > 0.0 { 1.1 * fastest } else { 1.0 };
     let graph = (0..=SAMPLES).map(|n| along * n as f64 / SAMPLES as f64);
@@ -89,8 +90,8 @@ mod tests {
     use super::*;
     use crate::laws::contact::{Coulomb, Tresca};
 
-    fn node(speed: f64, traction: f64, pressure: f64) -> Rubbing {
-        Rubbing { speed, traction, pressure }
+    fn node(speed: f64, traction: f64, pressure: f64) -> SlidingNode {
+        SlidingNode { speed, traction, pressure }
     }
 
     #[test]

@@ -57,7 +57,7 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
 }
 
 /// Columns of a table that share a chart.
-struct Columns<'a> {
+struct ChartColumns<'a> {
     /// Name of the picture.
     name: &'a str,
     /// Its subject in the caption.
@@ -89,7 +89,7 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
         let none = unfelt.iter().map(|force| format!("{} of {what}: 0 {unit}", force.replace('_', " ")));
         out.constant.extend(none);
         let name = format!("force_{number}");
-        let drawn = Columns { name: &name, what, source: what, quantity, unit, columns: &felt };
+        let drawn = ChartColumns { name: &name, what, source: what, quantity, unit, columns: &felt };
         draw(&rows, &drawn, &mut out)?;
         if source.starts_with("contact") {
             for (name, quantity, columns) in [
@@ -103,7 +103,7 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
                 let what = format!("{source}, {quantity}");
                 draw(
                     &rows,
-                    &Columns { name: &name, what: &what, source, quantity, unit, columns },
+                    &ChartColumns { name: &name, what: &what, source, quantity, unit, columns },
                     &mut out,
                 )?;
             }
@@ -123,7 +123,11 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
         ("energies", "energy", columns(&[Role::Stored])),
         ("dissipation", "work and dissipation since t = 0", spent),
     ] {
-        draw(table, &Columns { name, what, source: "", quantity: what, unit, columns: &columns }, &mut out)?;
+        draw(
+            table,
+            &ChartColumns { name, what, source: "", quantity: what, unit, columns: &columns },
+            &mut out,
+        )?;
     }
     out.pictures.extend(over_time(
         table,
@@ -145,8 +149,8 @@ fn is_constant((low, high): (f64, f64)) -> bool {
 
 /// Adds a chart of several columns over time, and names the columns that are constant: in the caption of the chart, or in the list if
 /// all of them are.
-fn draw(table: &Table, columns: &Columns<'_>, out: &mut Pictures) -> Result<()> {
-    let Columns { name, what, source, quantity, unit, columns } = *columns;
+fn draw(table: &Table, columns: &ChartColumns<'_>, out: &mut Pictures) -> Result<()> {
+    let ChartColumns { name, what, source, quantity, unit, columns } = *columns;
     let mut series = Vec::new();
     let (mut ends, mut constant) = (Vec::new(), Vec::new());
     for column in columns {

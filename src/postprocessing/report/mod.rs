@@ -20,7 +20,7 @@ use crate::{
     postprocessing::drawing::{body, chart, colour, markup, picture, scale, svg, view},
     run::version,
 };
-use artifacts::Found;
+use artifacts::RunFiles;
 use page::Page;
 pub use run::Options;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub fn report(folder: &Path, options: Options) -> Result<Made> {
     let (page, missing) = if study::is_study(folder) {
         (study::page(folder)?, Vec::new())
     } else {
-        let found = Found::read(folder)?;
+        let found = RunFiles::read(folder)?;
         (run::page(&found, options)?, missing(&found))
     };
     write_page(&page, &folder.join("report"), "index.html", missing)
@@ -49,7 +49,7 @@ pub fn report(folder: &Path, options: Options) -> Result<Made> {
 
 /// Writes `report/comparison.html` in the first folder: a page with two runs side by side.
 pub fn compare(folders: [&Path; 2], options: Options) -> Result<Made> {
-    let found = [Found::read(folders[0])?, Found::read(folders[1])?];
+    let found = [RunFiles::read(folders[0])?, RunFiles::read(folders[1])?];
     let page = comparison::page(&found, options)?;
     let missing = found.iter().flat_map(|found| {
         missing(found).into_iter().map(|words| format!("{}: {words}", found.folder.display()))
@@ -58,7 +58,7 @@ pub fn compare(folders: [&Path; 2], options: Options) -> Result<Made> {
 }
 
 /// Descriptions of the files that are missing or unreadable.
-fn missing(found: &Found) -> Vec<String> {
+fn missing(found: &RunFiles) -> Vec<String> {
     found.gaps.iter().map(|gap| format!("{}: {}", gap.file, gap.why)).collect()
 }
 

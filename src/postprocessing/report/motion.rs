@@ -1,8 +1,8 @@
 //! An animation: the deformed body at the output times, with the nodes of a contact boundary on the graph of its law.
 
 use super::{
-    artifacts::{Found, drawn_times},
-    body::{Body, Drawn, Look},
+    artifacts::{RunFiles, drawn_times},
+    body::{Drawn, DrawnBody, Look},
     boundary::{Boundary, Laws},
     picture::Picture,
     scale::number,
@@ -24,16 +24,17 @@ const FEWEST: usize = 3;
 const SECONDS: f64 = 0.6;
 
 /// The animation of a run with these contacts, if its fields differ at three times or more.
-pub(super) fn picture(found: &Found, look: Look, contacts: &[Laws]) -> Result<Option<Picture>> {
+pub(super) fn picture(found: &RunFiles, look: Look, contacts: &[Laws]) -> Result<Option<Picture>> {
     let Some(last) = &found.snapshot else { return Ok(None) };
     let times = drawn_times(last);
     if times.len() < FEWEST {
         return Ok(None);
     }
     let snapshots = times.into_iter().map(|step| found.snapshot_at(step)).collect::<Result<Vec<_>>>()?;
-    let bodies: Vec<Body> = snapshots.iter().map(|snapshot| Body::new(snapshot).with_look(look)).collect();
-    let all: Vec<&Body> = bodies.iter().collect();
-    let common = Body::in_common("all drawings", &all, true);
+    let bodies: Vec<DrawnBody> =
+        snapshots.iter().map(|snapshot| DrawnBody::new(snapshot).with_look(look)).collect();
+    let all: Vec<&DrawnBody> = bodies.iter().collect();
+    let common = DrawnBody::in_common("all drawings", &all, true);
     // A field whose value differs within a drawing, not only from one drawing to the next.
     let varies = |field: &&OutputField| {
         let name = field.picture.map(|picture| picture.name).filter(|name| common.has(name));
@@ -57,7 +58,7 @@ pub(super) fn picture(found: &Found, look: Look, contacts: &[Laws]) -> Result<Op
 
 /// The nodes of the first contact boundary with a profile on the graph of its law, at the times of the snapshots at which there is
 /// a profile.
-fn graphs(found: &Found, contacts: &[Laws], snapshots: &[Snapshot]) -> Result<Vec<Option<Picture>>> {
+fn graphs(found: &RunFiles, contacts: &[Laws], snapshots: &[Snapshot]) -> Result<Vec<Option<Picture>>> {
     let Some(profiles) = &found.profiles else { return Ok(Vec::new()) };
     let names = profiles.names();
     let on = |name: &String| contacts.iter().filter(|laws| laws.on.contains(name)).collect::<Vec<_>>();

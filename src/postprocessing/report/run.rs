@@ -1,8 +1,8 @@
 //! The page of a run.
 
 use super::{
-    artifacts::{Found, Gap},
-    body::{self, Body, Drawn},
+    artifacts::{MissingFile, RunFiles},
+    body::{self, Drawn, DrawnBody},
     boundary::{Boundary, Laws},
     facts, history,
     law::Law,
@@ -36,7 +36,7 @@ pub struct Options {
 }
 
 /// The title of a run: that of its job, or the name of its folder.
-pub(super) fn title(found: &Found) -> String {
+pub(super) fn title(found: &RunFiles) -> String {
     let about = found.job.as_ref().and_then(|job| job.about.as_ref());
     let name =
         found.folder.file_name().map_or_else(|| "Run".into(), |name| name.to_string_lossy().into_owned());
@@ -44,7 +44,7 @@ pub(super) fn title(found: &Found) -> String {
 }
 
 /// The page of a run.
-pub(super) fn page(found: &Found, options: Options) -> Result<Page> {
+pub(super) fn page(found: &RunFiles, options: Options) -> Result<Page> {
     let mut page = Page::new(&title(found), head(found));
     let body = drawn_body(found, options);
     for (heading, words, pictures) in drawn_sections(found, body.as_ref())? {
@@ -77,19 +77,19 @@ pub(super) type Sections = Vec<Section>;
 pub(super) type Section = (String, String, Vec<Picture>);
 
 /// How bodies are drawn.
-fn look(found: &Found, options: Options) -> body::Look {
+fn look(found: &RunFiles, options: Options) -> body::Look {
     let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
     let Options { per_cell, contours } = options;
     body::Look { per_cell, contours, several_materials }
 }
 
 /// The body at the last time, if there are fields.
-pub(super) fn drawn_body(found: &Found, options: Options) -> Option<Body<'_>> {
-    found.snapshot.as_ref().map(|snapshot| Body::new(snapshot).with_look(look(found, options)))
+pub(super) fn drawn_body(found: &RunFiles, options: Options) -> Option<DrawnBody<'_>> {
+    found.snapshot.as_ref().map(|snapshot| DrawnBody::new(snapshot).with_look(look(found, options)))
 }
 
 /// The sections of the body, the boundaries and the quantities over time.
-pub(super) fn drawn_sections(found: &Found, body: Option<&Body>) -> Result<Sections> {
+pub(super) fn drawn_sections(found: &RunFiles, body: Option<&DrawnBody>) -> Result<Sections> {
     let mut sections = Sections::new();
     if let (Some(body), Some(snapshot)) = (body, &found.snapshot) {
         sections.push(body_section(found, body, snapshot)?);
@@ -103,7 +103,7 @@ fn folded(summary: &str, html: &str) -> String {
     format!("<details>\n<summary>{}</summary>\n{html}</details>\n", escape(summary))
 }
 
-fn head(found: &Found) -> String {
+fn head(found: &RunFiles) -> String {
     let mut head = String::new();
     let about = found.job.as_ref().and_then(|job| job.about.as_ref());
     if let Some(reference) = about.and_then(|about| about.reference.as_ref()) {
@@ -120,7 +120,7 @@ fn head(found: &Found) -> String {
     }
     if !found.gaps.is_empty() {
         head.push_str("<div class=\"missing\">\n<h2>Missing</h2>\n<ul>\n");
-        for Gap { file, why, lacking } in &found.gaps {
+        for MissingFile { file, why, lacking } in &found.gaps {
             // Writing to a String cannot fail.
             let _ = writeln!(
                 head,
@@ -133,7 +133,7 @@ fn head(found: &Found) -> String {
     head
 }
 
-fn body_section(found: &Found, body: &Body, snapshot: &Snapshot) -> Result<Section> {
+fn body_section(found: &RunFiles, body: &DrawnBody, snapshot: &Snapshot) -> Result<Section> {
     let mut drawn = Vec::new();
     for field in &FIELDS {
         drawn.extend(body.of_field(field)?);
@@ -173,7 +173,7 @@ fn body_section(found: &Found, body: &Body, snapshot: &Snapshot) -> Result<Secti
 }
 
 /// The mean outward normals of the contact boundaries of a solid that have a profile.
-fn contact_directions(found: &Found, snapshot: &Snapshot) -> Vec<[f64; 3]> {
+fn contact_directions(found: &RunFiles, snapshot: &Snapshot) -> Vec<[f64; 3]> {
     let (Some(profiles), Some(job), 3) = (&found.profiles, &found.job, snapshot.dimension()) else {
         return Vec::new();
     };
@@ -184,7 +184,7 @@ fn contact_directions(found: &Found, snapshot: &Snapshot) -> Vec<[f64; 3]> {
 }
 
 /// The laws of each contact.
-fn contact_laws(found: &Found) -> Result<Vec<Laws>> {
+fn contact_laws(found: &RunFiles) -> Result<Vec<Laws>> {
     let of = |contact: &Contact| {
         let Contact { on, part, friction, .. } = contact;
         Ok(Laws { on: on.clone(), part: part.clone(), normal: Law::of(contact)?, friction: *friction })
@@ -192,7 +192,7 @@ fn contact_laws(found: &Found) -> Result<Vec<Laws>> {
     found.job.iter().flat_map(|job| &job.contact).map(of).collect()
 }
 
-fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>) -> Result<()> {
+fn boundary_sections(sections: &mut Sections, found: &RunFiles, body: Option<&DrawnBody>) -> Result<()> {
     let contacts = contact_laws(found)?;
     let mut seen = Vec::new();
     if let Some(profiles) = found.profiles.as_ref().filter(|profiles| !profiles.is_empty()) {
@@ -254,7 +254,7 @@ fn not_drawn(constant: &[String]) -> String {
     paragraph(&format!("Not drawn, because constant: {}.", constant.join(", ")))
 }
 
-fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
+fn time_sections(sections: &mut Sections, found: &RunFiles) -> Result<()> {
     let mut add = |heading: &str, mut words: String, Pictures { pictures, constant }: Pictures| {
         words += &not_drawn(&constant);
         sections.push((heading.into(), words, pictures));

@@ -15,7 +15,7 @@ use crate::{
     io::output::{columns::RunTable, field_snapshot::Snapshot},
     job::Job,
     postprocessing::drawing::{
-        body::{Body, Coloured},
+        body::{Coloured, DrawnBody},
         chart::{Axis, Chart, Look, Series},
         colour::{LINES, VIRIDIS},
         picture::Picture,
@@ -370,7 +370,7 @@ fn on_the_body(
             unit: unit(of),
             shades: VIRIDIS,
         };
-        let mut picture = Body::new(&snapshot).errors(look, cells)?;
+        let mut picture = DrawnBody::new(&snapshot).errors(look, cells)?;
         picture.caption = format!(
             "Error of {} in space at t = {} s, root mean square in each cell, {}. {}",
             run.name,

@@ -11,7 +11,7 @@ use crate::{
 
 /// A table with a title and lines below it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Table {
+pub(super) struct ResultTable {
     /// Its title.
     pub title: String,
     /// Names of the columns; the first is text, the others are numbers.
@@ -22,7 +22,7 @@ pub(super) struct Table {
     pub notes: Vec<String>,
 }
 
-impl Table {
+impl ResultTable {
     fn new(title: impl Into<String>, header: &[&str]) -> Self {
         let header = header.iter().map(|name| (*name).to_owned()).collect();
         Self { title: title.into(), header, ..Self::default() }
@@ -136,8 +136,8 @@ fn meaning(norm: &Norm) -> String {
 }
 
 /// All tables of the results, in the order in which they are read.
-pub(super) fn all(results: &Results) -> Vec<Table> {
-    let mut tables: Vec<Table> = (0..results.norms.len()).map(|norm| errors(results, norm)).collect();
+pub(super) fn all(results: &Results) -> Vec<ResultTable> {
+    let mut tables: Vec<ResultTable> = (0..results.norms.len()).map(|norm| errors(results, norm)).collect();
     tables.extend(responses(results));
     tables.extend(targets(results));
     tables.push(costs(results));
@@ -149,7 +149,7 @@ pub(super) fn all(results: &Results) -> Vec<Table> {
     tables
 }
 
-fn errors(results: &Results, norm: usize) -> Table {
+fn errors(results: &Results, norm: usize) -> ResultTable {
     let shown = &results.norms[norm];
     let symbols = refined(results, norm);
     let names: Vec<String> = symbols.iter().map(|symbol| format!("order ({symbol})")).collect();
@@ -164,7 +164,7 @@ fn errors(results: &Results, norm: usize) -> Table {
         header.extend(["published", "published order", "computed/published"]);
     }
     header.push("digits/s");
-    let mut table = Table::new(format!("{}   [{}]", shown.meaning, shown.name), &header);
+    let mut table = ResultTable::new(format!("{}   [{}]", shown.meaning, shown.name), &header);
     for run in &results.runs {
         let mut row = vec![run.name.clone()];
         match run.errors.get(norm).and_then(Option::as_ref) {
@@ -216,10 +216,10 @@ fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
 }
 
 /// The responses of all runs.
-fn responses(results: &Results) -> Option<Table> {
+fn responses(results: &Results) -> Option<ResultTable> {
     let mut header = vec!["run"];
     header.extend(results.sweep.iter().chain(&results.response).map(String::as_str));
-    let mut table = Table::new("Responses   [in the SI units of the quantities]", &header);
+    let mut table = ResultTable::new("Responses   [in the SI units of the quantities]", &header);
     for run in &results.runs {
         let mut row = vec![run.name.clone()];
         for at in 0..results.sweep.len() {
@@ -239,14 +239,14 @@ fn responses(results: &Results) -> Option<Table> {
 }
 
 /// For each norm the cost of its target errors, with one row per target and scheme.
-fn targets(results: &Results) -> Vec<Table> {
+fn targets(results: &Results) -> Vec<ResultTable> {
     let header =
         ["target", "scheme", "run", "error", "dominant error", "steps", "computing s", "relative time"];
-    let mut tables: Vec<Table> = Vec::new();
+    let mut tables: Vec<ResultTable> = Vec::new();
     for target in &results.targets {
         let title = format!("Fastest runs for target errors   [{}]", target.norm);
         if tables.last().is_none_or(|table| table.title != title) {
-            tables.push(Table::new(title, &header));
+            tables.push(ResultTable::new(title, &header));
         }
         let Some(table) = tables.last_mut() else { continue };
         for reached in &target.reached {
@@ -265,7 +265,7 @@ fn targets(results: &Results) -> Vec<Table> {
     tables
 }
 
-fn costs(results: &Results) -> Table {
+fn costs(results: &Results) -> ResultTable {
     let header = [
         "run",
         "unknowns",
@@ -280,7 +280,7 @@ fn costs(results: &Results) -> Table {
         "solve s",
     ];
     let mut table =
-        Table::new("Costs   [wall time in seconds; computing excludes the writing of files]", &header);
+        ResultTable::new("Costs   [wall time in seconds; computing excludes the writing of files]", &header);
     for run in results.runs.iter().chain(&results.reference) {
         table.rows.push(cost_cells(run));
     }
@@ -309,11 +309,11 @@ fn cost_cells(run: &RunResult) -> Vec<String> {
     ]
 }
 
-fn tolerances(results: &Results) -> Table {
+fn tolerances(results: &Results) -> ResultTable {
     let names: Vec<&str> = results.norms.iter().map(|norm| norm.name.as_str()).collect();
     let mut header = vec!["run", "tolerance", "computing s"];
     header.extend(&names);
-    let mut table = Table::new(
+    let mut table = ResultTable::new(
         "Effect of the solver's tolerance: change of the results, relative to the error at the tightest tolerance",
         &header,
     );
@@ -341,12 +341,12 @@ fn tolerances(results: &Results) -> Table {
     table
 }
 
-fn ablation(results: &Results) -> Option<Table> {
+fn ablation(results: &Results) -> Option<ResultTable> {
     let ablation = results.ablation.as_ref()?;
     let header =
         ["without", "computing s", "saved s", "displacement (V)", "velocity (H)", "stress (Q)", "status"];
     let title = "Effects switched off one by one   [relative change of the results at the end]";
-    let mut table = Table::new(title, &header);
+    let mut table = ResultTable::new(title, &header);
     let whole = optional(ablation.seconds, |s| format!("{s:.3}"));
     let status = ablation.error.clone().unwrap_or_else(|| "completed".into());
     let none = || "-".to_owned();
@@ -369,8 +369,8 @@ fn ablation(results: &Results) -> Option<Table> {
     Some(table)
 }
 
-fn failures(results: &Results) -> Option<Table> {
-    let mut table = Table { title: "Failed runs and notes".into(), ..Table::default() };
+fn failures(results: &Results) -> Option<ResultTable> {
+    let mut table = ResultTable { title: "Failed runs and notes".into(), ..ResultTable::default() };
     for run in results.runs.iter().chain(&results.reference) {
         table.notes.extend(run.error.iter().map(|words| format!("{}: {}", run.name, words.trim())));
         table.notes.extend(run.notes.iter().map(|words| format!("{}: {words}", run.name)));
@@ -384,7 +384,7 @@ mod tests {
 
     #[test]
     fn tables_are_aligned_as_text_and_escaped_as_markdown() {
-        let mut table = Table::new("Errors", &["run", "error"]);
+        let mut table = ResultTable::new("Errors", &["run", "error"]);
         table.rows = vec![vec!["a".into(), "1.5".into()], vec!["long name".into(), "10.25".into()]];
         table.notes = vec!["||v||".into()];
         assert_eq!(

@@ -12,7 +12,7 @@
 //! corrected in the same way.
 
 use super::{
-    condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
+    condensed_matrix::{CondensedMatrix, ContactMotion, Subspace, Workspace},
     equations::{Floor, NodeByNode, StepMatrix},
     frames::Frames,
     problem::System,
@@ -75,7 +75,7 @@ struct Elimination {
 /// The contact nodes of this rank, in the order of vectors of contact nodes, and the motions on which laws act.
 struct ContactNodes<const D: usize> {
     nodes: Vec<usize>,
-    motions: Vec<Motion>,
+    motions: Vec<ContactMotion>,
 }
 
 /// Vectors of all nodes, and of contact nodes.
@@ -367,7 +367,8 @@ impl Elimination {
 impl<const D: usize> ContactNodes<D> {
     fn new(contact: &[ContactNode<D>]) -> Self {
         let motions = contact.iter().enumerate().flat_map(|(number, contact)| {
-            let motion = move |direction: &[f64; D]| Motion { at: number * D, direction: direction.to_vec() };
+            let motion =
+                move |direction: &[f64; D]| ContactMotion { at: number * D, direction: direction.to_vec() };
             contact.frame[..contact.active].iter().map(motion)
         });
         Self { nodes: contact.iter().map(|contact| contact.node).collect(), motions: motions.collect() }

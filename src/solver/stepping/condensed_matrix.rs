@@ -13,7 +13,7 @@ use std::{cell::RefCell, ops::Range};
 
 /// A motion of one contact node on which laws act: one scalar unknown.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Motion {
+pub(super) struct ContactMotion {
     /// Position of the values of its node in vectors of contact nodes.
     pub at: usize,
     pub direction: Vec<f64>,
@@ -32,7 +32,7 @@ pub(super) struct CondensedMatrix {
     pub nodes: Vec<Range<usize>>,
     /// The range of this rank in these motions.
     pub own: Range<usize>,
-    pub motions: Vec<Motion>,
+    pub motions: Vec<ContactMotion>,
     /// Stiffness of the springs in the factor along each motion of this rank, in N s/m; `None` on all ranks without springs.
     pub springs: Option<Vec<f64>>,
     pub subspace: RefCell<Subspace>,
@@ -59,7 +59,7 @@ pub(super) struct Workspace {
 
 impl Workspace {
     /// For these motions of this rank, and this number of motions of all ranks. Collective.
-    pub(super) fn new(session: &Session, motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
+    pub(super) fn new(session: &Session, motions: &[ContactMotion], total: usize) -> Result<RefCell<Self>> {
         let world = session.shared_world();
         let pairs = motions.chunk_by(|a, b| a.at == b.at).map(|node| node.len() * node.len()).sum();
         let block_gathering = Gathering::new(&world, pairs)?;

@@ -257,7 +257,11 @@ impl Newton {
             } else {
                 factor = factor.sqrt();
             }
-            let (Some((last, velocities)), Some(unknowns)) = (&reached, &self.reached) else { break };
+            let (Some((last, velocities)), Some(unknowns)) = (&reached, &self.reached) else {
+                trial.copy_from(&self.start)?;
+                restore_pressures(problem.body, problem.state)?;
+                break;
+            };
             if attempt.failure.is_some() {
                 set_give(problem.body, *last);
                 let contacts = &mut problem.body.contacts;

@@ -2,7 +2,7 @@
 
 use super::{
     Contact,
-    friction::{Friction, Motion},
+    friction::{Friction, FrictionStatus},
     point::{Unknown, Vectors::Newton},
 };
 
@@ -64,9 +64,9 @@ impl<const D: usize> Contact<D> {
         }
         for (motion, _) in self.friction.iter().flat_map(|f: &Friction<D>| f.motions(Newton, velocity)) {
             match motion {
-                Motion::Sticks => count.sticking += 1,
-                Motion::Slides => count.slipping += 1,
-                Motion::Separated => count.separated += 1,
+                FrictionStatus::Sticks => count.sticking += 1,
+                FrictionStatus::Slides => count.slipping += 1,
+                FrictionStatus::Separated => count.separated += 1,
             }
         }
         count

@@ -55,7 +55,7 @@ pub(super) struct Friction<const D: usize> {
 
 /// The state of a point with friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Motion {
+pub(super) enum FrictionStatus {
     Sticks,
     Slides,
     /// The law's bound depends on the pressure, which is zero.
@@ -365,16 +365,23 @@ impl<const D: usize> Friction<D> {
     }
 
     /// The state of each point with its weight, at these velocities.
-    pub(super) fn motions(&self, vectors: Vectors, velocity: &[f64]) -> impl Iterator<Item = (Motion, f64)> {
+    pub(super) fn motions(
+        &self,
+        vectors: Vectors,
+        velocity: &[f64],
+    ) -> impl Iterator<Item = (FrictionStatus, f64)> {
         self.sliding(vectors, velocity).map(|(point, sliding)| {
             // A node that is held over an obstacle at rest has no friction of its own.
             let is_idle = !point.is_free() && norm(&sliding) == 0.0;
             if is_idle || (self.law.follows_pressure() && point.pressure <= 0.0) {
-                return (Motion::Separated, point.weight);
+                return (FrictionStatus::Separated, point.weight);
             }
             let parameter = add_scaled(&point.whole_traction(), self.scale, &sliding);
             let found = self.law.resolve(norm(&parameter), self.scale, point.pressure, point.context);
-            (if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }, point.weight)
+            (
+                if found.derivative == 0.0 { FrictionStatus::Sticks } else { FrictionStatus::Slides },
+                point.weight,
+            )
         })
     }
 

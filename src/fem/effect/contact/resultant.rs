@@ -2,7 +2,7 @@
 
 use super::{
     Contact,
-    friction::Motion,
+    friction::FrictionStatus,
     point::{Unknown, Vectors::Body},
 };
 use crate::{
@@ -72,9 +72,9 @@ impl<const D: usize> Contact<D> {
         }
         for (motion, weight) in self.friction.iter().flat_map(|friction| friction.motions(Body, velocity)) {
             match motion {
-                Motion::Sticks => areas.sticking += weight,
-                Motion::Slides => areas.slipping += weight,
-                Motion::Separated => {}
+                FrictionStatus::Sticks => areas.sticking += weight,
+                FrictionStatus::Slides => areas.slipping += weight,
+                FrictionStatus::Separated => {}
             }
         }
         areas
@@ -102,7 +102,7 @@ impl<const D: usize> Contact<D> {
                 state.sliding = sliding;
                 let (free, held) = tangential.parts_of(traction);
                 state.friction = add_scaled(&free, 1.0, &held);
-                state.sticks = motions.next().map(|(motion, _)| motion == Motion::Sticks);
+                state.sticks = motions.next().map(|(motion, _)| motion == FrictionStatus::Sticks);
             }
             if point.carries(&self.law) {
                 state.pressure = match point.unknown {

@@ -47,7 +47,7 @@ pub struct DruckerPrager<N = f64> {
 }
 
 impl<N> InPlaces<N> for DruckerPrager<N> {
-    type There = DruckerPrager;
+    type AtPlace = DruckerPrager;
 
     const YIELD_STRESS: Option<&'static str> = Some("cohesion");
 

@@ -33,7 +33,7 @@ pub trait Parameters {
 /// without yield stress.
 pub trait InPlaces<N> {
     /// The parameters at a place.
-    type There: Parameters;
+    type AtPlace: Parameters;
 
     /// The key of the yield stress.
     const YIELD_STRESS: Option<&'static str> = None;
@@ -44,7 +44,7 @@ pub trait InPlaces<N> {
     }
 
     /// The parameters where the yield stress has this value in Pa, if there is one.
-    fn with_yield_stress(&self, yield_stress: f64) -> Self::There;
+    fn with_yield_stress(&self, yield_stress: f64) -> Self::AtPlace;
 }
 
 /// The evaluation of a law at a point. The defaults are those of a law without yield surface and without hardening.

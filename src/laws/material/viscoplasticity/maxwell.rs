@@ -34,7 +34,7 @@ pub struct Maxwell {
 }
 
 impl<N> InPlaces<N> for Maxwell {
-    type There = Self;
+    type AtPlace = Self;
 
     fn with_yield_stress(&self, _: f64) -> Self {
         *self

@@ -66,7 +66,7 @@ fn one() -> f64 {
 }
 
 impl<N> InPlaces<N> for Norton {
-    type There = Self;
+    type AtPlace = Self;
 
     fn with_yield_stress(&self, _: f64) -> Self {
         *self

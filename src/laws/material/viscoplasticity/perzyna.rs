@@ -41,7 +41,7 @@ use crate::{
 };
 
 impl<N> InPlaces<N> for Perzyna<N> {
-    type There = Perzyna;
+    type AtPlace = Perzyna;
 
     const YIELD_STRESS: Option<&'static str> = Some("yield_stress");
 
