@@ -3,7 +3,7 @@
 use crate::mpirun::{self, scramble};
 use crate::owner;
 use clarke::error::Result;
-use clarke::io::output::checkpoint_file::{self, Checkpoint, RowSet, Table};
+use clarke::io::output::checkpoint_file::{self, Checkpoint, IdTable, RowSet};
 use clarke::io::output::inspect::inspect;
 use clarke::io::output::seal;
 use mpi::traits::{Communicator, CommunicatorCollectives};
@@ -42,9 +42,9 @@ pub fn write(world: &impl Communicator, folder: &Path) {
         RowSet { name: "cells", total: CELLS, ids: &cells },
     ];
     let tables = [
-        Table { name: "displacement", set: "nodes", width: 2, values: &displacements },
-        Table { name: "velocity", set: "nodes", width: 2, values: &velocities },
-        Table { name: "history", set: "cells", width: 3, values: &histories },
+        IdTable { name: "displacement", set: "nodes", width: 2, values: &displacements },
+        IdTable { name: "velocity", set: "nodes", width: 2, values: &velocities },
+        IdTable { name: "history", set: "cells", width: 3, values: &histories },
     ];
     checkpoint_file::write(&folder.join("checkpoint-64.h5"), world, HEADER, &sets, &tables).expect("write");
 }
