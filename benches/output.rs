@@ -14,7 +14,7 @@ mod triad;
 
 use clarke::{
     io::output::{
-        checkpoint_file::{self, RowSet, Table},
+        checkpoint_file::{self, IdTable, RowSet},
         checksum::table_checksum,
         fields::{Field, FieldFile, FieldMesh, Place, Shape},
         parallel_file::ParallelFile,
@@ -93,11 +93,11 @@ impl Part {
         ]
     }
 
-    fn tables(&self) -> Vec<Table<'_>> {
+    fn tables(&self) -> Vec<IdTable<'_>> {
         let names = ["displacement", "velocity", "previous_velocity", "contact_traction"];
         let nodal = names.into_iter().zip(&self.nodal);
-        let nodal = nodal.map(|(name, values)| Table { name, set: "nodes", width: 2, values });
-        nodal.chain([Table { name: "history", set: "cells", width: 3, values: &self.history }]).collect()
+        let nodal = nodal.map(|(name, values)| IdTable { name, set: "nodes", width: 2, values });
+        nodal.chain([IdTable { name: "history", set: "cells", width: 3, values: &self.history }]).collect()
     }
 
     fn ids(&self, set: &str) -> &[u64] {
