@@ -4,7 +4,7 @@ use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     fem::effect::{
-        Blend, Contact, ContactConditions, Effect, Inertia, LoadedObstacle, Quadrature, Travel,
+        Blend, Contact, ContactConditions, Effect, Freedom, Inertia, LoadedObstacle, Quadrature, Travel,
         ViscousStress, choose_unknowns,
     },
     job::{Expression, Fix, FixedDirections, Scalar},
@@ -234,24 +234,24 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
     let load = ObstacleLoad { direction, moment: Some(number(0.0)), ..ObstacleLoad::default() };
     contact.obstacle = Some(LoadedObstacle::new(&load, contact.gap.axis()));
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
-    for motion in 0..2 {
+    for freedom in Freedom::ALL {
         let travel = Travel::to_end(Blend::euler(0.1));
-        contact.driven_mut(motion).expect("a motion").start(travel, 0.1, None);
+        contact.driven_mut(freedom).expect("a motion").start(travel, 0.1, None);
     }
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
     contact.prepare(0.1, 0.1, &displacement).expect("prepared");
     contact.follow_obstacle(true);
     let start = [0.7, -3.0];
     let mut velocities_at = |[along, about]: [f64; 2]| {
-        contact.driven_mut(0).expect("a motion").set_velocity(along);
-        contact.driven_mut(1).expect("a motion").set_velocity(about);
+        contact.driven_mut(Freedom::Translation).expect("a motion").set_velocity(along);
+        contact.driven_mut(Freedom::Rotation).expect("a motion").set_velocity(about);
         contact.place_obstacle().expect("placed");
         let mut apart = vec![0.0; state.velocity.owned().expect("owned").len()];
         contact.subtract_obstacle(&mut apart);
-        let columns = [0, 1].map(|motion| {
+        let columns = Freedom::ALL.map(|freedom| {
             let mut column = vec![0.0; apart.len()];
-            contact.add_motion(motion, &mut column);
-            if motion == 0 {
+            contact.add_motion(freedom, &mut column);
+            if freedom == Freedom::Translation {
                 contact.add_sweep(&mut column).expect("swept");
             }
             column

@@ -17,7 +17,7 @@
 
 use crate::{
     error::{Error, Result},
-    fem::effect::{Contact, LoadedMotion},
+    fem::effect::{Contact, Freedom, LoadedMotion},
     linear_algebra::petsc::DistributedVector,
     parallel::session::Session,
 };
@@ -57,8 +57,8 @@ pub struct ObstacleMotions {
 
 /// One motion.
 struct Motion {
-    /// The numbers of the contact and of the motion of its obstacle.
-    place: [usize; 2],
+    /// The number of the contact, and the degree of freedom of its obstacle.
+    place: (usize, Freedom),
     /// `N`.
     velocities: DistributedVector,
     /// The change of nodal velocities with that of the motion, which is `N` unless the obstacle rolls.
@@ -108,8 +108,8 @@ impl ObstacleMotions {
         if let Some(contact) = self.parted.take() {
             self.may_part = false;
             contacts[contact].follow_obstacle(false);
-            for number in 0..2 {
-                let Some(motion) = contacts[contact].driven_mut(number) else { continue };
+            for freedom in Freedom::ALL {
+                let Some(motion) = contacts[contact].driven_mut(freedom) else { continue };
                 let free = motion.velocity() + motion.change_to_free();
                 if free.is_finite() {
                     motion.set_velocity(free);
@@ -135,8 +135,8 @@ impl ObstacleMotions {
     ) -> Result<()> {
         (self.touched, self.parted) = (None, None);
         let driven = contacts.iter().enumerate().flat_map(|(contact, laws)| {
-            laws.driven().into_iter().enumerate().filter_map(move |(number, motion)| {
-                motion.map(|motion| ([contact, number], motion.inertia()))
+            Freedom::ALL.into_iter().zip(laws.driven()).filter_map(move |(freedom, motion)| {
+                motion.map(|motion| ((contact, freedom), motion.inertia()))
             })
         });
         for (at, (place, inertia)) in driven.enumerate() {
@@ -154,9 +154,9 @@ impl ObstacleMotions {
             }
             let motion = &mut self.motions[at];
             (motion.place, motion.inertia, motion.approach) = (place, inertia, None);
-            let [contact, number] = place;
+            let (contact, freedom) = place;
             motion.velocities.fill(0.0)?;
-            contacts[contact].add_motion(number, &mut motion.velocities.owned_mut()?);
+            contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
             motion.size = motion.velocities.norm()?;
         }
         if self.is_empty() {
@@ -174,9 +174,9 @@ impl ObstacleMotions {
         mut multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
     ) -> Result<()> {
         let count = self.motions.len();
-        for Motion { place: [contact, number], velocities, column, forces, .. } in &mut self.motions {
+        for Motion { place: (contact, freedom), velocities, column, forces, .. } in &mut self.motions {
             column.copy_from(velocities)?;
-            if *number == 0 && contacts[*contact].rolls() {
+            if *freedom == Freedom::Translation && contacts[*contact].rolls() {
                 let added = contacts[*contact].add_sweep(&mut column.owned_mut()?);
                 session.agree(added)?;
             }
@@ -202,13 +202,13 @@ impl ObstacleMotions {
     ) -> Result<bool> {
         let count = self.motions.len();
         self.work.clear();
-        for Motion { place: [contact, number], .. } in &self.motions {
-            self.work.push(contacts[*contact].resultants(velocity)[*number]);
+        for Motion { place: (contact, freedom), .. } in &self.motions {
+            self.work.push(contacts[*contact].resultants(velocity)[*freedom as usize]);
         }
         for motion in &self.motions {
             self.work.push(own_dot(&motion.velocities, residual)?);
         }
-        for Motion { place: [contact, _], .. } in &self.motions {
+        for Motion { place: (contact, _), .. } in &self.motions {
             let laws = &mut contacts[*contact];
             let is_new =
                 laws.follow_along_new_tangents() || (!laws.follows_obstacle() && laws.has_tractions());
@@ -216,13 +216,13 @@ impl ObstacleMotions {
         }
         let sums = session.sum_of_lists(&self.work);
         if let Some(at) = sums[2 * count..].iter().position(|touching| *touching > 0.0) {
-            self.touched = Some(self.motions[at].place[0]);
+            self.touched = Some(self.motions[at].place.0);
             return Err(Error::Failed(NO_CONTACT.into()));
         }
         (self.values.clear(), self.unbalanced.clear());
         let mut largest = 0.0;
-        for (at, Motion { place: [contact, number], size, .. }) in self.motions.iter().enumerate() {
-            let Some(motion) = contacts[*contact].driven_mut(*number) else { continue };
+        for (at, Motion { place: (contact, freedom), size, .. }) in self.motions.iter().enumerate() {
+            let Some(motion) = contacts[*contact].driven_mut(*freedom) else { continue };
             let [open, terms] = motion.unbalanced(sums[at]);
             let value = open + sums[count + at];
             let enough = f64::max(SHARE * self.tolerance * size, ROUNDING * terms);
@@ -240,8 +240,8 @@ impl ObstacleMotions {
         }
         self.solve(|_| true);
         let mut placed = Ok(());
-        for (Motion { place: [contact, number], .. }, change) in self.motions.iter().zip(&self.values) {
-            if let Some(motion) = contacts[*contact].driven_mut(*number) {
+        for (Motion { place: (contact, freedom), .. }, change) in self.motions.iter().zip(&self.values) {
+            if let Some(motion) = contacts[*contact].driven_mut(*freedom) {
                 motion.set_velocity(motion.velocity() - change);
             }
         }
@@ -278,26 +278,30 @@ impl ObstacleMotions {
     ) -> Result<()> {
         for (at, motion) in self.motions.iter_mut().enumerate() {
             motion.approach = None;
-            let [contact, number] = motion.place;
+            let (contact, freedom) = motion.place;
             let laws = &contacts[contact];
-            let [grip, area] = session.sum([laws.grip(number), laws.area()]);
+            let [grip, area] = session.sum([laws.grip(freedom), laws.area()]);
             if grip > 0.0 {
                 continue;
             }
-            let driving = laws.driven()[number].map_or(0.0, |motion| motion.driving());
+            let driving = laws.driven()[freedom as usize].map_or(0.0, |motion| motion.driving());
             let [open, _] = self.unbalanced.get(at).copied().unwrap_or([-driving, 0.0]);
             if open == 0.0 {
                 motion.approach = Some(0.0);
                 continue;
             }
             let (sign, open) = (-open.signum(), open.abs());
-            let nearest = if number == 0 { laws.change_to_touch(velocity, sign) } else { f64::INFINITY };
+            let nearest = if freedom == Freedom::Translation {
+                laws.change_to_touch(velocity, sign)
+            } else {
+                f64::INFINITY
+            };
             let nearest = -session.largest([-nearest])[0];
             let change = if motion.inertia * nearest < open {
                 nearest + (open - motion.inertia * nearest) / (motion.inertia + laws.scale * area)
             } else {
                 // Relative to a distant obstacle, velocities of the body would be rounding errors.
-                if number == 0 && self.may_part && laws.follows_obstacle() {
+                if freedom == Freedom::Translation && self.may_part && laws.follows_obstacle() {
                     self.parted = Some(contact);
                     return Err(Error::Failed(NO_CONTACT.into()));
                 }
@@ -342,8 +346,8 @@ impl ObstacleMotions {
 
     /// The velocities of all motions.
     pub(super) fn velocities<const D: usize>(&self, contacts: &[Contact<D>]) -> Vec<f64> {
-        let velocity = |[contact, number]: [usize; 2]| {
-            contacts[contact].driven()[number].map_or(0.0, LoadedMotion::velocity)
+        let velocity = |(contact, freedom): (usize, Freedom)| {
+            contacts[contact].driven()[freedom as usize].map_or(0.0, LoadedMotion::velocity)
         };
         self.motions.iter().map(|motion| velocity(motion.place)).collect()
     }
@@ -354,9 +358,9 @@ impl ObstacleMotions {
         contacts: &mut [Contact<D>],
         velocities: &[f64],
     ) -> Result<()> {
-        for (Motion { place: [contact, number], .. }, velocity) in self.motions.iter().zip(velocities) {
+        for (Motion { place: (contact, freedom), .. }, velocity) in self.motions.iter().zip(velocities) {
             contacts[*contact]
-                .driven_mut(*number)
+                .driven_mut(*freedom)
                 .into_iter()
                 .for_each(|motion| motion.set_velocity(*velocity));
         }
@@ -366,14 +370,15 @@ impl ObstacleMotions {
     /// The norm in m/s of the velocities by which nodes follow obstacles since the start of the step: velocities are rounded as differences
     /// from them.
     pub(super) fn speed<const D: usize>(&self, contacts: &[Contact<D>]) -> f64 {
-        let change =
-            |[contact, number]: [usize; 2]| contacts[contact].driven()[number].map_or(0.0, |m| m.change());
+        let change = |(contact, freedom): (usize, Freedom)| {
+            contacts[contact].driven()[freedom as usize].map_or(0.0, |m| m.change())
+        };
         self.motions.iter().map(|motion| motion.size * change(motion.place).abs()).sum()
     }
 
     /// Whether a motion changes nodal velocities otherwise than the velocities work against forces on the obstacle.
     pub(super) fn is_unsymmetric<const D: usize>(&self, contacts: &[Contact<D>]) -> bool {
-        self.motions.iter().any(|motion| contacts[motion.place[0]].rolls())
+        self.motions.iter().any(|motion| contacts[motion.place.0].rolls())
     }
 
     /// The reason why the motions are not solved, given the norm of the nodal residual in N and the relative tolerance of steps.

@@ -20,7 +20,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
-        effect::{CONTACT, Contact, Energy, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
+        effect::{CONTACT, Contact, Energy, Freedom, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
         resultants::BalancedMotion,
         state::State,
     },
@@ -493,13 +493,13 @@ impl Stepper {
         let (travel, time) = (self.integrator.travel(step), self.integrator.balanced_time(step));
         let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);
         for (number, contact) in body.contacts.iter_mut().enumerate() {
-            for (what, motion) in ["force", "moment"].into_iter().zip(0..) {
-                let Some(motion) = contact.driven_mut(motion) else { continue };
+            for (cause, freedom) in [("force", Freedom::Translation), ("moment", Freedom::Rotation)] {
+                let Some(motion) = contact.driven_mut(freedom) else { continue };
                 motion.start(travel, time, ratio);
                 let value = motion.driving();
                 if !value.is_finite() {
                     return Err(Error::Failed(format!(
-                        "the {what} on the obstacle of contact.{number} is {value} at t = {time} s; correct the expression in the job"
+                        "the {cause} on the obstacle of contact.{number} is {value} at t = {time} s; correct the expression in the job"
                     )));
                 }
             }

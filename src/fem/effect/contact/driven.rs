@@ -9,7 +9,7 @@
 
 use super::{
     Contact,
-    loaded_obstacle::LoadedMotion,
+    loaded_obstacle::{Freedom, LoadedMotion},
     point::{Point, Unknown, Vectors::Newton},
 };
 use crate::{
@@ -32,14 +32,20 @@ impl<const D: usize> Contact<D> {
         self.obstacle.as_ref().map_or([None; 2], |obstacle| obstacle.motions())
     }
 
-    /// The motion with this number, to be changed.
-    pub fn driven_mut(&mut self, number: usize) -> Option<&mut LoadedMotion> {
-        self.obstacle.as_mut()?.motions_mut().into_iter().nth(number)?
+    /// The motion of this degree of freedom, to be changed.
+    pub fn driven_mut(&mut self, freedom: Freedom) -> Option<&mut LoadedMotion> {
+        let [translation, rotation] = self.obstacle.as_mut()?.motions_mut();
+        match freedom {
+            Freedom::Translation => translation,
+            Freedom::Rotation => rotation,
+        }
     }
 
     /// Sets the velocities of the obstacle to those from which the step starts.
     pub fn restart_obstacle(&mut self) -> Result<()> {
-        (0..2).for_each(|number| self.driven_mut(number).into_iter().for_each(LoadedMotion::restart));
+        Freedom::ALL
+            .into_iter()
+            .for_each(|freedom| self.driven_mut(freedom).into_iter().for_each(LoadedMotion::restart));
         self.place_obstacle()
     }
 
@@ -192,24 +198,25 @@ impl<const D: usize> Contact<D> {
     }
 
     /// The velocity of the obstacle's material at a point for a motion at 1 m/s (1 rad/s).
-    fn carrying(&self, number: usize, at: usize) -> Vector<D> {
+    fn carrying(&self, freedom: Freedom, at: usize) -> Vector<D> {
         let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
-        let velocities = self.obstacle.as_ref().map(|obstacle| obstacle.velocities_at(&arm)[number]);
+        let velocities =
+            self.obstacle.as_ref().map(|obstacle| obstacle.velocities_at(&arm)[freedom as usize]);
         velocities.flatten().unwrap_or([0.0; D])
     }
 
     /// Adds the change of nodal velocities, a vector of Newton's method, with the velocity of a motion at fixed unknowns.
-    pub fn add_motion(&self, number: usize, nodal: &mut [f64]) {
+    pub fn add_motion(&self, freedom: Freedom, nodal: &mut [f64]) {
         if !self.follows {
             return;
         }
         let parameters = self.points.iter().filter(|point| point.unknown == Unknown::Parameter);
-        for point in parameters.filter(|_| number == 0) {
+        for point in parameters.filter(|_| freedom == Freedom::Translation) {
             point.add_along(Newton, point.follows / point.free_length, nodal);
         }
         let tangential = self.friction.iter().flat_map(|friction| &friction.points);
         for point in tangential.filter(|point| point.follows) {
-            point.add(Newton, 1.0, &point.free_part(&self.carrying(number, point.at)), nodal);
+            point.add(Newton, 1.0, &point.free_part(&self.carrying(freedom, point.at)), nodal);
         }
     }
 
@@ -217,31 +224,34 @@ impl<const D: usize> Contact<D> {
     /// of Newton's method with ghosts; 0 for motions that it does not have.
     pub fn resultants(&self, velocity: &[f64]) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        for (number, sum) in
-            sums.iter_mut().enumerate().filter(|(number, _)| self.driven()[*number].is_some())
-        {
+        for (freedom, sum) in Freedom::ALL.into_iter().zip(&mut sums) {
+            if self.driven()[freedom as usize].is_none() {
+                continue;
+            }
             for (at, point) in self.points.iter().enumerate() {
                 let pressure = point.pressure_at(&self.law, Newton, velocity);
-                *sum += point.weight * pressure * dot(&point.normal, &self.carrying(number, at));
+                *sum += point.weight * pressure * dot(&point.normal, &self.carrying(freedom, at));
             }
             for point in self.friction.iter().flat_map(|friction| &friction.points) {
-                *sum += point.weight * dot(&point.whole_traction(), &self.carrying(number, point.at));
+                *sum += point.weight * dot(&point.whole_traction(), &self.carrying(freedom, point.at));
             }
         }
         sums
     }
 
     /// A measure of how firmly points on this rank hold a motion at the last linearisation, in m^(D-1); 0 where nothing touches.
-    pub fn grip(&self, number: usize) -> f64 {
+    pub fn grip(&self, freedom: Freedom) -> f64 {
         let square = |value: f64| value * value;
         let normal = self.points.iter().enumerate().filter(|(_, point)| point.unknown == Unknown::Parameter);
         let normal = normal.map(|(at, point)| {
-            let along = dot(&point.normal, &self.carrying(number, at));
-            point.weight * (1.0 - point.theta).abs() * if number == 0 { square(along) } else { 0.0 }
+            let along = dot(&point.normal, &self.carrying(freedom, at));
+            point.weight
+                * (1.0 - point.theta).abs()
+                * if freedom == Freedom::Translation { square(along) } else { 0.0 }
         });
         let sliding = self.friction.iter().flat_map(|friction| &friction.points).map(|point| {
             let share = point.tangent.theta.iter().map(|theta| (1.0 - theta).abs()).sum::<f64>();
-            point.weight * share * square(norm(&point.free_part(&self.carrying(number, point.at))))
+            point.weight * share * square(norm(&point.free_part(&self.carrying(freedom, point.at))))
         });
         normal.sum::<f64>() + sliding.sum::<f64>()
     }

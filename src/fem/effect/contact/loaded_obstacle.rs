@@ -50,6 +50,20 @@ impl Travel {
     }
 }
 
+/// A degree of freedom of an obstacle, in the order of lists of its [motions](LoadedObstacle::motions).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Freedom {
+    /// Along its direction.
+    Translation,
+    /// About its axis.
+    Rotation,
+}
+
+impl Freedom {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Translation, Self::Rotation];
+}
+
 /// A motion with one degree of freedom and the force, or the moment, that drives it.
 #[derive(Debug)]
 pub struct LoadedMotion {
