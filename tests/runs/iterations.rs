@@ -108,7 +108,7 @@ fn rolling_takes_few_iterations_on_any_mesh_and_in_any_step() {
         ("[120, 4]", "end = 0.1, step = 0.002, scheme = 'bdf2'", 950.0),
         ("[120, 4]", "end = 0.1, step = 0.005, scheme = 'bdf2'", 550.0),
         ("[120, 4]", "end = 0.1, step = 0.002, scheme = 'implicit_euler'", 1200.0),
-        ("[480, 8]", "end = 0.01, step = 0.002, scheme = 'bdf2'", 300.0),
+        ("[480, 8]", "end = 0.01, step = 0.002, scheme = 'bdf2'", 600.0),
     ] {
         let kept = case(cells, time).run_and_keep(1);
         let results = kept.results();

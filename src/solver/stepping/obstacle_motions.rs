@@ -21,10 +21,12 @@ use crate::{
     linear_algebra::petsc::DistributedVector,
     parallel::session::Session,
 };
-use std::fmt::Write;
+use std::{cmp::Ordering, fmt::Write};
 
-/// Evaluations of the velocities of one residual.
-pub(super) const EVALUATIONS: usize = 6;
+/// Evaluations of the velocities of one residual: after how many they must lower the unbalanced forces, and at most.
+const EVALUATIONS: [usize; 2] = [0, 6];
+/// The same where obstacles rest on held points, whose pressures may grow as a power of the penetration from zero.
+const HELD_EVALUATIONS: [usize; 2] = [10, 60];
 /// An evaluation that leaves more than this share of the unbalanced forces has met their rounding errors.
 const LEAST_DECREASE: f64 = 0.5;
 /// Share of the tolerance of nodal forces to which velocities are evaluated.
@@ -69,6 +71,8 @@ struct Motion {
     size: f64,
     /// `m / k'`.
     inertia: f64,
+    /// What held points add to its `s`.
+    held: f64,
     /// The change of its velocity in the next iteration, if nothing holds it.
     approach: Option<f64>,
 }
@@ -149,11 +153,12 @@ impl ObstacleMotions {
                     forces,
                     size: 0.0,
                     inertia,
+                    held: 0.0,
                     approach: None,
                 });
             }
             let motion = &mut self.motions[at];
-            (motion.place, motion.inertia, motion.approach) = (place, inertia, None);
+            (motion.place, motion.inertia, motion.held, motion.approach) = (place, inertia, 0.0, None);
             let (contact, freedom) = place;
             motion.velocities.fill(0.0)?;
             contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
@@ -214,12 +219,17 @@ impl ObstacleMotions {
                 laws.follow_along_new_tangents() || (!laws.follows_obstacle() && laws.has_tractions());
             self.work.push(f64::from(u8::from(is_new)));
         }
+        for Motion { place: (contact, freedom), .. } in &self.motions {
+            self.work.push(contacts[*contact].held_stiffness(*freedom, velocity));
+        }
         let sums = session.sum_of_lists(&self.work);
-        if let Some(at) = sums[2 * count..].iter().position(|touching| *touching > 0.0) {
+        self.motions.iter_mut().zip(&sums[3 * count..]).for_each(|(motion, held)| motion.held = *held);
+        if let Some(at) = sums[2 * count..3 * count].iter().position(|touching| *touching > 0.0) {
             self.touched = Some(self.motions[at].place.0);
             return Err(Error::Failed(NO_CONTACT.into()));
         }
-        (self.values.clear(), self.unbalanced.clear());
+        self.values.clear();
+        self.unbalanced.clear();
         let mut largest = 0.0;
         for (at, Motion { place: (contact, freedom), size, .. }) in self.motions.iter().enumerate() {
             let Some(motion) = contacts[*contact].driven_mut(*freedom) else { continue };
@@ -233,12 +243,15 @@ impl ObstacleMotions {
                 largest = f64::NAN;
             }
         }
-        let is_slow = evaluation > 0 && largest > LEAST_DECREASE * self.largest;
+        let rests = self.motions.iter().any(|motion| motion.held > 0.0);
+        let [patience, most] = if rests { HELD_EVALUATIONS } else { EVALUATIONS };
+        let is_slow = evaluation > patience && largest > LEAST_DECREASE * self.largest;
         self.largest = largest;
-        if largest <= 1.0 || !largest.is_finite() || is_slow || evaluation + 1 == EVALUATIONS {
+        if largest <= 1.0 || !largest.is_finite() || is_slow || evaluation + 1 == most {
             return Ok(false);
         }
         self.solve(|_| true);
+        self.press_on_held(session, contacts, velocity);
         let mut placed = Ok(());
         for (Motion { place: (contact, freedom), .. }, change) in self.motions.iter().zip(&self.values) {
             if let Some(motion) = contacts[*contact].driven_mut(*freedom) {
@@ -252,10 +265,40 @@ impl ObstacleMotions {
         Ok(true)
     }
 
+    /// Replaces the change of a motion that has no equation, because it only presses on held points and does not touch them yet, by that
+    /// with which it does. Collective.
+    fn press_on_held<const D: usize>(
+        &mut self,
+        session: &Session,
+        contacts: &[Contact<D>],
+        velocity: &[f64],
+    ) {
+        for (at, motion) in self.motions.iter().enumerate() {
+            let ([open, _], (contact, freedom)) = (self.unbalanced[at], motion.place);
+            if open == 0.0 || freedom != Freedom::Translation || self.diagonal(at) != 0.0 {
+                continue;
+            }
+            let (laws, sign) = (&contacts[contact], -open.signum());
+            let [away] = session.largest([-laws.change_to_touch(velocity, sign)]);
+            let [area] = session.sum([laws.area()]);
+            let change = -away + open.abs() / (laws.scale * area);
+            if change.is_finite() {
+                self.values[at] = -sign * change;
+                self.largest = f64::INFINITY;
+            }
+        }
+    }
+
+    /// The diagonal entry of `s`.
+    fn diagonal(&self, at: usize) -> f64 {
+        self.slopes[at * self.motions.len() + at] + self.motions[at].held
+    }
+
     /// Replaces the values by `s^-1` times them for these motions, and by 0 for all others.
     fn solve(&mut self, is_in: impl Fn(&Motion) -> bool) {
         let count = self.motions.len();
         self.work.clone_from(&self.slopes);
+        (0..count).for_each(|at| self.work[at * count + at] = self.diagonal(at));
         for (at, _) in self.motions.iter().enumerate().filter(|(_, motion)| !is_in(motion)) {
             for other in 0..count {
                 self.work[at * count + other] = f64::from(u8::from(other == at));
@@ -280,7 +323,8 @@ impl ObstacleMotions {
             motion.approach = None;
             let (contact, freedom) = motion.place;
             let laws = &contacts[contact];
-            let [grip, area] = session.sum([laws.grip(freedom), laws.area()]);
+            let [grip, area] =
+                session.sum([laws.grip(freedom) + laws.held_stiffness(freedom, velocity), laws.area()]);
             if grip > 0.0 {
                 continue;
             }
@@ -385,7 +429,7 @@ impl ObstacleMotions {
     pub(super) fn failure(&self, residual: f64, relative: f64) -> Option<String> {
         let is_open = |([open, terms], motion): (&[f64; 2], &Motion)| {
             let share = f64::max(relative * terms, motion.size * residual.max(self.tolerance));
-            !(open.abs() <= OBSTACLE_SHARE * share)
+            matches!(open.abs().partial_cmp(&(OBSTACLE_SHARE * share)), Some(Ordering::Greater) | None)
         };
         if !self.unbalanced.iter().zip(&self.motions).any(is_open) {
             return None;

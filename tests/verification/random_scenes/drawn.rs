@@ -617,7 +617,7 @@ fn obstacle<const D: usize>(draw: &mut Draw<D>, content: &Content) {
     let mut down = [0.0; D];
     down[D - 1] = -1.0;
     let kind = draw.one_of(&["plane", "sphere", "shape"]);
-    let is_loaded = content.scheme != "midpoint" && draw.chance(0.25);
+    let is_loaded = draw.chance(0.25);
     let is_turned = is_loaded && kind != "plane" && draw.chance(0.8);
     if is_loaded {
         velocity = [0.0; D];

@@ -256,18 +256,41 @@ impl<const D: usize> Contact<D> {
         normal.sum::<f64>() + sliding.sum::<f64>()
     }
 
+    /// The decrease of the force on the obstacle with the velocity of a motion in kg/s, by the pressures at points on this rank whose
+    /// normal velocity supports hold: only the obstacle changes them.
+    pub fn held_stiffness(&self, freedom: Freedom, velocity: &[f64]) -> f64 {
+        let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
+        let Some((direction, way)) = translation.filter(|_| freedom == Freedom::Translation) else {
+            return 0.0;
+        };
+        let held =
+            self.points.iter().filter(|point| point.unknown == Unknown::Held && self.is_pressed(point));
+        held.map(|point| {
+            let slope = self.law.slope(point.normal_component(Newton, velocity), point.context);
+            let along = dot(&point.normal, direction);
+            point.weight * slope / point.context.step_length * way * along * along
+        })
+        .sum()
+    }
+
+    /// Whether the obstacle may press on a point with a known or unknown pressure.
+    fn is_pressed(&self, point: &Point<D>) -> bool {
+        point.unknown != Unknown::Velocity && point.carries(&self.law) && point.can_touch()
+    }
+
     /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it touches a point on this rank in the step, at these
     /// velocities of Newton's method; infinite if it does not come nearer.
     pub fn change_to_touch(&self, velocity: &[f64], sign: f64) -> f64 {
+        let direction = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
         let change = |point: &Point<D>| {
-            let approach = -sign * point.follows * point.context.step_length;
+            let along = match direction {
+                Some((direction, _)) if point.unknown == Unknown::Held => dot(&point.normal, direction),
+                _ => point.follows,
+            };
+            let approach = -sign * along * point.context.step_length;
             let depth = self.depth(point, velocity);
             if approach > 0.0 && depth.is_finite() { (-depth / approach).max(0.0) } else { f64::INFINITY }
         };
-        self.points
-            .iter()
-            .filter(|point| point.unknown == Unknown::Parameter)
-            .map(change)
-            .fold(f64::INFINITY, f64::min)
+        self.points.iter().filter(|point| self.is_pressed(point)).map(change).fold(f64::INFINITY, f64::min)
     }
 }
