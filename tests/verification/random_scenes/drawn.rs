@@ -491,7 +491,7 @@ fn contacts<const D: usize>(draw: &mut Draw<D>, content: &Content) {
     let normal = normal_law(draw);
     let gap_of_obstacle = normal == Normal::Gap && draw.chance(0.6);
     if gap_of_obstacle {
-        obstacle(draw, content);
+        obstacle(draw);
     } else if normal == Normal::Gap {
         let (gap, rate) = (draw.between(0.0, 0.004), draw.between(0.0, 0.3));
         let (gap, rate) = (draw.number(gap, LENGTH), draw.number(rate, VELOCITY));
@@ -610,7 +610,7 @@ fn normal_law<const D: usize>(draw: &mut Draw<D>) -> Normal {
     }
 }
 
-fn obstacle<const D: usize>(draw: &mut Draw<D>, content: &Content) {
+fn obstacle<const D: usize>(draw: &mut Draw<D>) {
     let (lift, approach) = (draw.between(0.003, 0.006), draw.between(0.0, 0.6));
     let mut velocity = draw.direction().map(|x| 0.5 * x);
     velocity[D - 1] = approach;
