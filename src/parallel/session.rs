@@ -140,9 +140,16 @@ impl Session {
 
     /// Sum over all ranks of each entry of lists of one length. Collective.
     pub fn sum_of_lists(&self, mine: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; mine.len()];
-        self.world.all_reduce_into(mine, &mut all[..], SystemOperation::sum());
+        let mut all = Vec::new();
+        self.sum_lists_into(mine, &mut all);
         all
+    }
+
+    /// The same, written into a list. Collective.
+    pub fn sum_lists_into(&self, mine: &[f64], all: &mut Vec<f64>) {
+        all.clear();
+        all.resize(mine.len(), 0.0);
+        self.world.all_reduce_into(mine, &mut all[..], SystemOperation::sum());
     }
 
     /// Largest of each entry over all ranks; NaN where it is NaN on any rank. Collective.

@@ -252,25 +252,26 @@ impl Newton {
                     let mut unknowns = unknowns.owned_mut()?;
                     problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
                 }
-                reached = Some((ratio, self.obstacles.velocities(&problem.body.contacts)));
+                self.obstacles.keep(&problem.body.contacts);
+                reached = Some(ratio);
                 factor = f64::max(RATIO_FACTOR, factor * factor);
             } else {
                 factor = factor.sqrt();
             }
-            let (Some((last, velocities)), Some(unknowns)) = (&reached, &self.reached) else {
+            let (Some(last), Some(unknowns)) = (reached, &self.reached) else {
                 trial.copy_from(&self.start)?;
                 restore_pressures(problem.body, problem.state)?;
                 break;
             };
             if attempt.failure.is_some() {
-                set_give(problem.body, *last);
+                set_give(problem.body, last);
                 let contacts = &mut problem.body.contacts;
-                problem.session.agree(self.obstacles.set_velocities(contacts, velocities))?;
+                problem.session.agree(self.obstacles.restore(contacts))?;
                 trial.copy_from(unknowns)?;
                 let mut velocity = trial.owned_mut()?;
                 contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
             }
-            if *last <= LAST_RATIO || factor > LARGEST_RATIO_FACTOR {
+            if last <= LAST_RATIO || factor > LARGEST_RATIO_FACTOR {
                 break;
             }
             ratio = last * factor;

@@ -54,7 +54,10 @@ pub struct ObstacleMotions {
     values: Vec<f64>,
     unbalanced: Vec<[f64; 2]>,
     largest: f64,
+    /// The velocities that [`keep`](Self::keep) kept.
+    kept: Vec<f64>,
     work: Vec<f64>,
+    sums: Vec<f64>,
 }
 
 /// One motion.
@@ -191,7 +194,7 @@ impl ObstacleMotions {
         for (row, column) in (0..count * count).map(|at| (at / count, at % count)) {
             self.work.push(own_dot(&self.motions[row].velocities, &self.motions[column].forces)?);
         }
-        self.slopes = session.sum_of_lists(&self.work);
+        session.sum_lists_into(&self.work, &mut self.slopes);
         (0..count).for_each(|at| self.slopes[at * count + at] += self.motions[at].inertia);
         Ok(())
     }
@@ -222,7 +225,8 @@ impl ObstacleMotions {
         for Motion { place: (contact, freedom), .. } in &self.motions {
             self.work.push(contacts[*contact].held_stiffness(*freedom, velocity));
         }
-        let sums = session.sum_of_lists(&self.work);
+        session.sum_lists_into(&self.work, &mut self.sums);
+        let sums = &self.sums;
         self.motions.iter_mut().zip(&sums[3 * count..]).for_each(|(motion, held)| motion.held = *held);
         if let Some(at) = sums[2 * count..3 * count].iter().position(|touching| *touching > 0.0) {
             self.touched = Some(self.motions[at].place.0);
@@ -378,7 +382,7 @@ impl ObstacleMotions {
         for motion in &self.motions {
             self.work.push(own_dot(&motion.velocities, forces)?);
         }
-        self.values = session.sum_of_lists(&self.work);
+        session.sum_lists_into(&self.work, &mut self.values);
         self.solve(|motion| motion.approach.is_none());
         for (motion, change) in self.motions.iter().zip(&self.values) {
             if *change != 0.0 {
@@ -388,25 +392,20 @@ impl ObstacleMotions {
         Ok(())
     }
 
-    /// The velocities of all motions.
-    pub(super) fn velocities<const D: usize>(&self, contacts: &[Contact<D>]) -> Vec<f64> {
+    /// Keeps the velocities of all motions.
+    pub(super) fn keep<const D: usize>(&mut self, contacts: &[Contact<D>]) {
         let velocity = |(contact, freedom): (usize, Freedom)| {
             contacts[contact].driven()[freedom as usize].map_or(0.0, LoadedMotion::velocity)
         };
-        self.motions.iter().map(|motion| velocity(motion.place)).collect()
+        self.kept.clear();
+        self.kept.extend(self.motions.iter().map(|motion| velocity(motion.place)));
     }
 
-    /// Sets what [`velocities`](Self::velocities) gave.
-    pub(super) fn set_velocities<const D: usize>(
-        &self,
-        contacts: &mut [Contact<D>],
-        velocities: &[f64],
-    ) -> Result<()> {
-        for (Motion { place: (contact, freedom), .. }, velocity) in self.motions.iter().zip(velocities) {
-            contacts[*contact]
-                .driven_mut(*freedom)
-                .into_iter()
-                .for_each(|motion| motion.set_velocity(*velocity));
+    /// Sets the velocities that were kept last.
+    pub(super) fn restore<const D: usize>(&self, contacts: &mut [Contact<D>]) -> Result<()> {
+        for (Motion { place: (contact, freedom), .. }, velocity) in self.motions.iter().zip(&self.kept) {
+            let motion = contacts[*contact].driven_mut(*freedom);
+            motion.into_iter().for_each(|motion| motion.set_velocity(*velocity));
         }
         contacts.iter_mut().try_for_each(Contact::place_obstacle)
     }

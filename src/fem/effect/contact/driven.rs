@@ -21,6 +21,11 @@ use crate::{
 /// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
 const NEAR: f64 = 1e-6;
 
+/// The penetration in m of a point at the end of the step, at these velocities of Newton's method.
+fn depth<const D: usize>(point: &Point<D>, velocity: &[f64]) -> f64 {
+    point.context.penetration + point.context.step_length * point.normal_component(Newton, velocity)
+}
+
 /// The place at which the ray of a point meets the obstacle relative to its centre.
 fn arm<const D: usize>(point: &Point<D>, seen: &Vector<D>, reach: f64, centre: &Vector<D>) -> Vector<D> {
     add_scaled(&add_scaled(seen, reach, &point.normal), -1.0, centre)
@@ -80,12 +85,13 @@ impl<const D: usize> Contact<D> {
     /// in it, at these velocities of Newton's method; all of them where friction needs no pressure. Elsewhere they would carry the motion
     /// of the obstacle to and fro, only to lose digits. Collective.
     pub fn follow_along_tangents(&mut self, session: &Session, velocity: &[f64]) {
-        let depths: Vec<f64> = self.points.iter().map(|point| self.depth(point, velocity)).collect();
-        let [deepest] = session.largest([depths.iter().fold(0.0, |most, depth| larger(most, *depth))]);
+        let depths = self.points.iter().map(|point| depth(point, velocity));
+        let [deepest] = session.largest([depths.fold(0.0, larger)]);
         let points = &self.points;
         if let Some(friction) = &mut self.friction {
             for point in &mut friction.points {
-                let touches = points[point.at].pressure != 0.0 || depths[point.at] >= -deepest;
+                let touches =
+                    points[point.at].pressure != 0.0 || depth(&points[point.at], velocity) >= -deepest;
                 point.follows = touches || !friction.law.follows_pressure();
             }
         }
@@ -119,14 +125,7 @@ impl<const D: usize> Contact<D> {
 
     /// Whether points on this rank would touch the obstacle where it is, at these velocities of Newton's method.
     pub fn would_touch(&self, velocity: &[f64]) -> bool {
-        self.points
-            .iter()
-            .any(|point| point.unknown == Unknown::Parameter && self.depth(point, velocity) >= 0.0)
-    }
-
-    /// The penetration in m of a point at the end of the step.
-    fn depth(&self, point: &Point<D>, velocity: &[f64]) -> f64 {
-        point.context.penetration + point.context.step_length * point.normal_component(Newton, velocity)
+        self.points.iter().any(|point| point.unknown == Unknown::Parameter && depth(point, velocity) >= 0.0)
     }
 
     /// Sets the places at which the rays along the normals meet an obstacle that a moment turns, relative to its centre; zero where they
@@ -288,7 +287,7 @@ impl<const D: usize> Contact<D> {
                 _ => point.follows,
             };
             let approach = -sign * along * point.context.step_length;
-            let depth = self.depth(point, velocity);
+            let depth = depth(point, velocity);
             if approach > 0.0 && depth.is_finite() { (-depth / approach).max(0.0) } else { f64::INFINITY }
         };
         self.points.iter().filter(|point| self.is_pressed(point)).map(change).fold(f64::INFINITY, f64::min)
