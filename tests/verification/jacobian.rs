@@ -282,3 +282,29 @@ fn columns_of_rolling_obstacles_are_differences_of_their_velocities() {
         columns::<3, 6>(&world.session, &brick([3, 2, 2]));
     });
 }
+
+/// Bounds that are fixed where nothing touches yet leave the unknowns relative to an obstacle whose motion is prescribed: the next
+/// attempt or step may bring it under pressure.
+fn follows_belt(session: &Session) {
+    let (body, state) =
+        body::<2, 4>(session, &crossed([4, 3]), &[("left", Fix::Keyword(FixedDirections::All))], vec![]);
+    let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
+    let conditions =
+        ContactConditions { quadrature: Quadrature::Nodal, law: laws()[6].clone(), gap: belt::<2>() };
+    let mut contact = Contact::new(session, &body.mesh, &facets, conditions, &body.held).expect("contact");
+    contact.add_friction(FRICTION[2].expect("a law"), &body.mesh, &body.held).expect("friction");
+    choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
+    let displacement = vec![0.0; state.velocity.local().expect("local").len()];
+    contact.prepare(0.1, 0.1, &displacement).expect("prepared");
+    contact.fix_bounds();
+    let mut apart = vec![0.0; state.velocity.owned().expect("owned").len()];
+    contact.subtract_obstacle(&mut apart);
+    let [size] = session.sum([apart.iter().map(|v| v * v).sum::<f64>()]);
+    // 3 m/s at the four nodes that are not held.
+    assert!((size - 36.0).abs() < 1e-9, "{size}");
+}
+
+#[test]
+fn fixed_bounds_leave_the_unknowns_relative_to_a_prescribed_motion() {
+    run_on(&[1], |world| follows_belt(&world.session));
+}

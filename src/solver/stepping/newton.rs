@@ -159,7 +159,7 @@ impl Newton {
             let has_fixed_bounds = fallback.iteration == FrictionIteration::FixedPoint;
             let mut rounds = 0;
             if fallback.yields_at_first {
-                iterations += self.approach(problem, system, krylov, trial)?;
+                iterations += self.solve_yielding(problem, system, krylov, trial)?;
             }
             let failed = loop {
                 if has_fixed_bounds {
@@ -219,7 +219,7 @@ impl Newton {
 
     /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
     /// none; returns the Newton iterations. Collective.
-    fn approach<const D: usize, const S: usize>(
+    fn solve_yielding<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,

@@ -211,7 +211,7 @@ impl ObstacleMotions {
         let count = self.motions.len();
         self.work.clear();
         for Motion { place: (contact, freedom), .. } in &self.motions {
-            self.work.push(contacts[*contact].resultants(velocity)[*freedom as usize]);
+            self.work.push(contacts[*contact].resultant(*freedom, velocity));
         }
         for motion in &self.motions {
             self.work.push(own_dot(&motion.velocities, residual)?);

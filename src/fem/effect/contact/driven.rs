@@ -3,9 +3,11 @@
 //! The velocities `w` of these motions are unknowns beside those of the nodes. The unknowns of the points are relative to the obstacle:
 //! along the normal `n` of the body to `q . n (w - w_0)`, where `q` is the velocity of the obstacle's material at `w = 1` and `w_0` that from
 //! which the step starts, and along the tangents to `q w`. Velocities of nodes at fixed unknowns change by `N w`, and the resultant of
-//! nodal contact forces `C` is `N . C` ([`Contact::add_motion`]): a row and a column of a symmetric system. Tractions at fixed unknowns do
-//! not change with `w` where the normals of body and obstacle are parallel; elsewhere the gap changes by a different amount, and pressures
-//! have moments about the centre of a round obstacle. Both are small, exact in residuals, and left out of derivatives.
+//! nodal contact forces `C` is `N . C` ([`Contact::add_motion`]): a row and a column of a symmetric system. Where an obstacle rolls, the
+//! column also has the change of the places that touch ([`Contact::add_sweep`]), and the system is unsymmetric. Tractions at fixed unknowns
+//! do not change with `w` where the normals of body and obstacle are parallel; elsewhere the gap changes by a different amount, and
+//! pressures have moments about the centre of a round obstacle. Both are small, exact in residuals, and left out of derivatives. Pressures
+//! at points that supports hold depend on `w` alone ([`Contact::held_stiffness`]).
 
 use super::{
     Contact,
@@ -219,23 +221,17 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// The resultants of the tractions on the obstacle for its motions, in N and N m, of points on this rank at these velocities, a vector
-    /// of Newton's method with ghosts; 0 for motions that it does not have.
-    pub fn resultants(&self, velocity: &[f64]) -> [f64; 2] {
-        let mut sums = [0.0; 2];
-        for (freedom, sum) in Freedom::ALL.into_iter().zip(&mut sums) {
-            if self.driven()[freedom as usize].is_none() {
-                continue;
-            }
-            for (at, point) in self.points.iter().enumerate() {
-                let pressure = point.pressure_at(&self.law, Newton, velocity);
-                *sum += point.weight * pressure * dot(&point.normal, &self.carrying(freedom, at));
-            }
-            for point in self.friction.iter().flat_map(|friction| &friction.points) {
-                *sum += point.weight * dot(&point.whole_traction(), &self.carrying(freedom, point.at));
-            }
-        }
-        sums
+    /// The resultant of the tractions on the obstacle for a motion, in N or N m, of points on this rank at these velocities, a vector of
+    /// Newton's method with ghosts.
+    pub fn resultant(&self, freedom: Freedom, velocity: &[f64]) -> f64 {
+        let normal = self.points.iter().enumerate().map(|(at, point)| {
+            let pressure = point.pressure_at(&self.law, Newton, velocity);
+            point.weight * pressure * dot(&point.normal, &self.carrying(freedom, at))
+        });
+        let friction = self.friction.iter().flat_map(|friction| &friction.points);
+        let tangential = friction
+            .map(|point| point.weight * dot(&point.whole_traction(), &self.carrying(freedom, point.at)));
+        normal.chain(tangential).sum()
     }
 
     /// A measure of how firmly points on this rank hold a motion at the last linearisation, in m^(D-1); 0 where nothing touches.

@@ -66,12 +66,14 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or(0.0, |friction| friction.scale)
     }
 
-    /// Fixes the friction bounds at the pressures of the points. The unknowns of points without a bound do not follow the obstacle.
+    /// Fixes the friction bounds at the pressures of the points. The unknowns of points without a bound do not follow an obstacle that
+    /// forces drive.
     pub fn fix_bounds(&mut self) {
         let Some(friction) = &mut self.friction else { return };
         friction.update_pressures(&self.points);
-        let is_bound = friction.law.follows_pressure();
-        friction.points.iter_mut().for_each(|point| point.follows = !is_bound || point.pressure != 0.0);
+        if self.obstacle.is_some() && friction.law.follows_pressure() {
+            friction.points.iter_mut().for_each(|point| point.follows = point.pressure != 0.0);
+        }
     }
 
     /// Advances the histories of friction and wear by a step of this length in s, at its velocities with ghosts.
