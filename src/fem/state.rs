@@ -1,6 +1,11 @@
 //! The converged state of a run: nodal fields and time. Cell histories live with their effects.
 
-use crate::{error::Result, fem::effect::Step, linear_algebra::petsc::DistributedVector, mesh::Mesh};
+use crate::{
+    error::Result,
+    fem::effect::{Blend, Step},
+    linear_algebra::petsc::DistributedVector,
+    mesh::Mesh,
+};
 
 /// Nodal fields, `D` values a node, with ghosts up to date.
 #[derive(Debug)]
@@ -67,19 +72,20 @@ impl State {
         Ok(())
     }
 
-    /// Extrapolates velocity and displacement, committed at the midpoint of a step of this length in s, to its end. The velocity of local
-    /// nodes without mass remains that at the midpoint.
+    /// Extrapolates velocity and displacement, committed where the equations of a step hold, to its end. The velocity of local nodes
+    /// without mass remains.
     pub fn extrapolate<const D: usize>(
         &mut self,
-        length: f64,
+        blend: Blend,
         is_massless: impl Fn(usize) -> bool,
     ) -> Result<()> {
         let mut displacement = self.displacement.local_mut()?;
         let (mut velocity, before) = (self.velocity.local_mut()?, self.previous_velocity.local()?);
+        let rest = blend.way() - blend.length;
         for (at, v) in velocity.iter_mut().enumerate() {
-            displacement[at] += 0.5 * length * *v;
+            displacement[at] += rest * *v;
             if !is_massless(at / D) {
-                *v += *v - before[at];
+                *v = blend.end(before[at], *v);
             }
         }
         Ok(())

@@ -41,7 +41,7 @@ pub(super) fn check(job: &Job, table: &mut Table<'_>) {
     if let Some(checkpoint) = &job.checkpoint {
         checkpoint.check(&mut table.table("checkpoint"), job.time.end);
     }
-    check_midpoint(job, table);
+    check_extrapolation(job, table);
     job.solver.check(&mut table.table("solver"));
     job.output.check(&mut table.table("output"), job.time.end);
     check_expected(job, table);
@@ -184,11 +184,10 @@ fn check_strengths(job: &Job, table: &mut Table<'_>) {
     }
 }
 
-/// What cannot be extrapolated from the midpoint of a step is refused: histories that change in one direction only, and velocities that
-/// jump.
-fn check_midpoint(job: &Job, table: &mut Table<'_>) {
+/// If the end of a step is extrapolated, what cannot be is refused: histories that change in one direction only, and velocities that jump.
+fn check_extrapolation(job: &Job, table: &mut Table<'_>) {
     let scheme = job.time.scheme;
-    if !scheme.is_midpoint() {
+    if !scheme.extrapolates() {
         return;
     }
     let mut refuse = |path: &str, is_there: bool| {

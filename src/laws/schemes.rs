@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Defines [`Scheme`] by a list: the meaning of each scheme, its name in job files and its properties.
 macro_rules! schemes {
     ($($(#[$about:meta])* $scheme:ident = $name:literal {
-        order: $order:literal, kind: $kind:ident, formula: $formula:expr
+        order: $order:literal, formula: $formula:expr
     })*) => {
         /// The time scheme.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -31,7 +31,7 @@ macro_rules! schemes {
                 match self { $(Self::$scheme => $order,)* }
             }
 
-            /// The blend of earlier states from which a step of an implicit scheme starts; `None` for other schemes.
+            /// An implicit step as a blend of earlier states from which it starts; `None` for other schemes.
             pub fn formula(self) -> Option<fn(Step) -> Blend> {
                 match self { $(Self::$scheme => $formula,)* }
             }
@@ -41,31 +41,24 @@ macro_rules! schemes {
                 self.formula().is_some()
             }
 
-            /// Whether a step starts from the last two states.
-            pub fn is_two_step(self) -> bool {
-                matches!(self.kind(), Kind::TwoStep)
+            /// Number of states from which a step starts.
+            pub fn states(self) -> usize {
+                if self.example().earlier == 0.0 { 1 } else { 2 }
             }
 
-            /// Whether the equations of a step hold at its midpoint, from which its end is extrapolated.
-            pub fn is_midpoint(self) -> bool {
-                matches!(self.kind(), Kind::Midpoint)
+            /// Whether the end of a step is extrapolated from the time at which its equations hold. What jumps, or changes in one
+            /// direction only, cannot be extrapolated.
+            pub fn extrapolates(self) -> bool {
+                self.example().extrapolates()
             }
 
-            fn kind(self) -> Kind {
-                match self { $(Self::$scheme => Kind::$kind,)* }
+            /// One of equal steps.
+            fn example(self) -> Blend {
+                let step = Step { time: 2.0, length: 1.0, previous_length: 1.0 };
+                self.formula().map_or(Blend::euler(step.length), |formula| formula(step))
             }
         }
     };
-}
-
-/// The states that a step connects.
-enum Kind {
-    /// The state before it and the one at its end, where the equations hold.
-    OneStep,
-    /// These and the one before them.
-    TwoStep,
-    /// The state before it and the one at its midpoint, where the equations hold and from which that at its end is extrapolated.
-    Midpoint,
 }
 
 schemes! {
@@ -73,16 +66,30 @@ schemes! {
     /// contact memory are taken from the previous step. Stable only for steps below explicit_step_bound, which `solver check`
     /// prints.
     #[default]
-    LaggedEuler = "lagged_euler" { order: 1, kind: OneStep, formula: None }
+    LaggedEuler = "lagged_euler" { order: 1, formula: None }
     /// First order in time: all stresses are taken at the end of the step. The step has no stability bound. Suitable for large
     /// steps and impacts.
-    ImplicitEuler = "implicit_euler" { order: 1, kind: OneStep, formula: Some(implicit_euler::blend) }
+    ImplicitEuler = "implicit_euler" { order: 1, formula: Some(implicit_euler::blend) }
     /// Second order in time. All stresses are taken at the end of the step, from a backward difference over two steps. The step has
     /// no stability bound. Suitable for smooth motions; where velocities jump (impacts, sudden loads), the solution may overshoot.
-    Bdf2 = "bdf2" { order: 2, kind: TwoStep, formula: Some(bdf2::blend) }
+    Bdf2 = "bdf2" { order: 2, formula: Some(bdf2::blend) }
     /// Second order in time, for impacts and waves. All stresses are taken at the midpoint of the step, rigid contact at its end. The
     /// total energy of elastic bodies, of compliant foundations and of obstacles moved by forces is conserved exactly and never grows in
     /// an impact on a rigid obstacle; no vibration is damped, however short. Requires a density, fixed steps and, for contact,
     /// `redistribute_mass`. Damage, adhesion, contact memory and moving supports are refused.
-    Midpoint = "midpoint" { order: 2, kind: Midpoint, formula: Some(midpoint::blend) }
+    Midpoint = "midpoint" { order: 2, formula: Some(midpoint::blend) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn schemes_need_what_their_formulas_use() {
+        let of = |scheme: Scheme| (scheme.is_implicit(), scheme.states(), scheme.extrapolates());
+        assert_eq!(of(Scheme::LaggedEuler), (false, 1, false));
+        assert_eq!(of(Scheme::ImplicitEuler), (true, 1, false));
+        assert_eq!(of(Scheme::Bdf2), (true, 2, false));
+        assert_eq!(of(Scheme::Midpoint), (true, 1, true));
+    }
 }

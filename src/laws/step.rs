@@ -54,7 +54,7 @@ macro_rules! quantity {
 }
 pub(crate) use quantity;
 
-/// The start of an implicit step, which equals a step of implicit Euler of length `k'` from a blend of the last two states.
+/// An implicit step: one of implicit Euler of length `k'` from a blend of the last two states to the time at which its equations hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blend {
     /// `k'` in s: displacement, stress and velocity change by `k'` times their rates at the end.
@@ -63,18 +63,51 @@ pub struct Blend {
     pub recent: f64,
     /// Share of the state before it.
     pub earlier: f64,
+    /// Share of the step after which its equations hold: 1, or less if the end is extrapolated.
+    pub balance: f64,
 }
 
 impl Blend {
     /// Implicit Euler.
-    pub fn euler(length: f64) -> Self {
-        Self { length, recent: 1.0, earlier: 0.0 }
+    pub const fn euler(length: f64) -> Self {
+        Self { length, recent: 1.0, earlier: 0.0, balance: 1.0 }
+    }
+
+    /// The midpoint rule for a step of this length in s.
+    pub fn midpoint(length: f64) -> Self {
+        Self { balance: 0.5, ..Self::euler(0.5 * length) }
     }
 
     /// The blend of two values.
     #[inline(always)]
     pub fn of(self, recent: f64, earlier: f64) -> f64 {
         self.recent * recent + self.earlier * earlier
+    }
+
+    /// Whether the end of the step is extrapolated from the time at which its equations hold.
+    pub fn extrapolates(self) -> bool {
+        self.balance < 1.0
+    }
+
+    /// The length in s that multiplies the solved velocity in the displacement at the end of the step.
+    pub fn way(self) -> f64 {
+        self.length / self.balance
+    }
+
+    /// The value at the end of the step on the line through that before it and that where its equations hold.
+    pub fn end(self, before: f64, balanced: f64) -> f64 {
+        (balanced - (1.0 - self.balance) * before) / self.balance
+    }
+
+    /// The same from the start of the step to its end, if that is extrapolated.
+    pub fn to_end(self) -> Self {
+        Self { length: self.way(), balance: 1.0, ..self }
+    }
+
+    /// The part of the step at whose end its equations hold.
+    pub fn balanced(self, step: Step) -> Step {
+        let rest = (1.0 - self.balance) * step.length;
+        Step { time: step.time - rest, length: self.balance * step.length, ..step }
     }
 }
 
@@ -89,4 +122,21 @@ pub enum Evaluation {
     /// The end of an implicit step; evaluated for each iterate. Gives the part of the stress that is not a linear function of the
     /// velocity.
     End(Blend),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_is_solved_where_its_equations_hold_and_continued_to_its_end() {
+        let step = Step { time: 3.0, length: 0.5, previous_length: 0.25 };
+        let midpoint = Blend::midpoint(step.length);
+        assert_eq!(midpoint.balanced(step), Step { time: 2.75, length: 0.25, ..step });
+        assert_eq!((midpoint.length, midpoint.way(), midpoint.end(1.0, 3.0)), (0.25, 0.5, 5.0));
+        assert_eq!((midpoint.to_end(), midpoint.extrapolates()), (Blend::euler(0.5), true));
+        let euler = Blend::euler(step.length);
+        assert_eq!((euler.balanced(step), euler.to_end(), euler.extrapolates()), (step, euler, false));
+        assert_eq!((euler.way(), euler.end(1.0, 3.0)), (0.5, 3.0));
+    }
 }

@@ -72,7 +72,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
     }
-    if job.time.scheme.is_two_step() {
+    if job.time.scheme.states() > 1 {
         state.previous_displacement = Some(state.displacement.like()?);
     }
     session.agree(initial(job, &mesh, &held, &mut state))?;
@@ -94,7 +94,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         session.agree(body.redistribute_mass(session, &facets, &state.velocity))?;
         session.agree(refuse_remaining_mass(job, &body))?;
     }
-    if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
+    if job.time.adaptive.is_some() || job.time.scheme.states() > 1 {
         body.keep_earlier();
     }
     if !initial_stress.is_empty() {
@@ -103,10 +103,10 @@ pub(super) fn body<const D: usize, const S: usize>(
     Ok((body, state))
 }
 
-/// With the midpoint rule every contact node must be without mass.
+/// If the end of a step is extrapolated, every contact node must be without mass.
 fn refuse_remaining_mass<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) -> Result<()> {
     let keeps_mass = body.redistributed_mass.as_ref().and_then(|mass| mass.keeps_mass);
-    let Some(cell) = keeps_mass.filter(|_| job.time.scheme.is_midpoint()) else { return Ok(()) };
+    let Some(cell) = keeps_mass.filter(|_| job.time.scheme.extrapolates()) else { return Ok(()) };
     Err(Error::Refused(format!(
         "scheme \"{}\" requires contact nodes without mass, but all nodes of the body with a corner at {:?} m are on contact boundaries \
          and keep their mass; use a finer mesh there, or scheme \"bdf2\"",

@@ -94,8 +94,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             totals.step_level = Some(adaptive.step_level);
             outcome
         } else {
-            let step =
-                landings.fixed_step([state.time, state.step_length], target, time.scheme.is_two_step());
+            let step = landings.fixed_step([state.time, state.step_length], target);
             let mut outcome = session.agree(scheme.advance(session, body, state, step))?;
             outcome.landed_on = target.name.filter(|_| step.time == target.time);
             outcome

@@ -186,6 +186,7 @@ pub(super) fn landings(job: &Job) -> Landings {
         breakpoints: breakpoints(job),
         length: shortest_step(job),
         is_fixed: job.time.adaptive.is_none(),
+        starts_anew: job.time.scheme.states() > 1,
         end: job.time.end,
     }
 }

@@ -100,7 +100,7 @@ fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Resul
     for region in &mesh.regions {
         let material = loaded.job.material_of(region);
         let place = if loaded.job.region.is_empty() { "" } else { &*format!(" of region \"{region}\"") };
-        if scheme.is_midpoint() && material.density.is_none() {
+        if scheme.extrapolates() && material.density.is_none() {
             return Err(loaded.fault(
                 "time.scheme",
                 format!(

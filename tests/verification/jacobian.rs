@@ -4,7 +4,7 @@ use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     fem::effect::{
-        Blend, Contact, ContactConditions, Effect, Freedom, Inertia, LoadedObstacle, Quadrature, Travel,
+        Blend, Contact, ContactConditions, Effect, Freedom, Inertia, LoadedObstacle, Quadrature,
         ViscousStress, choose_unknowns,
     },
     job::{Expression, Fix, FixedDirections, Scalar},
@@ -235,8 +235,7 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
     contact.obstacle = Some(LoadedObstacle::new(&load, contact.gap.axis()));
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
     for freedom in Freedom::ALL {
-        let travel = Travel::to_end(Blend::euler(0.1));
-        contact.driven_mut(freedom).expect("a motion").start(travel, 0.1, None);
+        contact.driven_mut(freedom).expect("a motion").start(Blend::euler(0.1), 0.1, None);
     }
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
     contact.prepare(0.1, 0.1, &displacement).expect("prepared");

@@ -395,7 +395,7 @@ fn worst_step<const D: usize, const S: usize>(
 
 /// The contacts of a job, with boundaries without mass where the scheme requires them.
 fn massless(contacts: String, scheme: Scheme) -> String {
-    if scheme.is_midpoint() {
+    if scheme.extrapolates() {
         contacts.replace("[[contact]]\n", "[[contact]]\nredistribute_mass = true\n")
     } else {
         contacts

@@ -39,10 +39,11 @@ mod tests {
         move |start, length| [start + length * rate, length]
     }
 
-    const EULER: Evolution =
-        Evolution { blend: Blend { length: 0.3, recent: 1.0, earlier: 0.0 }, length: 0.3 };
-    const TWO_STEPS: Evolution =
-        Evolution { blend: Blend { length: 0.2, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }, length: 0.3 };
+    const EULER: Evolution = Evolution { blend: Blend::euler(0.3), length: 0.3 };
+    const TWO_STEPS: Evolution = Evolution {
+        blend: Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(0.2) },
+        length: 0.3,
+    };
 
     #[test]
     fn steady_growth_is_exact_in_both_formulas() {

@@ -50,7 +50,7 @@ pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
     Decrease, Freedom, Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
-    OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, Travel,
+    OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT,
     choose_unknowns, contact_nodes, longest_side, set_walls,
 };
 pub use contact_memory::ContactMemory;

@@ -21,9 +21,9 @@ pub(super) fn blend(step: Step) -> Blend {
     let ratio = step.length / step.previous_length;
     let below = 1.0 + 2.0 * ratio;
     Blend {
-        length: step.length * (1.0 + ratio) / below,
         recent: (1.0 + ratio) * (1.0 + ratio) / below,
         earlier: -ratio * ratio / below,
+        ..Blend::euler(step.length * (1.0 + ratio) / below)
     }
 }
 

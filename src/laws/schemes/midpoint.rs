@@ -18,5 +18,5 @@ use crate::laws::step::{Blend, Step};
 
 /// The blend from which the half step starts: the previous state.
 pub(super) fn blend(step: Step) -> Blend {
-    Blend::euler(0.5 * step.length)
+    Blend::midpoint(step.length)
 }

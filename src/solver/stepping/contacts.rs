@@ -92,7 +92,7 @@ pub(super) fn commit_tractions<const D: usize, const S: usize>(
 ) -> Result<()> {
     let Some(traction) = &mut state.contact_traction else { return Ok(()) };
     let velocity = state.velocity.local()?;
-    body.contacts.iter_mut().for_each(|contact| contact.advance_histories(&velocity, state.step_length));
+    body.contacts.iter_mut().for_each(|contact| contact.advance_histories(&velocity));
     traction.owned_mut()?.fill(0.0);
     for contact in &body.contacts {
         contact.add_tractions(&velocity, &mut traction.owned_mut()?);

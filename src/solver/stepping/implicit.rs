@@ -27,8 +27,6 @@ use crate::{
 /// Work vectors, and the energy terms of a step that depend on the state before it.
 pub(super) struct Implicit {
     formula: fn(Step) -> Blend,
-    /// Whether the equations hold at the midpoint of a step.
-    is_midpoint: bool,
     /// The blend of the current step.
     blend: Blend,
     /// `u~` and `v~`, with ghosts.
@@ -46,11 +44,10 @@ pub(super) struct Implicit {
 
 impl Implicit {
     /// Vectors with the layout of those of the state.
-    pub(super) fn new(state: &State, formula: fn(Step) -> Blend, is_midpoint: bool) -> Result<Self> {
+    pub(super) fn new(state: &State, formula: fn(Step) -> Blend) -> Result<Self> {
         let like = || state.velocity.like();
         Ok(Self {
             formula,
-            is_midpoint,
             blend: Blend::euler(0.0),
             displacement: like()?,
             velocity: like()?,
@@ -66,20 +63,9 @@ impl Implicit {
         (self.formula)(step).length
     }
 
-    /// Whether the equations hold at the midpoint of a step.
-    pub(super) fn is_midpoint(&self) -> bool {
-        self.is_midpoint
-    }
-
-    /// The part of a step at whose end its equations hold.
-    fn balanced(&self, step: Step) -> Step {
-        let length = 0.5 * step.length;
-        if self.is_midpoint { Step { time: step.time - length, length, ..step } } else { step }
-    }
-
     /// The time in s at which the equations of a step hold.
     pub(super) fn balanced_time(&self, step: Step) -> f64 {
-        self.balanced(step).time
+        (self.formula)(step).balanced(step).time
     }
 
     /// Adds `M v~ / k' - B^T s~`.
@@ -103,7 +89,7 @@ impl Implicit {
             previous_velocity: &velocity,
         };
         let at = Evaluation::Start(self.blend);
-        (_, self.squares) = body.add_start_forces(at, nodal, self.balanced(step), forces);
+        (_, self.squares) = body.add_start_forces(at, nodal, self.blend.balanced(step), forces);
         Ok(())
     }
 
@@ -112,14 +98,14 @@ impl Implicit {
         self.blend
     }
 
-    /// Corrects prepared contacts for the blend from which the step starts, or for equations that hold at its midpoint.
+    /// Corrects prepared contacts for the blend from which the step starts, and for an end that is extrapolated.
     pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
         step: Step,
     ) -> Result<()> {
-        if self.is_midpoint {
+        if self.blend.extrapolates() {
             body.contacts.iter_mut().try_for_each(Contact::conserve_energy)?;
         }
         body.contacts.iter_mut().for_each(|contact| contact.start_histories(self.blend));
@@ -169,7 +155,7 @@ impl Implicit {
             velocity: &velocity,
             previous_velocity: &previous_velocity,
         };
-        body.add_implicit_energy(nodal, self.balanced(step), &mut self.solved);
+        body.add_implicit_energy(nodal, self.blend.balanced(step), &mut self.solved);
         Ok(())
     }
 
@@ -196,17 +182,17 @@ impl Implicit {
 
     /// Adds the energies of the solved step that need the state before it to those of the step just committed.
     ///
-    /// Those of a midpoint are of half a step. Energies are quadratic in what is extrapolated from it, so that their changes in the whole
-    /// step are the works at the midpoint: of the terms of the scheme only those of contact remain.
+    /// If the end is extrapolated, they are those of half a step. Energies are quadratic in what is extrapolated from its midpoint, so that
+    /// their changes in the whole step are the works there: of the terms of the scheme only those of contact remain.
     pub(super) fn add_solved(&self, energy: &mut Energy) {
         *energy += self.solved;
-        if self.is_midpoint {
+        if self.blend.extrapolates() {
             *energy += self.solved;
             energy[NUMERICAL] = 0.0;
         }
     }
 
-    /// Extrapolates a step committed at its midpoint to its end. Stored energies become those at the end; gives the peaks there.
+    /// Extrapolates a step to its end where the scheme does. Stored energies become those at the end; gives the peaks there.
     pub(super) fn extrapolate<const D: usize, const S: usize>(
         &self,
         body: &mut Body<D, S>,
@@ -214,11 +200,11 @@ impl Implicit {
         step: Step,
         energy: &mut Energy,
     ) -> Result<Peaks> {
-        if !self.is_midpoint {
+        if !self.blend.extrapolates() {
             return Ok(Peaks::default());
         }
         let mass = body.redistributed_mass.as_ref();
-        state.extrapolate::<D>(step.length, |node| mass.is_some_and(|mass| mass.is_massless(node)))?;
+        state.extrapolate::<D>(self.blend, |node| mass.is_some_and(|mass| mass.is_massless(node)))?;
         body.extrapolate_histories();
         let (end, peaks) = body.energy_beside(state, step)?;
         for &kind in ENERGIES.iter().filter(|kind| kind.role == Role::Stored) {

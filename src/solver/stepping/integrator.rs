@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, CONTACT, Energy, Evaluation, NUMERICAL, Peaks, Step, Travel, VISCOUS},
+        effect::{Blend, CONTACT, Energy, Evaluation, NUMERICAL, Peaks, Step, VISCOUS},
         resultants::BalancedMotion,
         state::State,
     },
@@ -34,7 +34,7 @@ impl Integrator {
     pub(super) fn new(scheme: Scheme, state: &State) -> Result<Self> {
         Ok(match scheme.formula() {
             None => Self::LaggedEuler(LaggedEuler::default()),
-            Some(blend) => Self::Implicit(Box::new(Implicit::new(state, blend, scheme.is_midpoint())?)),
+            Some(blend) => Self::Implicit(Box::new(Implicit::new(state, blend)?)),
         })
     }
 
@@ -99,14 +99,6 @@ impl Integrator {
         match self {
             Self::LaggedEuler(_) => 0.0,
             Self::Implicit(scheme) => scheme.rounding(session),
-        }
-    }
-
-    /// The length in s that multiplies the velocity of an obstacle in a started step, in its inertia and in its displacement.
-    pub(super) fn travel(&self, step: Step) -> Travel {
-        match self {
-            Self::Implicit(scheme) if scheme.is_midpoint() => Travel::to_midpoint(step.length),
-            _ => Travel::to_end(self.blend(step.length)),
         }
     }
 

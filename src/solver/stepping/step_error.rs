@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, Form, Step},
+        effect::{Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, Form, Step},
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
@@ -56,8 +56,8 @@ pub(super) struct SolvedStep<'a> {
     pub velocity: &'a DistributedVector,
     /// The displacement from which the step starts, if stresses are those at the end of the step.
     pub flow_start: Option<FlowStart<'a>>,
-    /// In a step of second order, the length in s that multiplies a velocity in the displacement.
-    pub second_order_length: Option<f64>,
+    /// The states from which the step starts.
+    pub blend: Blend,
 }
 
 impl ErrorWorkspace {
@@ -69,7 +69,7 @@ impl ErrorWorkspace {
         state: &State,
         solved: SolvedStep<'_>,
     ) -> Result<StepError> {
-        let SolvedStep { step, velocity, flow_start, second_order_length } = solved;
+        let SolvedStep { step, velocity, flow_start, blend } = solved;
         let curvature = Curvature::of(step);
         let trial = velocity.local()?;
         let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
@@ -77,21 +77,18 @@ impl ErrorWorkspace {
         let Self { curved, strained, end, forces } = self;
         write(curved, values.clone().map(|(t, (v, p))| curvature.error([*t, *v, *p])));
         // Displacements, and stresses with them, are one order more accurate in the second-order formula.
-        let length = if let Some(length) = second_order_length {
-            strained.clone_from(curved);
-            length
-        } else {
+        if blend.earlier == 0.0 {
             write(strained, values.map(|(t, (v, _))| 0.5 * (t - v)));
-            step.length
-        };
+        } else {
+            strained.clone_from(curved);
+        }
         let [histories, surface] = {
-            let (start, length) =
-                flow_start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
-            write(end, start.local()?.iter().zip(trial.iter()).map(|(u, v)| u + length * v));
+            let start = flow_start.map_or(&state.displacement, |start| start.displacement).local()?;
+            write(end, start.iter().zip(trial.iter()).map(|(u, v)| u + blend.length * v));
             let surface = body.surface_error(curvature, end);
             [body.stress_error(curvature, end, surface), surface]
         };
-        let contact = contact_deviations(session, body, curvature, (&*end, &*trial), step);
+        let contact = contact_deviations(session, body, curvature, (&*end, &*trial));
         let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
         let mut square = |form: Option<Form>, x: &[f64]| {
             let Some(form) = form else { return 0.0 };
@@ -100,7 +97,7 @@ impl ErrorWorkspace {
             forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
         };
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
-        let strains = length * length * square(elastic, strained);
+        let strains = blend.length * blend.length * square(elastic, strained);
         let stresses = [strains + histories.error, histories.size];
         let [velocity, all_velocity] = [square(form, curved), square(form, &trial)];
         let [error, size] = [surface.error, surface.size];
@@ -134,7 +131,6 @@ fn contact_deviations<const D: usize, const S: usize>(
     body: &Body<D, S>,
     curvature: Curvature,
     motion: (&[f64], &[f64]),
-    step: Step,
 ) -> [Deviation; CONTACT_QUANTITIES] {
     let mut all = [Deviation::default(); CONTACT_QUANTITIES];
     if body.contacts.is_empty() {
@@ -142,7 +138,7 @@ fn contact_deviations<const D: usize, const S: usize>(
     }
     let mut squares = [[0.0; 3]; CONTACT_QUANTITIES];
     for contact in &body.contacts {
-        for (sum, found) in squares.iter_mut().zip(contact.deviations(curvature, motion, step.length)) {
+        for (sum, found) in squares.iter_mut().zip(contact.deviations(curvature, motion)) {
             let found = [found.error, found.size, found.negligible];
             sum.iter_mut().zip(found).for_each(|(sum, square)| *sum += square);
         }

@@ -44,6 +44,8 @@ pub struct Landings {
     pub length: f64,
     /// Whether steps are fixed.
     pub is_fixed: bool,
+    /// Whether a fixed step after a jump, or after a much shorter step, forgets the step before it.
+    pub starts_anew: bool,
     /// The end of the run in s.
     pub end: f64,
 }
@@ -67,22 +69,21 @@ impl Landings {
         first.map_or(landing, |first| Landing { time: first.time, name: Some(first.name) })
     }
 
-    /// The fixed step from this time in s, after a step of the length `last` in s, that does not pass `target`. A two-step scheme starts
-    /// anew after a jump and after a short step.
-    pub fn fixed_step(&self, [time, last]: [f64; 2], target: Landing, is_two_step: bool) -> Step {
+    /// The fixed step from this time in s, after a step of the length `last` in s, that does not pass `target`.
+    pub fn fixed_step(&self, [time, last]: [f64; 2], target: Landing) -> Step {
         let mut step = next_step([time, last], self.length, target.time);
         let has_grown = step.length > LARGEST_GROWTH * step.previous_length;
-        if is_two_step && (has_grown || self.has_jump(time)) {
+        if self.starts_anew && (has_grown || self.has_jump(time)) {
             step.previous_length = 0.0;
         }
         step
     }
 
     /// Visits the fixed steps of a run from time 0; of several that follow steps of their own length, some.
-    pub(super) fn visit_fixed_steps(&self, is_two_step: bool, mut visit: impl FnMut(Step)) {
+    pub(super) fn visit_fixed_steps(&self, mut visit: impl FnMut(Step)) {
         let [mut time, mut last] = [0.0; 2];
         while time < self.end {
-            let step = self.fixed_step([time, last], self.next(time), is_two_step);
+            let step = self.fixed_step([time, last], self.next(time));
             visit(step);
             let whole = ((self.next(step.time).time - step.time) / self.length - 2.0).floor();
             let repeats = step.length == self.length && step.previous_length == last && whole >= 1.0;
@@ -187,7 +188,16 @@ mod tests {
     /// A run of 1 s with steps of 0.1 s.
     fn landings(breakpoints: Vec<Breakpoint>, is_fixed: bool, times: Vec<f64>) -> Landings {
         let output_times = Vec::new();
-        Landings { times, output_times, interval: None, breakpoints, length: 0.1, is_fixed, end: 1.0 }
+        Landings {
+            times,
+            output_times,
+            interval: None,
+            breakpoints,
+            length: 0.1,
+            is_fixed,
+            starts_anew: false,
+            end: 1.0,
+        }
     }
 
     fn breakpoint(time: f64, is_jump: bool) -> Breakpoint {

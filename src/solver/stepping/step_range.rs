@@ -26,7 +26,7 @@ impl StepRange {
     /// The range of all fixed steps of a run.
     pub fn fixed(scheme: Scheme, landings: &Landings) -> Self {
         let mut all = None;
-        landings.visit_fixed_steps(scheme.is_two_step(), |step| {
+        landings.visit_fixed_steps(|step| {
             let own = Self::of(scheme, step);
             all = Some(all.map_or(own, |all: Self| all.or(own)));
         });
@@ -36,13 +36,10 @@ impl StepRange {
 
     /// The range of adaptive steps between these lengths in s, each after a step of any length.
     pub fn adaptive(scheme: Scheme, [shortest, longest]: [f64; 2]) -> Self {
-        let first = |length| Self::of(scheme, Step { time: length, length, previous_length: 0.0 });
-        let all = first(shortest).or(first(longest));
-        if !scheme.is_two_step() {
-            return all;
-        }
-        // `k' / k = (1 + w) / (1 + 2 w)` for any ratio `w` of successive steps.
-        Self { matrices: [0.5 * all.matrices[0], all.matrices[1]], ..all }
+        let after =
+            |length, previous_length| Self::of(scheme, Step { time: length, length, previous_length });
+        // Under two-step schemes `k' / k` falls with the ratio of successive steps.
+        after(shortest, 0.0).or(after(shortest, 1e-15 * shortest)).or(after(longest, 0.0))
     }
 
     /// The least range that contains both.
@@ -65,16 +62,18 @@ impl StepRange {
 mod tests {
     use super::*;
 
-    fn landings(times: Vec<f64>, end: f64) -> Landings {
-        Landings {
+    fn fixed(scheme: Scheme, times: Vec<f64>, end: f64) -> StepRange {
+        let landings = Landings {
             times,
             output_times: Vec::new(),
             interval: None,
             breakpoints: Vec::new(),
             length: 0.1,
             is_fixed: true,
+            starts_anew: scheme.states() > 1,
             end,
-        }
+        };
+        StepRange::fixed(scheme, &landings)
     }
 
     fn close(found: [f64; 2], expected: [f64; 2]) {
@@ -84,7 +83,7 @@ mod tests {
 
     #[test]
     fn equal_steps_have_one_length_except_under_a_two_step_scheme() {
-        let range = |scheme| StepRange::fixed(scheme, &landings(Vec::new(), 1e5));
+        let range = |scheme| fixed(scheme, Vec::new(), 1e5);
         for (scheme, matrix) in
             [(Scheme::LaggedEuler, 0.1), (Scheme::ImplicitEuler, 0.1), (Scheme::Midpoint, 0.05)]
         {
@@ -97,17 +96,17 @@ mod tests {
 
     #[test]
     fn shortened_steps_are_in_the_range() {
-        close(StepRange::fixed(Scheme::ImplicitEuler, &landings(vec![0.13], 0.2)).steps, [0.03, 0.1]);
-        close(StepRange::fixed(Scheme::ImplicitEuler, &landings(Vec::new(), 0.04)).steps, [0.04; 2]);
-        close(StepRange::fixed(Scheme::ImplicitEuler, &landings(Vec::new(), 100.01)).steps, [0.01, 0.1]);
+        close(fixed(Scheme::ImplicitEuler, vec![0.13], 0.2).steps, [0.03, 0.1]);
+        close(fixed(Scheme::ImplicitEuler, Vec::new(), 0.04).steps, [0.04; 2]);
+        close(fixed(Scheme::ImplicitEuler, Vec::new(), 100.01).steps, [0.01, 0.1]);
         // Ends that are multiples of the step but for rounding are reached.
         for end in [f64::next_up(0.3), f64::next_down(0.3), 3.0 * 0.1, f64::next_up(7.0)] {
-            close(StepRange::fixed(Scheme::ImplicitEuler, &landings(Vec::new(), end)).steps, [0.1; 2]);
+            close(fixed(Scheme::ImplicitEuler, Vec::new(), end).steps, [0.1; 2]);
         }
         // Steps have their full length again after 7.25 s: the last one takes 0.06 s.
-        close(StepRange::fixed(Scheme::ImplicitEuler, &landings(vec![7.25], 100.01)).steps, [0.05, 0.1]);
+        close(fixed(Scheme::ImplicitEuler, vec![7.25], 100.01).steps, [0.05, 0.1]);
         // After 0.1 s the step of 0.05 s has w = 1/2 and k' = 0.0375 s; that of 0.1 s after it w = 2 and k' = 0.06 s.
-        let two = StepRange::fixed(Scheme::Bdf2, &landings(vec![0.15], 0.25));
+        let two = fixed(Scheme::Bdf2, vec![0.15], 0.25);
         close(two.matrices, [0.0375, 0.1]);
     }
 

@@ -337,14 +337,9 @@ impl Stepper {
     ) -> Result<StepError> {
         self.finish(body, state, step)?;
         self.trial.update_ghosts()?;
-        let second_order_length = (self.scheme.is_two_step() && step.previous_length > 0.0)
-            .then(|| self.integrator.matrix_length(step));
-        let solved = SolvedStep {
-            step,
-            velocity: &self.trial,
-            flow_start: self.integrator.flow_start(),
-            second_order_length,
-        };
+        let blend = self.integrator.blend(step.length);
+        let solved =
+            SolvedStep { step, velocity: &self.trial, flow_start: self.integrator.flow_start(), blend };
         self.workspace.error(session, body, state, solved)
     }
 
@@ -490,12 +485,12 @@ impl Stepper {
         if let Some(supports) = &self.moving_supports {
             supports.set(body, &mut self.trial)?;
         }
-        let (travel, time) = (self.integrator.travel(step), self.integrator.balanced_time(step));
+        let (blend, time) = (self.integrator.blend(step.length), self.integrator.balanced_time(step));
         let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);
         for (number, contact) in body.contacts.iter_mut().enumerate() {
             for (cause, freedom) in [("force", Freedom::Translation), ("moment", Freedom::Rotation)] {
                 let Some(motion) = contact.driven_mut(freedom) else { continue };
-                motion.start(travel, time, ratio);
+                motion.start(blend, time, ratio);
                 let value = motion.driving();
                 if !value.is_finite() {
                     return Err(Error::Failed(format!(

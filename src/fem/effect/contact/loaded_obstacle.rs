@@ -27,29 +27,6 @@ pub const OBSTACLE_WORK: EnergyKind = EnergyKind::new(12, Role::Work, "obstacle_
 pub const OBSTACLE_NUMERICAL: EnergyKind =
     EnergyKind::new(13, Role::Numerical, "obstacle_numerical_dissipation");
 
-/// How a motion proceeds in a step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Travel {
-    /// The start of the step: the velocity changes by the length of the blend times its rate.
-    blend: Blend,
-    /// The length in s that multiplies the velocity in the displacement.
-    way: f64,
-    /// Whether the equations hold at the midpoint of the step.
-    is_midpoint: bool,
-}
-
-impl Travel {
-    /// A step whose equations hold at its end.
-    pub fn to_end(blend: Blend) -> Self {
-        Self { blend, way: blend.length, is_midpoint: false }
-    }
-
-    /// A step of this length in s whose equations hold at its midpoint.
-    pub fn to_midpoint(length: f64) -> Self {
-        Self { blend: Blend::euler(0.5 * length), way: length, is_midpoint: true }
-    }
-}
-
 /// A degree of freedom of an obstacle, in the order of lists of its [motions](LoadedObstacle::motions).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Freedom {
@@ -78,7 +55,7 @@ pub struct LoadedMotion {
     trial: [f64; 2],
     /// Resultant in N (N m) of the contact tractions in the last step and in the current one.
     resultant: [f64; 2],
-    travel: Travel,
+    blend: Blend,
     /// The force in N where the equations of the current step hold, and the velocity in m/s from which it starts.
     driving: f64,
     first: f64,
@@ -158,7 +135,7 @@ impl<const D: usize> LoadedObstacle<D> {
 
     /// The direction along which a force moves it and the length in s that multiplies its velocity in the displacement of a step.
     pub(super) fn translation(&self) -> Option<(&Vector<D>, f64)> {
-        self.translation.as_ref().map(|(direction, motion)| (direction, motion.travel.way))
+        self.translation.as_ref().map(|(direction, motion)| (direction, motion.blend.way()))
     }
 
     /// The velocity in m/s of its material at this place relative to the centre by its rotation alone.
@@ -198,7 +175,6 @@ impl LoadedMotion {
     fn new(force: Scalar, mass: f64, velocity: f64) -> Self {
         let start = [0.0, velocity];
         let (converged, earlier, trial) = (start, start, start);
-        let travel = Travel::to_end(Blend::euler(0.0));
         let resultant = [0.0; 2];
         Self {
             force,
@@ -208,7 +184,7 @@ impl LoadedMotion {
             earlier,
             trial,
             resultant,
-            travel,
+            blend: Blend::euler(0.0),
             driving: 0.0,
             first: velocity,
         }
@@ -226,8 +202,8 @@ impl LoadedMotion {
 
     /// Displacement in m and velocity in m/s where the equations of the last step held.
     pub fn balanced(&self) -> [f64; 2] {
-        let ([displacement, velocity], Travel { blend, way, .. }) = (self.trial, self.travel);
-        [displacement - (way - blend.length) * velocity, velocity]
+        let [displacement, velocity] = self.trial;
+        [displacement - (self.blend.way() - self.blend.length) * velocity, velocity]
     }
 
     /// Displacement and velocity, each at the end of the step, after the last one, before it, and at the start of the run.
@@ -256,10 +232,10 @@ impl LoadedMotion {
         self.resultant = [resultant; 2];
     }
 
-    /// Starts a step whose equations hold at `time`, from the last velocity or, if the ratio of the length of the step to that of the last
+    /// Starts a step whose equations hold at `time` in s, from the last velocity or, if the ratio of the length of the step to that of the last
     /// one is given, from that extrapolated.
-    pub fn start(&mut self, travel: Travel, time: f64, ratio: Option<f64>) {
-        self.travel = travel;
+    pub fn start(&mut self, blend: Blend, time: f64, ratio: Option<f64>) {
+        self.blend = blend;
         self.driving = self.force.evaluate(time, &[]);
         let [now, before] = [self.converged[1], self.earlier[1]];
         self.first = now + ratio.unwrap_or(0.0) * (now - before);
@@ -294,8 +270,8 @@ impl LoadedMotion {
 
     /// Sets the velocity in m/s in the equations of the step.
     pub fn set_velocity(&mut self, velocity: f64) {
-        let Travel { blend, way, .. } = self.travel;
-        self.trial = [blend.of(self.converged[0], self.earlier[0]) + way * velocity, velocity];
+        let start = self.blend.of(self.converged[0], self.earlier[0]);
+        self.trial = [start + self.blend.way() * velocity, velocity];
     }
 
     /// `m (w - w~) / k' - F - R` in N, given the resultant `R` in N, and the largest of the terms.
@@ -312,21 +288,20 @@ impl LoadedMotion {
 
     /// `m w / k'` and `m w~ / k'` in N.
     fn momentum_rates(&self) -> [f64; 2] {
-        let Travel { blend, .. } = self.travel;
-        let before = blend.of(self.converged[1], self.earlier[1]);
-        [self.trial[1], before].map(|velocity| self.mass * velocity / blend.length)
+        let before = self.blend.of(self.converged[1], self.earlier[1]);
+        [self.trial[1], before].map(|velocity| self.mass * velocity / self.blend.length)
     }
 
     /// `m / k'` in kg/s.
     pub fn inertia(&self) -> f64 {
-        self.mass / self.travel.blend.length
+        self.mass / self.blend.length
     }
 
     /// Displacement and velocity at the end of the step.
     fn end(&self) -> [f64; 2] {
         let [displacement, velocity] = self.trial;
-        let extrapolates = self.travel.is_midpoint && self.mass > 0.0;
-        [displacement, if extrapolates { 2.0 * velocity - self.converged[1] } else { velocity }]
+        // Without mass the velocity may jump.
+        [displacement, if self.mass > 0.0 { self.blend.end(self.converged[1], velocity) } else { velocity }]
     }
 
     /// Kinetic energy in J after the last step.
@@ -342,7 +317,7 @@ impl LoadedMotion {
         let [momentum, before] = self.momentum_rates();
         let [resultant_before, resultant] = self.resultant;
         let force = self.driving;
-        let [mean_force, mean_resultant] = if self.travel.blend.earlier == 0.0 {
+        let [mean_force, mean_resultant] = if self.blend.earlier == 0.0 {
             [force, resultant]
         } else {
             [0.5 * (force + self.force.evaluate(start, &[])), 0.5 * (resultant + resultant_before)]
@@ -394,7 +369,7 @@ mod tests {
         assert_eq!((disc.velocity_at(&[0.0, -0.5]), disc.turns()), ([-1.5, -1.0], true));
         let [falling, turning] = disc.motions_mut().map(|motion| motion.expect("both"));
         for motion in [falling, turning] {
-            motion.start(Travel::to_end(Blend::euler(0.5)), 0.5, None);
+            motion.start(Blend::euler(0.5), 0.5, None);
             motion.set_velocity(2.0);
         }
         assert_eq!(disc.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
@@ -409,7 +384,7 @@ mod tests {
     fn a_step_starts_from_an_extrapolated_velocity_and_may_be_free() {
         let mut obstacle = falling();
         obstacle.restore([0.0, 2.0, 0.0, 1.5]);
-        obstacle.start(Travel::to_end(Blend::euler(0.5)), 0.5, Some(2.0));
+        obstacle.start(Blend::euler(0.5), 0.5, Some(2.0));
         assert_eq!((obstacle.velocity(), obstacle.driving()), (3.0, 6.0));
         // 2 m/s + 6 N / 3 kg 0.5 s = 3 m/s.
         assert_eq!(obstacle.change_to_free(), 0.0);
@@ -417,14 +392,14 @@ mod tests {
         assert_eq!(obstacle.change(), 4.0);
         obstacle.restart();
         assert_eq!(obstacle.velocity(), 3.0);
-        obstacle.start(Travel::to_end(Blend::euler(0.5)), 0.5, None);
+        obstacle.start(Blend::euler(0.5), 0.5, None);
         assert_eq!(obstacle.velocity(), 2.0);
     }
 
     #[test]
     fn steps_of_both_schemes_by_hand() {
         let mut obstacle = falling();
-        obstacle.start(Travel::to_end(Blend::euler(0.5)), 0.5, None);
+        obstacle.start(Blend::euler(0.5), 0.5, None);
         obstacle.set_velocity(2.0);
         // 3 kg (2 - 1) m/s / 0.5 s = 6 N.
         assert_eq!(obstacle.unbalanced(0.0), [0.0, 12.0]);
@@ -433,7 +408,7 @@ mod tests {
         assert_eq!(obstacle.motion(), [1.0, 2.0]);
         // The second-order formula: x~ = 4/3 1, w~ = 4/3 2 - 1/3 1 = 7/3, k' = 1/3 s; 3 m/s are 3 (3 - 7/3) / (1/3) = 6 N.
         obstacle.start(
-            Travel::to_end(Blend { length: 1.0 / 3.0, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }),
+            Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(1.0 / 3.0) },
             1.0,
             None,
         );
@@ -450,7 +425,7 @@ mod tests {
     fn a_step_through_its_midpoint_loses_no_energy_and_others_lose_what_they_state() {
         let mut obstacle = falling();
         // 3 kg from 1 m/s under 6 N + 3 N for 0.5 s: 2.5 m/s, 0.875 m on the way.
-        obstacle.start(Travel::to_midpoint(0.5), 1.0, None);
+        obstacle.start(Blend::midpoint(0.5), 1.0, None);
         obstacle.set_velocity(1.75);
         assert_eq!(obstacle.unbalanced(3.0)[0], 0.0);
         let energy = obstacle.energy_of_step(f64::NAN);
@@ -460,7 +435,7 @@ mod tests {
         assert_eq!((obstacle.motion(), obstacle.resultant()), ([0.875, 2.5], 3.0));
         assert_eq!(obstacle.balanced(), [0.4375, 1.75], "at the midpoint");
         // Implicit Euler to 4 m/s: 3 kg 1.5 m/s / 0.5 s = 9 N over 2 m; 1/2 3 kg (1.5 m/s)^2 are lost.
-        obstacle.start(Travel::to_end(Blend::euler(0.5)), 1.0, None);
+        obstacle.start(Blend::euler(0.5), 1.0, None);
         obstacle.set_velocity(4.0);
         assert_eq!(obstacle.unbalanced(3.0)[0], 0.0);
         let energy = obstacle.energy_of_step(f64::NAN);
@@ -468,11 +443,7 @@ mod tests {
         assert_eq!(values, [24.0, 12.0, 6.0, -3.375]);
         assert_eq!(obstacle.balanced(), [2.875, 4.0], "at the end");
         // The second-order formula takes means of forces over the step.
-        obstacle.start(
-            Travel::to_end(Blend { length: 0.5, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 }),
-            1.0,
-            None,
-        );
+        obstacle.start(Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(0.5) }, 1.0, None);
         obstacle.set_velocity(4.0);
         obstacle.unbalanced(7.0);
         let way = obstacle.trial[0] - obstacle.converged[0];
@@ -482,7 +453,7 @@ mod tests {
         );
         // One without mass has the velocity of the midpoint.
         let mut light = LoadedMotion { mass: 0.0, ..falling() };
-        light.start(Travel::to_midpoint(0.5), 1.0, None);
+        light.start(Blend::midpoint(0.5), 1.0, None);
         light.set_velocity(1.75);
         light.commit();
         assert_eq!(light.motion(), [0.875, 1.75]);
@@ -492,7 +463,7 @@ mod tests {
     fn velocities_off_the_straight_line_are_errors() {
         let mut obstacle = falling();
         obstacle.restore([0.0, 2.0, 0.0, 1.0]);
-        obstacle.start(Travel::to_end(Blend::euler(0.5)), 1.0, None);
+        obstacle.start(Blend::euler(0.5), 1.0, None);
         obstacle.set_velocity(7.0);
         let step = Step { time: 1.0, length: 0.5, previous_length: 0.5 };
         // Half of 7 - (2 + 1) m/s, 3 kg.

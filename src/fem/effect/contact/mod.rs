@@ -65,7 +65,7 @@ pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, ContactEnergy, STORED_IN_CONTACT};
 pub use loaded_obstacle::{
-    Freedom, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, Travel,
+    Freedom, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK,
 };
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};

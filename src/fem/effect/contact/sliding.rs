@@ -12,8 +12,8 @@ use crate::{
     error::{Error, Result},
     fem::{
         effect::{
-            Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, History, HistoryStore,
-            Moment, Quantity, quantity,
+            CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, History, HistoryStore, Moment,
+            Quantity, quantity,
         },
         space::Held,
     },
@@ -77,8 +77,8 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Advances the histories of friction and wear by a step of this length in s, at its velocities with ghosts.
-    pub fn advance_histories(&mut self, velocity: &[f64], length: f64) {
-        let blend = self.blend_to_end(length);
+    pub fn advance_histories(&mut self, velocity: &[f64]) {
+        let blend = self.blend.to_end();
         let Some(friction) = &mut self.friction else { return };
         friction.advance_histories(velocity, blend);
         let Some(wear) = self.wear else { return };
@@ -87,12 +87,6 @@ impl<const D: usize> Contact<D> {
             let after = worn_after(point, wear, (velocity, norm(&slip)));
             point.worn = [after, point.worn[0]];
         }
-    }
-
-    /// The blend of earlier histories from which those at the end of a step of this length in s follow. Schemes without such a blend may
-    /// balance forces before the end of the step.
-    fn blend_to_end(&self, length: f64) -> Blend {
-        if self.blend.earlier == 0.0 { Blend::euler(length) } else { self.blend }
     }
 
     /// Sets the erosion at the points in the current step for these unknowns of Newton's method: wear and friction follow the pressure,
@@ -130,13 +124,12 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// The errors of what friction, wear and the obstacle keep, on this rank, in a step of this length in s that was solved and not yet
+    /// The errors of what friction, wear and the obstacle keep, on this rank, in a step that was solved and not yet
     /// committed, at its velocities with ghosts; see [`CONTACT_QUANTITIES`]. All ranks have the same obstacle.
     pub fn deviations(
         &self,
         curvature: Curvature,
         (displacement, velocity): (&[f64], &[f64]),
-        length: f64,
     ) -> [Deviation; CONTACT_QUANTITIES] {
         let mut out = [Deviation::default(); CONTACT_QUANTITIES];
         if let Some(obstacle) = &self.obstacle {
@@ -150,7 +143,7 @@ impl<const D: usize> Contact<D> {
             }
         }
         let Some(friction) = &self.friction else { return out };
-        let blend = self.blend_to_end(length);
+        let blend = self.blend.to_end();
         for (sliding, slip) in friction.sliding(Body, velocity) {
             let (speed, point) = (norm(&slip), &self.points[sliding.at]);
             if let Some(history) = friction.law.history() {

@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_two_step_scheme_continues_the_slip_until_a_point_comes_to_rest() {
-        let blend = Blend { length: 0.2, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 };
+        let blend = Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(0.2) };
         let law = law(Decay::Linear);
         // 0.35 m + 0.2 s 0.5 m/s = 0.45 m of 0.5 m.
         assert!((law.coefficient(0.5, law.context([0.3, 0.15], blend)) - 0.24).abs() < 1e-14);

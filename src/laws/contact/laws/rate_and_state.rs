@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn a_two_step_scheme_solves_its_formula_for_the_logarithm_of_the_state() {
-        let blend = Blend { length: 0.2, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 };
+        let blend = Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(0.2) };
         for (evolution, states) in [Evolution::Ageing, Evolution::Slip]
             .into_iter()
             .flat_map(|evolution| [[3.0, 2.9], [1e-4, 30.0], [2e9, 1e9]].map(|states| (evolution, states)))
