@@ -4,7 +4,7 @@ use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     fem::effect::{
-        Blend, Contact, ContactConditions, Effect, Freedom, Inertia, LoadedObstacle, Quadrature,
+        Blend, Contact, ContactConditions, Effect, Freedom, Inertia, LoadedObstacle, Quadrature, Step,
         ViscousStress, choose_unknowns,
     },
     job::{Expression, Fix, FixedDirections, Scalar},
@@ -21,6 +21,8 @@ use clarke::{
     parallel::session::Session,
     solver::stepping::{ContactEquations, Floor, ObstacleMotions, Scratch, SolveCounts},
 };
+
+const STEP: Step = Step { time: 0.1, length: 0.1, previous_length: 0.0 };
 
 fn laws() -> Vec<NormalResponse> {
     let damped = |symmetry| {
@@ -125,7 +127,9 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             });
             displacement.update_ghosts().expect("ghosts");
             let displacement = displacement.local().expect("local");
-            contacts.iter_mut().for_each(|c| c.prepare(0.1, 0.1, &displacement).expect("prepared"));
+            contacts.iter_mut().for_each(|c| {
+                c.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared")
+            });
             let mut scratch = Scratch::new(&state.velocity, &contacts).expect("scratch");
             let mut linear_solver = ProjectedKsp::new("", &state.velocity, D).expect("solver");
             linear_solver.linear_solver().set_method("cg").expect("cg");
@@ -238,7 +242,7 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
         contact.driven_mut(freedom).expect("a motion").start(Blend::euler(0.1), 0.1, None);
     }
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
-    contact.prepare(0.1, 0.1, &displacement).expect("prepared");
+    contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");
     contact.follow_obstacle(true);
     let start = [0.7, -3.0];
     let mut velocities_at = |[along, about]: [f64; 2]| {
@@ -294,7 +298,7 @@ fn follows_belt(session: &Session) {
     contact.add_friction(FRICTION[2].expect("a law"), &body.mesh, &body.held).expect("friction");
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
-    contact.prepare(0.1, 0.1, &displacement).expect("prepared");
+    contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");
     contact.fix_bounds();
     let mut apart = vec![0.0; state.velocity.owned().expect("owned").len()];
     contact.subtract_obstacle(&mut apart);

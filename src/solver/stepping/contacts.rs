@@ -4,7 +4,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{CONTACT, Contact, Energy, NUMERICAL, Step, WORK},
+        effect::{Blend, CONTACT, Contact, Energy, NUMERICAL, Step, WORK},
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
@@ -31,18 +31,20 @@ pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Prepares the points of all contacts for a step, with the pressures of the converged state.
+/// Prepares the points of all contacts for a step from this blend, whose displacement has ghosts, with the pressures of the converged
+/// state.
 pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     state: &State,
     step: Step,
+    (blend, start): (Blend, &DistributedVector),
 ) -> Result<()> {
     if body.contacts.is_empty() {
         return Ok(());
     }
-    let displacement = state.displacement.local()?;
+    let (converged, start) = (state.displacement.local()?, start.local()?);
     for contact in &mut body.contacts {
-        contact.prepare(step.time, step.length, &displacement)?;
+        contact.prepare(step, blend, [&converged, &start])?;
     }
     restore_pressures(body, state)
 }

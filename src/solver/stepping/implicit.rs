@@ -15,7 +15,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, Contact, ENERGIES, Energy, Evaluation, Form, NUMERICAL, Peaks, Role, Step},
+        effect::{Blend, ENERGIES, Energy, Evaluation, Form, NUMERICAL, Peaks, Role, Step},
         resultants::BalancedMotion,
         space::Nodal,
         state::State,
@@ -96,29 +96,6 @@ impl Implicit {
     /// The blend from which the step starts.
     pub(super) fn blend(&self) -> Blend {
         self.blend
-    }
-
-    /// Corrects prepared contacts for the blend from which the step starts, and for an end that is extrapolated.
-    pub(super) fn prepare_contacts<const D: usize, const S: usize>(
-        &mut self,
-        body: &mut Body<D, S>,
-        state: &State,
-        step: Step,
-    ) -> Result<()> {
-        if self.blend.extrapolates() {
-            body.contacts.iter_mut().try_for_each(Contact::conserve_energy)?;
-        }
-        body.contacts.iter_mut().for_each(|contact| contact.start_histories(self.blend));
-        if self.blend.earlier == 0.0 || !body.contacts.iter().any(|c| c.law.depends_on_displacement()) {
-            return Ok(());
-        }
-        {
-            let (start, before) = (self.displacement.local()?, state.displacement.local()?);
-            let mut shift = self.end.local_mut()?;
-            shift.iter_mut().zip(start.iter().zip(before.iter())).for_each(|(s, (a, b))| *s = a - b);
-        }
-        let shift = self.end.local()?;
-        body.contacts.iter_mut().try_for_each(|contact| contact.blend(step, self.blend, &shift))
     }
 
     /// The displacement from which the step starts, for cells with flow.

@@ -73,19 +73,6 @@ impl Integrator {
         }
     }
 
-    /// Corrects prepared contacts for the blend from which the step starts.
-    pub(super) fn prepare_contacts<const D: usize, const S: usize>(
-        &mut self,
-        body: &mut Body<D, S>,
-        state: &State,
-        step: Step,
-    ) -> Result<()> {
-        match self {
-            Self::LaggedEuler(_) => Ok(()),
-            Self::Implicit(scheme) => scheme.prepare_contacts(body, state, step),
-        }
-    }
-
     /// The displacement from which the step starts, for cells that flow at the end of the step.
     pub(super) fn flow_start(&self) -> Option<FlowStart<'_>> {
         match self {

@@ -499,8 +499,8 @@ impl Stepper {
                 }
             }
         }
-        let prepared = prepare_contacts(body, state, step);
-        Ok(session.agree(prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step)))?)
+        let start = self.integrator.flow_start().map_or(&state.displacement, |start| start.displacement);
+        Ok(session.agree(prepare_contacts(body, state, step, (blend, start)))?)
     }
 
     /// Counts the pass over the cells, and the vectors: forces set to zero, addition of the load, copy and extrapolation of the

@@ -13,76 +13,49 @@ use crate::{
 };
 
 impl<const D: usize> Contact<D> {
-    /// Evaluates the gap and the obstacle's motion for a step of this length to `time`, from the displacement at its start (with
-    /// ghosts).
-    pub fn prepare(&mut self, time: f64, length: f64, displacement: &[f64]) -> Result<()> {
-        self.start_histories(Blend::euler(length));
+    /// Starts a step of this blend: evaluates the gap and the motion of the obstacle, given the displacements of the converged state and of
+    /// the blend, both with ghosts. Histories of friction and wear start from the same blend of earlier ones, and the velocity of the
+    /// obstacle follows from its positions by the same formula. If the end of the step is extrapolated, pressures of laws with a potential
+    /// are their means over the step, which conserve energy.
+    pub fn prepare(&mut self, step: Step, blend: Blend, [converged, start]: [&[f64]; 2]) -> Result<()> {
+        self.blend = blend;
+        self.friction.iter_mut().for_each(|friction| friction.start_step(blend));
         if !self.law.depends_on_displacement() {
             return Ok(());
         }
-        self.step_length = length;
+        let (time, time_before) = (step.time, step.time - step.length);
+        self.step_length = blend.way();
         for point in &mut self.points {
             let [after, before] = match &self.obstacle {
                 None => [point.place; 2],
                 Some(obstacle) => [obstacle.seen_after(&point.place), obstacle.seen_before(&point.place)],
             };
-            let along = point.normal_component(Body, displacement);
-            let [worn, _] = point.worn;
+            let along = point.normal_component(Body, converged);
+            let [worn, worn_before] = point.worn;
             let gap = self.gap.of_moved(time, &after, &point.normal, along - worn)?;
-            let before = self.gap.of_moved(time - length, &before, &point.normal, along - worn)?;
+            let before = self.gap.of_moved(time_before, &before, &point.normal, along - worn)?;
             point.reach = gap;
             point.moved = along - worn;
+            point.penetration_before = along - before - worn;
+            [point.blend_offset, point.continued_wear] = if blend.earlier == 0.0 {
+                [0.0; 2]
+            } else {
+                [point.normal_component(Body, start) - along, -blend.earlier * (worn - worn_before)]
+            };
+            let means = blend.extrapolates() && point.penetration_before.is_finite();
             point.context = NodeContext {
-                penetration: along - gap - worn,
-                step_length: length,
-                mean_from: None,
+                penetration: along - gap - worn + (point.blend_offset - point.continued_wear),
+                step_length: self.step_length,
+                mean_from: means.then_some(point.penetration_before),
                 erosion: 0.0,
             };
-            point.penetration_before = along - before - worn;
-            point.blend_offset = 0.0;
-            point.continued_wear = 0.0;
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
         self.follow_obstacle(true);
-        self.set_obstacle_velocities(Rate::euler(time, length))
-    }
-
-    /// Starts the histories of friction from this blend of earlier ones, as whose length the laws see the step.
-    pub fn start_histories(&mut self, blend: Blend) {
-        self.blend = blend;
-        self.friction.iter_mut().for_each(|friction| friction.start_step(blend));
-    }
-
-    /// To be called after [`Contact::prepare`]: the displacement at the end is `u_{n-1} + shift + length v_n` with the length of
-    /// the blend and a nodal shift with ghosts. The obstacle's velocity follows from its positions by the same formula.
-    pub fn blend(&mut self, step: Step, blend: Blend, shift: &[f64]) -> Result<()> {
-        if !self.law.depends_on_displacement() {
-            return Ok(());
-        }
-        self.step_length = blend.length;
-        for point in &mut self.points {
-            debug_assert!(point.blend_offset == 0.0, "the point was prepared");
-            point.blend_offset = point.normal_component(Body, shift);
-            let [worn, before] = point.worn;
-            point.continued_wear = -blend.earlier * (worn - before);
-            point.context.penetration += point.blend_offset - point.continued_wear;
-            point.context.step_length = blend.length;
-        }
-        let before = step.time - step.length;
-        let recent = [before, blend.recent / blend.length];
-        let earlier = [before - step.previous_length, blend.earlier / blend.length];
-        self.set_obstacle_velocities(Rate { time: step.time, before: [recent, earlier] })
-    }
-
-    /// To be called after [`Contact::prepare`]: lets pressures of laws with a potential be their means over the step, which conserve
-    /// energy.
-    pub fn conserve_energy(&mut self) -> Result<()> {
-        for point in &mut self.points {
-            point.context.mean_from =
-                Some(point.penetration_before).filter(|penetration| penetration.is_finite());
-        }
-        self.place_obstacle()
+        let recent = [time_before, blend.recent / self.step_length];
+        let earlier = [time_before - step.previous_length, blend.earlier / self.step_length];
+        self.set_obstacle_velocities(Rate { time, before: [recent, earlier] })
     }
 
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
