@@ -481,6 +481,29 @@ fn names_handed_on_and_names_in_tests_make_no_circle() {
 /// Largest number of parameters of a function besides `self`.
 const MAX_PARAMETERS: usize = 5;
 
+/// The parts of a list between its commas.
+fn parts(list: &[TokenTree]) -> impl Iterator<Item = &[TokenTree]> {
+    let (mut depth, mut is_arrow) = (0, false);
+    list.split(move |token| {
+        depth += i32::from(is(token, '<')) - i32::from(is(token, '>') && !is_arrow);
+        is_arrow = is(token, '-');
+        depth == 0 && is(token, ',')
+    })
+}
+
+/// The number of values in a parameter: those of a tuple count one by one.
+fn values(parameter: &[TokenTree]) -> usize {
+    match parameter {
+        [.., before, TokenTree::Group(tuple)]
+            if tuple.delimiter() == Delimiter::Parenthesis && (is(before, ':') || is(before, '&')) =>
+        {
+            let list: Vec<TokenTree> = tuple.stream().into_iter().collect();
+            parts(&list).filter(|part| !part.is_empty()).count().max(1)
+        }
+        _ => 1,
+    }
+}
+
 /// The functions with their numbers of parameters besides `self`, without functions that C calls.
 fn parameters(stream: TokenStream, found: &mut Vec<(String, usize)>) {
     let tokens: Vec<TokenTree> = stream.into_iter().collect();
@@ -508,16 +531,11 @@ fn parameters(stream: TokenStream, found: &mut Vec<(String, usize)>) {
             _ => None,
         });
         let list: Vec<TokenTree> = list.into_iter().flatten().collect();
-        let (mut depth, mut is_arrow) = (0, false);
-        let parts = list.split(|token| {
-            depth += i32::from(is(token, '<')) - i32::from(is(token, '>') && !is_arrow);
-            is_arrow = is(token, '-');
-            depth == 0 && is(token, ',')
-        });
+        let parts = parts(&list);
         let is_parameter = |part: &&[TokenTree]| {
             !part.is_empty() && !part.iter().take(5).any(|token| is_word(token, "self"))
         };
-        found.push((name.to_string(), parts.filter(is_parameter).count()));
+        found.push((name.to_string(), parts.filter(is_parameter).map(values).sum()));
     }
 }
 
@@ -534,9 +552,9 @@ fn functions_have_few_parameters() {
     assert!(seen > 2000, "only {seen} functions were seen");
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     let mut found = Vec::new();
-    let text = "fn f<T: Fn(u8, u8) -> u8>(&'a mut self, a: [u8; 2], b: A<C, D>, c: impl Fn(u8) -> u8) {}";
+    let text = "fn f<T: Fn(u8, u8) -> u8>(&'a mut self, a: [u8; 2], b: A<C, D>, c: impl Fn(u8, u8), (d, e): (u8, A<C, D>)) {}";
     parameters(tokens(text), &mut found);
-    assert_eq!(found, [("f".to_owned(), 3)]);
+    assert_eq!(found, [("f".to_owned(), 5)]);
 }
 
 /// The lines with the word `unsafe`, and whether the word starts a block.

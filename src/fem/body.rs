@@ -15,7 +15,7 @@ use crate::{
             RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect,
             SurfaceForce, Term,
         },
-        space::{Batch, CellMatrix, Geometry, Held, Needs, Nodal, assemble, facet_points},
+        space::{Batch, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, facet_points},
         state::State,
     },
     laws::material::Isotropic,
@@ -501,8 +501,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
             let needs = Needs { velocity_change: true, ..Needs::default() };
             let requested = (0..runs.len()).filter(|number| runs[*number]);
             let nodal = Nodal { previous_velocity: before, ..Nodal::all(velocity) };
-            let cells = (&self.mesh, &self.geometry);
-            Batch::for_each(requested, cells, nodal, needs, |batch: &mut Batch<D, S>| {
+            let inputs = Inputs { nodal, needs };
+            Batch::for_each(requested, &self.mesh, &self.geometry, inputs, |batch: &mut Batch<D, S>| {
                 batch.velocity = batch.velocity_change;
                 inertia.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
                 // Quadratic cells have all their inertia at the first point.

@@ -60,12 +60,21 @@ pub(crate) struct Document {
     unread: Vec<String>,
 }
 
+/// Where a document comes from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Origin<'a> {
+    /// Its name in messages.
+    pub name: &'a str,
+    /// The folder of relative paths.
+    pub folder: &'a Path,
+}
+
 impl Document {
-    /// Parses `text`, applies `overrides`, reads tables relative to `folder` and checks every key against the schema.
+    /// Parses `text`, applies `overrides`, reads tables relative to its folder and checks every key against the schema.
     pub(crate) fn new(
         kind: Kind,
         text: &str,
-        (name, folder): (&str, &Path),
+        Origin { name, folder }: Origin<'_>,
         overrides: &[String],
         colour: bool,
     ) -> Result<Self> {
@@ -104,7 +113,7 @@ impl Document {
 
 impl Loaded {
     fn new(text: &str, name: &str, folder: &Path, overrides: &[String], colour: bool) -> Result<Self> {
-        let mut document = Document::new(Kind::job(), text, (name, folder), overrides, colour)?;
+        let mut document = Document::new(Kind::job(), text, Origin { name, folder }, overrides, colour)?;
         let mut job: Job = document.fill()?;
         let mut findings = Findings::default();
         check(&job, &mut Table::new(&document.root, &document.unread, &mut findings));

@@ -26,5 +26,5 @@ pub use document::*;
 pub use effective::differing_keys;
 pub use findings::MeshNames;
 pub use load::Loaded;
-pub(crate) use load::{Document, by_extension, normal, read};
+pub(crate) use load::{Document, Origin, by_extension, normal, read};
 pub(crate) use schema::{Kind, Schema, schema_of};

@@ -43,6 +43,13 @@ pub struct Simulation<const D: usize, const S: usize> {
     pub(super) adaptive: Option<Adaptive<D>>,
 }
 
+/// A body with its state and the solver of its steps.
+pub(super) struct Prepared<const D: usize, const S: usize> {
+    pub body: Body<D, S>,
+    pub state: State,
+    pub scheme: Stepper,
+}
+
 impl<const D: usize, const S: usize> Simulation<D, S> {
     /// Sets a job up on `mesh`, the whole mesh on rank 0 and nothing elsewhere; adds warnings about the mesh to those of the
     /// job. `S` is the number of stress components that go with the job's hypothesis. Collective.
@@ -55,14 +62,14 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     /// The same on this rank's part of a mesh that was checked against the job. Collective.
     pub fn on(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Result<Self> {
         let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh)?;
-        Ok(Self::start(session, &loaded.job, (body, state, scheme), None)?)
+        Ok(Self::start(session, &loaded.job, Prepared { body, state, scheme }, None)?)
     }
 
     /// A job that was set up, with the totals of the run that it continues, if there is one. Collective.
     pub(super) fn start(
         session: &Session,
         job: &Job,
-        (body, state, mut scheme): (Body<D, S>, State, Stepper),
+        Prepared { body, state, mut scheme }: Prepared<D, S>,
         totals: Option<Totals>,
     ) -> Result<Self, Agreed> {
         let totals = match totals {

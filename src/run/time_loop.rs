@@ -9,6 +9,7 @@ use super::{
     phases,
     restored::{candidates, restore},
     setup::{Setup, setup},
+    simulation::Prepared,
     step_line::{Short, ShownColumns, StepLine},
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
@@ -71,7 +72,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = restored.as_ref().map(|restored| restored.totals);
-    let simulation = Simulation::start(session, job, (body, state, scheme), totals)?;
+    let simulation = Simulation::start(session, job, Prepared { body, state, scheme }, totals)?;
     let (body, state) = (&simulation.body, &simulation.state);
     let contents = Contents { job, identity, probes, is_restart };
     let mut outputs = session.agree(Outputs::open(session, contents, body, state, &mut log))?;

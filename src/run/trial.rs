@@ -4,7 +4,11 @@
 //! with this contact, friction and flow, rejected adaptive steps. The steps that follow may take longer or shorter. Ranges contain the
 //! times of nine in ten jobs of the project (docs/speed.md).
 
-use super::{setup::Setup, simulation::Simulation, steps};
+use super::{
+    setup::Setup,
+    simulation::{Prepared, Simulation},
+    steps,
+};
 use crate::{
     job::Job,
     parallel::{agreement::Agreed, session::Session},
@@ -61,7 +65,7 @@ pub(super) fn estimate<const D: usize, const S: usize>(
         (true, false) => NONLINEAR,
         (true, true) => FLOWING,
     };
-    let mut simulation = Simulation::start(session, job, (body, state, scheme), None)?;
+    let mut simulation = Simulation::start(session, job, Prepared { body, state, scheme }, None)?;
     let mut tried = Tried { steps: Vec::new(), others };
     let (start, mut before) = (Instant::now(), 0.0);
     while before < LONGEST.max(SHARE * set_up) {

@@ -136,6 +136,15 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     holds_forces: bool,
 }
 
+/// Nodal values, and what batches need of them.
+#[derive(Clone, Copy)]
+pub struct Inputs<'a> {
+    /// The values.
+    pub nodal: Nodal<'a>,
+    /// What is needed.
+    pub needs: Needs,
+}
+
 impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
     /// Visits all points of the cells of the mesh in batches with the outputs zero; `visit` may read them afterwards. Forces on nodes
     /// are zero at the first point of cells, and kept for the others.
@@ -146,15 +155,15 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         needs: Needs,
         visit: impl FnMut(&mut Self),
     ) {
-        Self::for_each(0..geometry.runs.len(), (mesh, geometry), nodal, needs, visit);
+        Self::for_each(0..geometry.runs.len(), mesh, geometry, Inputs { nodal, needs }, visit);
     }
 
     /// Visits the runs of cells with these numbers in the same way.
     pub fn for_each(
         numbers: impl Iterator<Item = usize>,
-        (mesh, geometry): (&Mesh<D>, &'g Geometry<D>),
-        nodal: Nodal<'_>,
-        needs: Needs,
+        mesh: &Mesh<D>,
+        geometry: &'g Geometry<D>,
+        Inputs { nodal, needs }: Inputs<'_>,
         mut visit: impl FnMut(&mut Self),
     ) {
         let Some(first) = geometry.packs.first() else { return };

@@ -13,7 +13,7 @@ pub mod samples;
 mod surface;
 
 pub use assembly::{CellMatrix, assemble};
-pub use batch::{Batch, Integrity, Needs, Nodal};
+pub use batch::{Batch, Inputs, Integrity, Needs, Nodal};
 pub use geometry::{Cell, CellRun, CellShape, Geometry, Simplex, SimplexPack};
 pub use held::{Held, Slanted};
 pub use kernels::NodalPacks;

@@ -24,6 +24,7 @@ use super::field::{
     view_columns,
 };
 use super::field_slab::Slab;
+use super::hyperslab::TableRows;
 use super::parallel_file::{Element, METADATA_BYTES, ParallelFile};
 use super::xdmf;
 use crate::error::{Error, Result};
@@ -225,8 +226,8 @@ impl<const D: usize> FieldFile<D> {
                 }
             } else {
                 let (slab, folder) = (self.slab(kind.place), format!("Fields/{}", kind.name));
-                let shape = (slab.total, file_width(kind.shape));
-                self.file.write_tables(&folder, first, shape, slab.first, tables)?;
+                let rows = TableRows { rows: slab.total, width: file_width(kind.shape), start: slab.first };
+                self.file.write_tables(&folder, first, rows, tables)?;
             }
         }
         self.count_steps(first)?;

@@ -154,6 +154,14 @@ impl<T> Drop for Rows<'_, T> {
     fn drop(&mut self) {}
 }
 
+/// The shape of a table, and the first row of this rank in it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TableRows {
+    pub rows: u64,
+    pub width: usize,
+    pub start: u64,
+}
+
 impl ParallelFile {
     /// A dataset that HDF5 does not fill: if one rank could not write the zeros, HDF5 would let the others wait.
     fn new_dataset<T: Element>(&self) -> hdf5::DatasetBuilderEmpty {
@@ -176,14 +184,12 @@ impl ParallelFile {
         Ok(Rows::new(self, dataset, width))
     }
 
-    /// Makes the tables `{folder}/{first}`, `{folder}/{first + 1}`, ... of `rows x width` numbers and writes this rank's rows of
-    /// each, from row `start` on. For many small tables: the ranks exchange nothing but the outcome, once.
+    /// Makes the tables `{folder}/{first}`, `{folder}/{first + 1}`, ... of this shape and writes this rank's rows of each. For many small tables: the ranks exchange nothing but the outcome, once.
     pub(super) fn write_tables<'a>(
         &self,
         folder: &str,
         first: usize,
-        (rows, width): (u64, usize),
-        start: u64,
+        TableRows { rows, width, start }: TableRows,
         tables: impl Iterator<Item = &'a [f64]>,
     ) -> Result<(), Agreed> {
         let written = self.file.group(folder).and_then(|group| {

@@ -54,6 +54,13 @@ impl Precision {
     }
 }
 
+/// The factor that is wanted.
+struct Wanted {
+    precision: Precision,
+    /// Whether the last unknowns are not eliminated.
+    partial: bool,
+}
+
 impl Cholesky {
     /// Factors the whole matrix of these block rows, in a known order of elimination or in one with these unknowns last. Where the
     /// matrix is not positive definite in single precision the factor is in double precision. `None` where the unknowns can't all be
@@ -65,7 +72,7 @@ impl Cholesky {
         known: Option<&[u32]>,
         precision: Precision,
     ) -> Result<Option<Self>> {
-        Self::of(block, || Cow::Borrowed(rows), last, known, (precision, false))
+        Self::of(block, || Cow::Borrowed(rows), last, known, Wanted { precision, partial: false })
     }
 
     /// As [`new`](Self::new) for all unknowns but the last ones, which are not eliminated. Of the entries between two of these only
@@ -80,7 +87,8 @@ impl Cholesky {
     ) -> Result<Self> {
         let moved =
             || Error::Internal("unknowns of an interface are not last in the order of elimination".into());
-        Self::of(block, || Cow::Owned(rows()), last, known, (precision, true))?.ok_or_else(moved)
+        Self::of(block, || Cow::Owned(rows()), last, known, Wanted { precision, partial: true })?
+            .ok_or_else(moved)
     }
 
     fn of<'a>(
@@ -88,7 +96,7 @@ impl Cholesky {
         make_rows: impl Fn() -> Cow<'a, BlockRows>,
         last: &[usize],
         known: Option<&[u32]>,
-        (precision, partial): (Precision, bool),
+        Wanted { precision, partial }: Wanted,
     ) -> Result<Option<Self>> {
         let rows = make_rows();
         rows.check(block, rows.offsets.len().saturating_sub(1))?;

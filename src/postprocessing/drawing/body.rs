@@ -3,7 +3,7 @@
 use super::{
     colour::{Colour, Shades, VIRIDIS, hex},
     common::{Common, is_uniform},
-    frame::{Frame, colour_bar},
+    frame::{ColourKey, Frame, colour_bar},
     paint::{Style, Triangle, paint},
     picture::Picture,
     scale::{Scale, extent, number, percentiles, unit_by_name},
@@ -340,7 +340,9 @@ impl<'a> DrawnBody<'a> {
         svg += &text(6.0, 18.0, "start", &heading);
         svg += &paint(&self.triangles(&frame, &corners), &style, frame.height)?;
         svg += &self.surroundings(&frame);
-        svg += &colour_bar(name, shades, (scale, shown.is_clipped), &scale.words(quantity, unit), &frame);
+        let words = scale.words(quantity, unit);
+        let key = ColourKey { scale, is_clipped: shown.is_clipped, words: &words };
+        svg += &colour_bar(name, shades, key, &frame);
         svg += "</svg>";
         let (figures, colours) = words_of(shown, unit);
         let seen = self

@@ -76,14 +76,21 @@ impl Frame {
     }
 }
 
+/// What a colour bar shows.
+pub(super) struct ColourKey<'a> {
+    pub scale: &'a Scale,
+    /// Whether there are values beyond the ends of the scale.
+    pub is_clipped: bool,
+    /// The heading.
+    pub words: &'a str,
+}
+
 /// The colour bar on the right of a drawing. The name of the picture makes the names of gradients unique, because a page contains
-/// many drawings.
-/// The ends of the bar of a clipped scale are arrows, because there are values beyond them.
+/// many drawings. The ends of the bar of a clipped scale are arrows, because there are values beyond them.
 pub(super) fn colour_bar(
     name: &str,
     shades: Shades,
-    (scale, is_clipped): (&Scale, bool),
-    words: &str,
+    ColourKey { scale, is_clipped, words }: ColourKey<'_>,
     frame: &Frame,
 ) -> String {
     let name = plain_name(name);

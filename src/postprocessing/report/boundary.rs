@@ -59,6 +59,15 @@ struct BodyBehind<'a> {
     normals: Vec<[f64; 3]>,
 }
 
+/// A quantity to be drawn.
+struct Quantity<'a> {
+    /// Its name in files.
+    column: &'a str,
+    /// Its name in words.
+    name: &'a str,
+    unit: &'a str,
+}
+
 /// The laws of a contact.
 pub(super) struct Laws {
     /// Its boundaries.
@@ -177,7 +186,12 @@ impl<'a> Boundary<'a> {
                     out.constant.push(format!("{quantity}: {} {unit}", number(low)).trim_end().to_owned());
                 }
                 Some(range) => {
-                    let mut picture = self.drawn((name, &quantity, unit), &values, range, snapshot)?;
+                    let mut picture = self.drawn(
+                        Quantity { column: name, name: &quantity, unit },
+                        &values,
+                        range.into(),
+                        snapshot,
+                    )?;
                     if let (Some(picture), true) = (&mut picture, name == CONTACT_STATUS.name) {
                         picture.caption +=
                             " 1: open, 2: touching, without friction, 3: sticking, 4: sliding.";
@@ -242,9 +256,9 @@ impl<'a> Boundary<'a> {
     /// obstacle: such nodes are left out.
     fn drawn(
         &self,
-        (column, quantity, unit): (&str, &str, &str),
+        Quantity { column, name: quantity, unit }: Quantity<'_>,
         values: &[f64],
-        (low, high): (f64, f64),
+        [low, high]: [f64; 2],
         snapshot: Option<&Snapshot>,
     ) -> Result<Option<Picture>> {
         let name = format!("{}_{column}", self.name);

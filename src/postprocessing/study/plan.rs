@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    job::{Document, Every, Job, Loaded, MeshSource, Scheme, normal, read},
+    job::{Document, Every, Job, Loaded, MeshSource, Origin, Scheme, normal, read},
 };
 use std::path::{Path, PathBuf};
 
@@ -89,8 +89,9 @@ impl Plan {
     /// Reads the study in the file `path`, applies `overrides`, and loads the jobs of all runs.
     pub fn load(path: &Path, overrides: &[String], colour: bool) -> Result<Self> {
         let (text, folder) = read(kind(), path)?;
-        let mut document =
-            Document::new(kind(), &text, (&path.display().to_string(), &folder), overrides, colour)?;
+        let name = path.display().to_string();
+        let origin = Origin { name: &name, folder: &folder };
+        let mut document = Document::new(kind(), &text, origin, overrides, colour)?;
         document.refuse()?;
         let study: Study = document.fill()?;
         let base = Job::load_coloured(&normal(&folder.join(&study.base.job)), &study.base.set, colour)?;

@@ -15,13 +15,13 @@ use crate::{
 pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &State,
-    (step, with_means): (Step, bool),
+    step: Step,
     energy: &mut Energy,
     powers: &mut Energy,
 ) -> Result<()> {
     let velocity = state.velocity.local()?;
     for contact in &body.contacts {
-        let own = contact.energy_of_step(&velocity, step.length, with_means);
+        let own = contact.energy_of_step(&velocity, step.length);
         energy[CONTACT] += own.dissipated + step.length * own.dissipated_power;
         energy[NUMERICAL] += own.numerical;
         energy[WORK] += own.work + step.length * own.driving_power;

@@ -164,7 +164,7 @@ impl Integrator {
             Self::LaggedEuler(scheme) => energy += scheme.explicit,
             Self::Implicit(scheme) => scheme.add_solved(&mut energy),
         }
-        add_contact_energy(body, state, (step, self.averages_powers()), &mut energy, &mut powers)?;
+        add_contact_energy(body, state, step, &mut energy, &mut powers)?;
         if let Self::Implicit(scheme) = self {
             energy[NUMERICAL] += scheme.momentum_term(body, state, step)?;
             peaks = peaks.or(scheme.extrapolate(body, state, step, &mut energy)?);

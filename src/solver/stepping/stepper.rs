@@ -4,6 +4,7 @@ use super::{
     StepOutcome,
     contacts::{commit_tractions, keep_closeness, prepare_contacts, refuse_passage},
     factor_cache::nearest_cached_length,
+    flow::FlowStart,
     force_scale::ForceScale,
     integrator::Integrator,
     lagged_euler::refuse_fast_flow,
@@ -462,7 +463,7 @@ impl Stepper {
         let forces = &mut self.right_hand_side;
         if let Some(supports) = &mut self.moving_supports {
             let start = self.integrator.flow_start();
-            let start = start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
+            let start = start.unwrap_or(FlowStart { displacement: &state.displacement, length: step.length });
             supports.impose(session, body, step, start, forces)?;
         }
         body.held.clear(&mut forces.owned_mut()?);

@@ -54,12 +54,12 @@ impl MovingSupports {
         session: &Session,
         body: &Body<D, S>,
         step: Step,
-        (start, length): (&DistributedVector, f64),
+        FlowStart { displacement, length }: FlowStart<'_>,
         forces: &mut DistributedVector,
     ) -> Result<()> {
         let Some(motion) = &body.support_motion else { return Ok(()) };
         let written = {
-            let (start, mut velocity) = (start.owned()?, self.velocity.owned_mut()?);
+            let (start, mut velocity) = (displacement.owned()?, self.velocity.owned_mut()?);
             motion.write_velocity(step.time, &start, length, &mut velocity)
         };
         session.agree(written)?;

@@ -31,15 +31,15 @@ pub struct ContactEnergy {
 }
 
 impl<const D: usize> Contact<D> {
-    /// The energies of a step of this length, from velocities at its end (with ghosts). `with_means`: pressures are means over the step
-    /// where the obstacle moves or wear grows, as fits a formula of second order.
+    /// The energies of a step of this length, from velocities at its end (with ghosts). Under a formula of second order pressures are
+    /// means over the step where the obstacle moves or wear grows.
     ///
     /// The pressure takes up `k p v`. With the penetrations `d`, the energy `e` of the law, a gap that grows by `g` and wear by `h`,
     /// `k p v + numerical = (e(d_n) - e(d_{n-1})) + p g + p h`: stored energy, work on the obstacle, dissipation. Where the law stores
     /// nothing, as a rigid obstacle, `p (d_n - d_{n-1})` is dissipated. Friction `q` on an obstacle with the velocity `w` absorbs
     /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle. Where supports prescribe a part of `v`, they do the work of pressure and
     /// friction there.
-    pub fn energy_of_step(&self, velocity: &[f64], length: f64, with_means: bool) -> ContactEnergy {
+    pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> ContactEnergy {
         let mut sum = ContactEnergy::default();
         for point in &self.points {
             let v = point.normal_component(Body, velocity);
@@ -50,7 +50,11 @@ impl<const D: usize> Contact<D> {
                 sum.driving_power += of_supports;
                 continue;
             }
-            let mean = if with_means { 0.5 * (pressure + self.pressure_before(point)) } else { pressure };
+            let mean = if self.blend.earlier != 0.0 {
+                0.5 * (pressure + self.pressure_before(point))
+            } else {
+                pressure
+            };
             let change = point.context.step_length * v;
             let eroded = point.worn[0] - point.worn[1] - point.continued_wear;
             let after = point.context.penetration + change - eroded;

@@ -23,6 +23,7 @@ mod radial;
 #[cfg(test)]
 mod tests;
 
+use overstress::Overstressed;
 pub use overstress::{Metric, Perzyna};
 
 use super::{
@@ -111,7 +112,7 @@ impl Flow for Elastic<Perzyna> {
         if norm <= yield_stress {
             return None;
         }
-        let start = (norm, yield_stress);
+        let start = Overstressed { norm, yield_stress };
         Some(if S == 3 {
             plane_stress::flow(self, trial, length, start, tangent)
         } else {

@@ -13,6 +13,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{array, f64::consts::FRAC_1_SQRT_2};
 
+/// The elastic stress at the end of a step above the yield stress.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Overstressed {
+    /// Its norm, `q*` or `|s*|`, in Pa.
+    pub norm: f64,
+    /// `Y*` in Pa.
+    pub yield_stress: f64,
+}
+
 /// Perzyna's law: the stress rate is `G(s) = -(1/(2 relaxation)) (f/yield_stress)^(exponent - 1) E (s - P_K s)`, where P_K is the
 /// projection on the yield set of von Mises and the overstress f is the von Mises norm of s minus the yield stress.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -12,7 +12,7 @@
 //! equation around that one.
 
 use super::{
-    overstress::{NO_YIELD_STRESS, Perzyna},
+    overstress::{NO_YIELD_STRESS, Overstressed, Perzyna},
     plane_projection::Surface,
 };
 use crate::{
@@ -73,15 +73,14 @@ struct Values {
     by_stress: [[f64; 3]; 3],
 }
 
-/// Flow of the step, and increment of the accumulated strain. `start` contains the norm of `s*` and `Y*`.
+/// Flow of the step, and increment of the accumulated strain, from the norm of `s*` and `Y*`.
 pub(super) fn flow<const S: usize>(
     law: &Elastic<Perzyna>,
     trial: &Mandel<S>,
     length: f64,
-    start: (f64, f64),
+    Overstressed { norm, yield_stress }: Overstressed,
     tangent: Option<&mut Tangent<S>>,
 ) -> (Mandel<S>, f64) {
-    let (norm, yield_stress) = start;
     let [along, across] = law.metric_and_elasticity();
     let step = Step {
         trial: turned(&[trial[0], trial[1], trial[2]]),

@@ -11,7 +11,7 @@
 //! solved for that of
 //! `f`, so that large exponents and overstresses far above the yield stress neither need many iterations nor overflow.
 
-use super::overstress::Perzyna;
+use super::overstress::{Overstressed, Perzyna};
 use crate::{
     laws::material::{
         Elastic,
@@ -26,15 +26,14 @@ use crate::{
 /// Larger than the number of iterations for any law.
 const ITERATIONS: usize = 100;
 
-/// Flow of the step, and increment of the accumulated strain. `start` contains `q*` and `Y*`.
+/// Flow of the step, and increment of the accumulated strain, from `q*` and `Y*`.
 pub(super) fn flow<const S: usize>(
     law: &Elastic<Perzyna>,
     trial: &Mandel<S>,
     length: f64,
-    start: (f64, f64),
+    Overstressed { norm, yield_stress }: Overstressed,
     tangent: Option<&mut Tangent<S>>,
 ) -> (Mandel<S>, f64) {
-    let (norm, yield_stress) = start;
     let Perzyna { relaxation, exponent: power, .. } = law.parameters;
     let (shear, hardening) = (law.elasticity.shear, law.hardening_modulus());
     let stiffness = 1.5 * shear + hardening;
