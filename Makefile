@@ -92,7 +92,7 @@ test: deps
 
 # Everything compiled for these indices stays in a folder of its own.
 test64: test64-lib
-	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --test jobs on_two_ranks
+	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --test all jobs::every_job_gives_its_numbers_on_two_ranks
 
 test64-lib: deps64
 	PETSC_DIR=$(PETSC64_DIR) cargo --config profile.release.package.clarke.opt-level=1 test --release --locked --target-dir $(TARGET64) --lib
@@ -102,10 +102,9 @@ check64: deps64
 
 # Random contact laws; random jobs; families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
 hard: deps
-	CLARKE_RANDOM_LAWS=1000 cargo test --release --locked --test verification random_laws
-	CLARKE_RANDOM_SCENES=5000 cargo test --release --locked --test verification random_scenes
-	CLARKE_HARD=1 cargo test --release --locked --test hard -- --test-threads 1 --nocapture
-	CLARKE_HARD=1 cargo test --release --locked --test faults -- --test-threads 1 --nocapture
+	CLARKE_RANDOM_LAWS=1000 cargo test --release --locked --test all random_laws
+	CLARKE_RANDOM_SCENES=5000 cargo test --release --locked --test all random_scenes
+	CLARKE_HARD=1 cargo test --release --locked --test all -- hard:: faults:: --test-threads 1 --nocapture
 	fuzz/run.sh
 	cargo build --release --locked
 	tests/slurm/run.sh $(binary)
@@ -154,7 +153,7 @@ deny:
 
 # docs/ as a book in HTML; the tests that make test runs, too, write it and check its links and formulas.
 book: deps
-	cargo test --release --locked --test book
+	cargo test --release --locked --test all book::
 	@echo '$(or $(CARGO_TARGET_DIR),target)/book/index.html'
 
 # The pictures of jobs in README.md.
