@@ -38,7 +38,7 @@ help:
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make reference  build, then write what is generated from the types of the keys: schema/ and docs/reference-*keys.md'
-	@echo 'make test      deps, then every test, and 20 s of random input for each reader of files'
+	@echo 'make test      deps, then every test, and random input for each reader of files; ARGS=--write puts the slowest into docs'
 	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
 	@echo 'make test64-lib  only the tests of the library there'
 	@echo 'make check64   only whether it compiles there'
@@ -85,10 +85,9 @@ reference: build
 	$(binary) describe --markdown > docs/reference-keys.md
 	$(binary) describe study --markdown > docs/reference-study-keys.md
 
-# The summary of the tests comes last.
+# ARGS=--write puts the slowest tests into docs/tests.md.
 test: deps
-	fuzz/run.sh 20
-	cargo test --release --locked
+	scripts/test.sh $(ARGS)
 
 # Everything compiled for these indices stays in a folder of its own.
 test64: test64-lib
@@ -98,7 +97,7 @@ test64-lib: deps64
 	PETSC_DIR=$(PETSC64_DIR) cargo --config profile.release.package.clarke.opt-level=1 test --release --locked --target-dir $(TARGET64) --lib
 
 check64: deps64
-	PETSC_DIR=$(PETSC64_DIR) cargo clippy --locked -- -D warnings
+	PETSC_DIR=$(PETSC64_DIR) cargo clippy --release --locked -- -D warnings
 
 # Random contact laws; random jobs; families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
 hard: deps
@@ -141,10 +140,11 @@ bench-space: deps
 verification: deps
 	cargo bench --locked --bench verification -- $(ARGS)
 
+# With the profile of the build, whose generated code and macros serve here, too.
 lint: deps
 	cargo fmt --all --check
-	cargo clippy --all-targets --locked -- -D warnings
-	RUSTDOCFLAGS='-D warnings' cargo doc --no-deps --locked
+	cargo clippy --release --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --no-deps --locked
 
 # The crate advisories change without a change here: no part of `make lint`.
 deny:
