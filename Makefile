@@ -38,7 +38,7 @@ help:
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make reference  build, then write what is generated from the types of the keys: schema/ and docs/reference-*keys.md'
-	@echo 'make test      deps, then every test, and 20 s of random input for each reader of files'
+	@echo 'make test      deps, then every test, and random input for each reader of files; ARGS=--write puts the slowest into docs'
 	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
 	@echo 'make test64-lib  only the tests of the library there'
 	@echo 'make check64   only whether it compiles there'
@@ -85,27 +85,25 @@ reference: build
 	$(binary) describe --markdown > docs/reference-keys.md
 	$(binary) describe study --markdown > docs/reference-study-keys.md
 
-# The summary of the tests comes last.
+# ARGS=--write puts the slowest tests into docs/tests.md.
 test: deps
-	fuzz/run.sh 20
-	cargo test --release --locked
+	scripts/test.sh $(ARGS)
 
 # Everything compiled for these indices stays in a folder of its own.
 test64: test64-lib
-	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --test jobs on_two_ranks
+	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --test all jobs::every_job_gives_its_numbers_on_two_ranks
 
 test64-lib: deps64
 	PETSC_DIR=$(PETSC64_DIR) cargo --config profile.release.package.clarke.opt-level=1 test --release --locked --target-dir $(TARGET64) --lib
 
 check64: deps64
-	PETSC_DIR=$(PETSC64_DIR) cargo clippy --locked -- -D warnings
+	PETSC_DIR=$(PETSC64_DIR) cargo clippy --release --locked -- -D warnings
 
 # Random contact laws; random jobs; families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
 hard: deps
-	CLARKE_RANDOM_LAWS=1000 cargo test --release --locked --test verification random_laws
-	CLARKE_RANDOM_SCENES=5000 cargo test --release --locked --test verification random_scenes
-	CLARKE_HARD=1 cargo test --release --locked --test hard -- --test-threads 1 --nocapture
-	CLARKE_HARD=1 cargo test --release --locked --test faults -- --test-threads 1 --nocapture
+	CLARKE_RANDOM_LAWS=1000 cargo test --release --locked --test all random_laws
+	CLARKE_RANDOM_SCENES=5000 cargo test --release --locked --test all random_scenes
+	CLARKE_HARD=1 cargo test --release --locked --test all -- hard:: faults:: --test-threads 1 --nocapture
 	fuzz/run.sh
 	cargo build --release --locked
 	tests/slurm/run.sh $(binary)
@@ -142,10 +140,11 @@ bench-space: deps
 verification: deps
 	cargo bench --locked --bench verification -- $(ARGS)
 
+# With the profile of the build, whose generated code and macros serve here, too.
 lint: deps
 	cargo fmt --all --check
-	cargo clippy --all-targets --locked -- -D warnings
-	RUSTDOCFLAGS='-D warnings' cargo doc --no-deps --locked
+	cargo clippy --release --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --no-deps --locked
 
 # The crate advisories change without a change here: no part of `make lint`.
 deny:
@@ -154,7 +153,7 @@ deny:
 
 # docs/ as a book in HTML; the tests that make test runs, too, write it and check its links and formulas.
 book: deps
-	cargo test --release --locked --test book
+	cargo test --release --locked --test all book::
 	@echo '$(or $(CARGO_TARGET_DIR),target)/book/index.html'
 
 # The pictures of jobs in README.md.

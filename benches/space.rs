@@ -4,8 +4,10 @@
 //! Each problem has a reference value of one quantity: a closed form, or the value on a mesh much finer than those of the table.
 //! `--write` puts the tables into docs/space.md.
 
-#[path = "../tests/checked/mod.rs"]
+#[path = "../tests/checked.rs"]
 mod checked;
+#[path = "../tests/cores.rs"]
+mod cores;
 #[path = "table/mod.rs"]
 mod table;
 #[path = "triad/mod.rs"]

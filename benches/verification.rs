@@ -4,8 +4,10 @@
 //! several meshes, and a chart of their errors. The first page lists all cases on the meshes of their jobs. `--write` puts tables and
 //! charts into the pages, those of the named ones only if there are names (`hertz`).
 
-#[path = "../tests/checked/mod.rs"]
+#[path = "../tests/checked.rs"]
 mod checked;
+#[path = "../tests/cores.rs"]
+mod cores;
 #[path = "table/mod.rs"]
 mod table;
 

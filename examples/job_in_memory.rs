@@ -15,7 +15,7 @@ use std::path::Path;
 
 const JOB: &str = include_str!("../jobs/papers/wang_cheng_2022.toml");
 
-fn main() -> Result<(), Error> {
+pub fn main() -> Result<(), Error> {
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let changes = ["mesh.rectangle.cells = [8, 8]", "traction.0.value = [0, -5]"].map(String::from);

@@ -1,12 +1,9 @@
 //! Every job under jobs/ and every case under tests/cases reproduces the numbers of its `[check]` table, on one and on two ranks.
 //! The cases are problems of manuals and publications at default settings.
 
-#[path = "checked/mod.rs"]
-mod checked;
-
 use std::path::{Path, PathBuf};
 
-use checked::run;
+use crate::checked::run;
 use clarke::{
     job::{Expected, Job},
     postprocessing::study::quantity,

@@ -696,3 +696,37 @@ fn the_licences_of_all_packages_are_allowed() {
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
+
+/// The crates that a command of cargo compiles, with their features.
+fn compiled_crates(command: &str) -> BTreeSet<String> {
+    // Of what cargo tells, only the graph of its units has all features; it is an unstable format.
+    let graph = Command::new(env!("CARGO"))
+        .args([command, "--release", "--locked", "--offline", "--unit-graph", "-Zunstable-options"])
+        .env("RUSTC_BOOTSTRAP", "1")
+        .current_dir(root())
+        .output()
+        .expect("cargo");
+    assert!(graph.status.success(), "{}", String::from_utf8_lossy(&graph.stderr));
+    let graph: serde_json::Value = serde_json::from_slice(&graph.stdout).expect("JSON");
+    let units = graph["units"].as_array().expect("units");
+    units.iter().map(|unit| format!("{} {}", unit["pkg_id"], unit["features"])).collect()
+}
+
+#[test]
+fn what_make_run_has_compiled_serves_the_tests_too() {
+    let [solver, tests] = ["build", "test"].map(compiled_crates);
+    assert!(solver.len() > 100, "only {} crates were seen", solver.len());
+    let again: Vec<&String> = solver.difference(&tests).collect();
+    assert!(again.is_empty(), "the crates of the tests ask these for more features: {again:#?}");
+}
+
+#[test]
+fn what_the_tests_have_compiled_serves_the_random_input_too() {
+    let [solver, random_input] = ["Cargo.toml", "fuzz/Cargo.toml"].map(|file| {
+        let text = std::fs::read_to_string(root().join(file)).expect("a manifest");
+        let mut profile = text.parse::<toml::Table>().expect("tables")["profile"]["release"].clone();
+        profile.as_table_mut().expect("a table").remove("package");
+        profile
+    });
+    assert_eq!(solver, random_input, "otherwise every crate is compiled again");
+}

@@ -1,14 +1,14 @@
-//! Valid jobs and meshes with random changes, processed up to the first step in this process.
+//! Valid jobs and meshes with random changes, processed up to the first step in one process.
 
+use crate::verification::{World, run_on};
 use clarke::{
     error::{Error, Exit},
     job::Job,
-    parallel::session::Mpi,
     run,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use std::{cell::Cell, io::Write, path::Path};
+use std::{cell::Cell, path::Path};
 
 const JOB: &str = r#"
 [mesh]
@@ -110,13 +110,14 @@ fn changed(text: &str, changes: &[Change]) -> String {
 
 #[test]
 fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
-    let mpi = Mpi::start().expect("MPI");
-    let session = mpi.session().expect("PETSc");
-    let folder = tempfile::tempdir().expect("folder");
-    let mesh = folder.path().join("mesh.msh");
+    run_on(&[1], |world| try_changes(&world));
+}
+
+fn try_changes(World { session, folder, .. }: &World) {
+    let mesh = folder.join("mesh.msh");
     let check = |job: &str| -> Result<(), Error> {
-        let loaded = Job::from_text(job, "job.toml", folder.path(), &[])?;
-        run::check(&session, loaded, None)?.json().map(drop)
+        let loaded = Job::from_text(job, "job.toml", folder, &[])?;
+        run::check(session, loaded, None)?.json().map(drop)
     };
     let write = |text: &str| std::fs::write(&mesh, text).expect("written");
     write(SQUARE);
@@ -132,20 +133,16 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
                 let words = error.to_string();
                 prop_assert_eq!(Exit::from(error), Exit::Refused);
                 refused.set(refused.get() + 1);
-                prop_assert!(names_its_place(&words, folder.path()), "{}", words);
+                prop_assert!(names_its_place(&words, folder), "{}", words);
             }
         }
         Ok(())
     });
-    // A panic ends the process by MPI_Abort, and output captured by the test runner is lost; this output is not captured.
-    result.unwrap_or_else(|fault| {
-        let _ = writeln!(std::io::stderr(), "{fault}");
-        panic!("{fault}")
-    });
+    result.unwrap_or_else(|fault| panic!("{fault}"));
     assert!(ready.get() > 20 && refused.get() > 100, "{ready:?} ready, {refused:?} refused");
     write(SQUARE);
     check(JOB).expect("what was refused leaves nothing behind in the process");
-    let left = std::fs::read_dir(folder.path()).expect("folder").count();
+    let left = std::fs::read_dir(folder).expect("folder").count();
     assert_eq!(left, 1, "a check writes nothing");
 }
 

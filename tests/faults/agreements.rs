@@ -1,7 +1,8 @@
 //! Each agreement and each file operation of a run fails on each rank in turn. All ranks must end in the same way, with one
 //! message.
 
-use crate::{case::Case, mpirun, trials};
+use super::{SCENARIO, trials};
+use crate::{case::Case, mpirun};
 use clarke::{
     error::Exit,
     io::output::parallel_file::was_abandoned,
@@ -19,9 +20,6 @@ use std::{
     path::Path,
     time::{Duration, Instant},
 };
-
-/// The name of the scenario under `mpirun`, which is followed by a kind of run and the number of a part.
-pub const SCENARIO: &str = "agreements ";
 
 const RANKS: usize = 3;
 
@@ -64,7 +62,7 @@ fn whatever_fails_on_whichever_rank_ends_all_ranks_alike() {
             let job = format!("{kind}.toml");
             std::fs::copy(folder.path().join(&job), own.join(&job)).expect("copied");
         }
-        let output = mpirun::start(RANKS, &format!("{SCENARIO}{kind} {part}"), &own);
+        let output = mpirun::start(RANKS, &format!("{SCENARIO} agreements {kind} {part}"), &own);
         let said = String::from_utf8_lossy(&output.stdout);
         let last: Vec<&str> = said.lines().rev().take(12).collect();
         let errors = String::from_utf8_lossy(&output.stderr);
@@ -74,8 +72,8 @@ fn whatever_fails_on_whichever_rank_ends_all_ranks_alike() {
     }
 }
 
-/// The part that runs under `mpirun`. Files that could not be written stay open, as in a run; therefore the process ends without
-/// finalising MPI.
+/// The part that runs under `mpirun`, with a kind of run and the number of a part. Files that could not be written stay open, as in a
+/// run; therefore the process ends without finalising MPI.
 pub fn scenario(words: &str, folder: &Path) {
     let (kind, part) = words.split_once(' ').expect("a kind and a part");
     let mpi = Mpi::start().expect("MPI");

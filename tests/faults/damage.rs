@@ -1,6 +1,6 @@
 //! Damaged and foreign checkpoints are skipped or refused; no run continues from them.
 
-use crate::{
+use super::{
     Random, trials,
     undisturbed::{RANKS, saving, undisturbed},
 };

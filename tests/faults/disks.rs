@@ -1,10 +1,12 @@
 //! Disks that are full or not writable. Small disks need mount namespaces; limits of file sizes do not.
 
+use super::{
+    trials,
+    undisturbed::{RANKS, assert_same_fields, finish, saving, undisturbed},
+};
 use crate::{
     case::Case,
     launch::{Outcome, Running},
-    trials,
-    undisturbed::{RANKS, assert_same_fields, finish, saving, undisturbed},
 };
 use std::process::Command;
 

@@ -1,11 +1,12 @@
 //! SIGKILL to a rank or to `mpirun` at random moments, most of them while files are written.
 
+use super::{
+    Random, trials,
+    undisturbed::{RANKS, finish, saving, undisturbed},
+};
 use crate::{
-    Random,
     case::Case,
     launch::{Running, Target},
-    trials,
-    undisturbed::{RANKS, finish, saving, undisturbed},
 };
 use std::{
     collections::BTreeMap,

@@ -1,6 +1,7 @@
 //! Restarts between all numbers of ranks, for each effect and each scheme, with fixed and adaptive steps.
 
-use crate::{Random, case::Case, hdf5_file::NumberFile, mpirun, results::Results, trials};
+use super::{Random, SCENARIO, trials};
+use crate::{case::Case, hdf5_file::NumberFile, mpirun, results::Results};
 use clarke::{
     error::Exit,
     job::Job,
@@ -134,7 +135,7 @@ pub fn scenario(name: &str, folder: &Path) {
     let session = mpi.session().expect("PETSc");
     for job in std::fs::read_to_string(folder.join(JOBS)).expect("jobs").lines().map(Path::new) {
         let ranks = session.ranks();
-        if name == "restart_write" {
+        if name == "write" {
             take(&session, job, &written_by(ranks), &Start::Anew);
             continue;
         }
@@ -221,8 +222,9 @@ fn restarts_from_any_ranks_to_any_ranks_lose_nothing_of_any_effect_under_any_sch
         let folder = tempfile::tempdir().expect("folder");
         let list: String = jobs.iter().map(|job| format!("{}\n", job.display())).collect();
         std::fs::write(folder.path().join(JOBS), list).expect("written");
-        for scenario in ["restart_write", "restart_read"] {
-            RANKS.for_each(|ranks| mpirun::run(ranks, scenario, folder.path()));
+        for part in ["write", "read"] {
+            let scenario = format!("{SCENARIO} restart {part}");
+            RANKS.for_each(|ranks| mpirun::run(ranks, &scenario, folder.path()));
         }
         batch.iter().zip(&jobs).for_each(|(combination, job)| compare(*combination, job));
         restarts += 16 * batch.len();

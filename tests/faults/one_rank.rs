@@ -1,6 +1,7 @@
 //! A law or the assembly fails on one rank: all ranks end together, with one message. `disks` tests files that one rank cannot
 //! write, `tests/verification/callbacks.rs` callbacks of Newton's method.
 
+use super::SCENARIO;
 use crate::mpirun;
 use clarke::{
     error::Exit,
@@ -98,7 +99,7 @@ pub fn fail(name: &str) -> Exit {
 fn expect(fault: &str, code: i32, words: &str, steps: usize) {
     for ranks in [2, 3] {
         let folder = tempfile::tempdir().expect("folder");
-        let output = mpirun::start(ranks, &format!("one_rank {fault}"), folder.path());
+        let output = mpirun::start(ranks, &format!("{SCENARIO} one_rank {fault}"), folder.path());
         let said =
             format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         assert_eq!(output.status.code(), Some(code), "{fault} on {ranks} ranks\n{said}");

@@ -1,6 +1,7 @@
 //! Steps near the bound of the explicit scheme, and far above it with implicit schemes.
 
-use crate::{case::Case, family};
+use super::family;
+use crate::case::Case;
 use clarke::linear_algebra::tensor::larger;
 
 const STEPS: f64 = 200.0;

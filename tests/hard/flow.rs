@@ -1,6 +1,7 @@
 //! Viscoplastic flow near its limits: vanishing viscosity, zero yield stress, a yield stress that is never reached, high exponents.
 
-use crate::{assert_close, case::Case, family};
+use super::{assert_close, family};
+use crate::case::Case;
 use clarke::linear_algebra::tensor::larger;
 
 const PLANE: &str = "hard/nearly_perfect_plasticity";

@@ -1,6 +1,7 @@
 //! Impacts at any speed: the rebound scales with the equations, no body passes through the wall, and no energy is generated.
 
-use crate::{case::Case, family, results::Results};
+use super::family;
+use crate::{case::Case, results::Results};
 use clarke::linear_algebra::tensor::larger;
 
 /// Energy minus the work of loads, for every step.
@@ -43,7 +44,7 @@ fn bars_are_thrown_back_alike_at_any_speed() {
         let end = |results: &Results, speed: f64| {
             results.table("history.csv").last("kinetic_energy") / speed.powi(2)
         };
-        crate::assert_close(end(&results, speed), end(&reference.0, 10.0), 1e-9, &what);
+        super::assert_close(end(&results, speed), end(&reference.0, 10.0), 1e-9, &what);
     }
 }
 

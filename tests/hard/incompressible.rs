@@ -1,6 +1,7 @@
 //! The locking of linear cells near a Poisson's ratio of 0.5, and its reduction by crossed diagonals.
 
-use crate::{case::Case, family};
+use super::family;
+use crate::case::Case;
 
 /// Deflection of a clamped bar of 4 m x 1 m in plane strain under a shear load of 1 Pa at its end, from 8 n x 2 n
 /// rectangles.

@@ -1,6 +1,7 @@
 //! Laws with jumps and kinks over very many steps.
 
-use crate::{case::Case, results::Results, thorough};
+use super::thorough;
+use crate::{case::Case, results::Results};
 use clarke::linear_algebra::tensor::larger;
 
 /// The largest absolute value of some numbers.

@@ -1,6 +1,7 @@
 //! Loads that become undefined during a run, and missing supports.
 
-use crate::{case::Case, family, launch};
+use super::family;
+use crate::{case::Case, launch};
 
 #[test]
 fn loads_that_cease_to_be_numbers_end_the_run_with_its_state_saved() {

@@ -1,6 +1,7 @@
 //! Very many steps: the energy balance does not drift, memory does not grow, and sums keep their accuracy.
 
-use crate::{assert_close, case::Case, results::Results, thorough};
+use super::{assert_close, thorough};
+use crate::{case::Case, results::Results};
 use clarke::{
     fem::effect::{ENERGIES, Role},
     linear_algebra::tensor::larger,

@@ -1,6 +1,7 @@
 //! Extreme meshes: one cell, fewer contact nodes than ranks, ranks without contact, bad cells on many ranks.
 
-use crate::{assert_close, case::Case, family, results::assert_same_answer};
+use super::{assert_close, family};
+use crate::{case::Case, results::assert_same_answer};
 use std::path::{Path, PathBuf};
 
 fn beside(path: &str) -> PathBuf {

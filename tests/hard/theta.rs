@@ -1,7 +1,8 @@
 //! Steps with theta from far below 1 to far above 1: they are solved, refused with the message of the certificate, or failed, but
 //! never wrong.
 
-use crate::{case::Case, family};
+use super::family;
+use crate::case::Case;
 
 /// The law of the job, which decreases by 2 Pa s/m between 1 and 2 m/s.
 fn pressure(velocity: f64) -> f64 {
@@ -85,7 +86,7 @@ fn adaptive_steps_follow_the_one_motion_though_longer_ones_have_several_solution
             let found = -results.table("probes.csv").last("velocity_y");
             let (steps, rejected) = (results.number("steps"), results.number("rejected_steps"));
             println!("{what}: at rest at {found:.6} m/s after {steps} steps, {rejected} rejected");
-            crate::assert_close(found, rest, 1e-4, &what);
+            super::assert_close(found, rest, 1e-4, &what);
         }
     }
 }

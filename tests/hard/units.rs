@@ -1,6 +1,7 @@
 //! The same problem in other units has the same results.
 
-use crate::{case::Case, family, results::Results};
+use super::family;
+use crate::{case::Case, results::Results};
 use clarke::linear_algebra::tensor::larger;
 use toml::Value;
 
@@ -113,7 +114,7 @@ fn assert_same(kind: &str, units: Units) {
         assert!(off < 1e-9, "{kind} in {units:?}: {column} is {off:e} off");
     }
     let stress = |results: &Results| results.number("final_von_mises");
-    crate::assert_close(stress(&b) / units.stress, stress(&a), 1e-9, &format!("{kind} in {units:?}"));
+    super::assert_close(stress(&b) / units.stress, stress(&a), 1e-9, &format!("{kind} in {units:?}"));
     println!("{kind} in {units:?}: {worst:.1e} off");
 }
 

@@ -1,6 +1,7 @@
 //! Vanishing effects: the results tend to those without the effect, or the job is refused.
 
-use crate::{case::Case, family};
+use super::family;
+use crate::case::Case;
 use clarke::linear_algebra::tensor::larger;
 
 /// Displacements of the tip.

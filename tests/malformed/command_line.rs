@@ -1,7 +1,7 @@
 //! Command lines that are refused, and files that are inspected.
 
+use super::refusal::{refused, try_all};
 use crate::launch::{run, run_alone};
-use crate::refusal::{refused, try_all};
 use std::path::PathBuf;
 
 fn paper() -> String {

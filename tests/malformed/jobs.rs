@@ -1,6 +1,6 @@
 //! The invalid jobs of tests/refusals as runs: the program refuses them in the same way as the library.
 
-use crate::refusal::{refused_job, try_all};
+use super::refusal::{refused_job, try_all};
 use std::path::PathBuf;
 
 #[test]

@@ -1,6 +1,6 @@
 //! Invalid and damaged mesh files, run with an otherwise valid job.
 
-use crate::refusal::{refused_job, try_all};
+use super::refusal::{refused_job, try_all};
 use std::path::{Path, PathBuf};
 
 /// The job around a mesh.

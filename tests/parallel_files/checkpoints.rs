@@ -1,7 +1,7 @@
 //! Checkpoints, intact and damaged.
 
-use crate::mpirun::{self, scramble};
-use crate::owner;
+use super::{owner, run};
+use crate::mpirun::scramble;
 use clarke::error::Result;
 use clarke::io::output::checkpoint_file::{self, Checkpoint, IdTable, RowSet};
 use clarke::io::output::inspect::inspect;
@@ -162,7 +162,7 @@ pub fn damage(world: &impl Communicator, folder: &Path) {
 fn a_checkpoint_of_any_number_of_ranks_is_read_on_any_number_of_ranks() {
     for writers in 1..=4 {
         let folder = tempfile::tempdir().expect("folder");
-        mpirun::run(writers, "checkpoint_write", folder.path());
+        run(writers, "checkpoint_write", folder.path());
         let names: Vec<_> = std::fs::read_dir(folder.path()).expect("folder").collect();
         assert_eq!(names.len(), 1, "nothing but the checkpoint is left: {names:?}");
         let words = inspect(&folder.path().join("checkpoint-64.h5")).expect("inspect");
@@ -170,7 +170,7 @@ fn a_checkpoint_of_any_number_of_ranks_is_read_on_any_number_of_ranks() {
             assert!(words.contains(part), "{words}");
         }
         for readers in 1..=4 {
-            mpirun::run(readers, "checkpoint_read", folder.path());
+            run(readers, "checkpoint_read", folder.path());
         }
     }
 }
@@ -178,14 +178,14 @@ fn a_checkpoint_of_any_number_of_ranks_is_read_on_any_number_of_ranks() {
 #[test]
 fn checkpoints_that_do_not_fit_the_job_are_refused_with_the_reason() {
     let folder = tempfile::tempdir().expect("folder");
-    mpirun::run(2, "checkpoint_write", folder.path());
-    mpirun::run(1, "checkpoint_refusals", folder.path());
-    mpirun::run(3, "checkpoint_refusals", folder.path());
+    run(2, "checkpoint_write", folder.path());
+    run(1, "checkpoint_refusals", folder.path());
+    run(3, "checkpoint_refusals", folder.path());
 }
 
 #[test]
 fn no_flipped_bit_and_no_cut_gives_a_wrong_restart() {
     let folder = tempfile::tempdir().expect("folder");
-    mpirun::run(2, "checkpoint_write", folder.path());
-    mpirun::run(1, "checkpoint_damage", folder.path());
+    run(2, "checkpoint_write", folder.path());
+    run(1, "checkpoint_damage", folder.path());
 }

@@ -1,6 +1,7 @@
 //! Field files, read serially as other programs read them.
 
-use crate::{mpirun, owner};
+use super::{SCENARIO, owner, run};
+use crate::mpirun;
 use clarke::io::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
 use clarke::io::output::inspect::inspect;
 use hdf5::{Location, types::FixedAscii};
@@ -228,9 +229,9 @@ fn check(folder: &Path, times: &[f64]) {
 fn fields_of_all_steps_stand_in_the_file_whatever_the_number_of_ranks() {
     for ranks in 1..=4 {
         let folder = tempfile::tempdir().expect("folder");
-        mpirun::run(ranks, "fields_write_packed", folder.path());
+        run(ranks, "fields_write_packed", folder.path());
         check(folder.path(), &[0.0, 0.25, 0.5, 0.75]);
-        mpirun::run(ranks, "fields_write", folder.path());
+        run(ranks, "fields_write", folder.path());
         check(folder.path(), &[0.0, 0.25, 0.5, 0.75]);
         let words = inspect(&folder.path().join("fields.vtkhdf")).expect("inspect");
         for part in ["42 nodes", "40 triangles", "steps: 4", "t = 0.75 s", "tensor at each cell"] {
@@ -242,7 +243,7 @@ fn fields_of_all_steps_stand_in_the_file_whatever_the_number_of_ranks() {
 #[test]
 fn the_metadata_of_many_steps_are_not_written_amid_a_transfer() {
     let folder = tempfile::tempdir().expect("folder");
-    mpirun::run(1, "fields_many", folder.path());
+    run(1, "fields_many", folder.path());
     let words = inspect(&folder.path().join("fields.vtkhdf")).expect("inspect");
     let steps: u32 = MANY_STEPS.iter().sum();
     assert!(words.contains(&format!("steps: {steps}")), "{words}");
@@ -252,7 +253,7 @@ fn the_metadata_of_many_steps_are_not_written_amid_a_transfer() {
 fn a_solid_is_written_as_tetrahedra_with_all_components() {
     for ranks in [1, 2, 3] {
         let folder = tempfile::tempdir().expect("folder");
-        mpirun::run(ranks, "fields_solid", folder.path());
+        run(ranks, "fields_solid", folder.path());
         let file = hdf5::File::open(folder.path().join("fields.vtkhdf")).expect("open");
         let floats = |name: &str| file.dataset(name).and_then(|set| set.read_raw::<f64>()).expect("numbers");
         let whole = |name: &str| file.dataset(name).and_then(|set| set.read_raw::<i64>()).expect("numbers");
@@ -272,9 +273,9 @@ fn a_solid_is_written_as_tetrahedra_with_all_components() {
 #[test]
 fn the_steps_that_a_run_wrote_out_before_it_died_can_be_read() {
     let folder = tempfile::tempdir().expect("folder");
-    assert!(!mpirun::start(2, "fields_die", folder.path()).status.success());
+    assert!(!mpirun::start(2, &format!("{SCENARIO} fields_die"), folder.path()).status.success());
     check(folder.path(), &[0.0, 0.25]);
-    mpirun::run(3, "fields_resume", folder.path());
+    run(3, "fields_resume", folder.path());
     check(folder.path(), &[0.0, 0.25, 0.375, 0.5]);
 }
 
@@ -282,8 +283,8 @@ fn the_steps_that_a_run_wrote_out_before_it_died_can_be_read() {
 fn a_restarted_run_drops_later_steps_and_continues_with_any_number_of_ranks() {
     for (before, after) in [(1, 4), (4, 1), (3, 2)] {
         let folder = tempfile::tempdir().expect("folder");
-        mpirun::run(before, "fields_write", folder.path());
-        mpirun::run(after, "fields_resume", folder.path());
+        run(before, "fields_write", folder.path());
+        run(after, "fields_resume", folder.path());
         check(folder.path(), &[0.0, 0.25, 0.375, 0.5]);
     }
 }

@@ -1,6 +1,6 @@
 //! Tables of which each rank holds a range of rows.
 
-use crate::mpirun;
+use super::run;
 use clarke::io::output::parallel_file::{Element, ParallelFile};
 use mpi::traits::Communicator;
 use std::path::Path;
@@ -90,7 +90,7 @@ pub fn fail_on_one_rank(world: &impl Communicator, folder: &Path) {
 fn rows_written_in_pieces_by_uneven_ranks_come_back_in_any_other_split() {
     let folder = tempfile::tempdir().expect("folder");
     for ranks in 1..=4 {
-        mpirun::run(ranks, "rows", folder.path());
+        run(ranks, "rows", folder.path());
     }
 }
 
@@ -98,6 +98,6 @@ fn rows_written_in_pieces_by_uneven_ranks_come_back_in_any_other_split() {
 fn a_fault_of_one_rank_is_an_error_on_all_and_none_is_left_waiting() {
     let folder = tempfile::tempdir().expect("folder");
     for ranks in [1, 3] {
-        mpirun::run(ranks, "rows_fault", folder.path());
+        run(ranks, "rows_fault", folder.path());
     }
 }

@@ -1,10 +1,10 @@
 //! The error indicator in the output of a run.
 
+use super::report::report;
 use crate::{
     case::Case,
     hdf5_file::NumberFile,
     launch,
-    report::report,
     results::{Results, relative_difference},
 };
 

@@ -1,10 +1,10 @@
 //! The output files of a run, as documented.
 
+use super::report::report;
 use crate::{
     case::{Case, paper_job},
     hdf5_file::NumberFile,
     launch,
-    report::report,
     results::Results,
 };
 use clarke::linear_algebra::tensor::larger;

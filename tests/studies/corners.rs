@@ -1,7 +1,7 @@
 //! Singular stress at the clamped corners of the paper's problem: reduced orders on uniform meshes, and their recovery on graded
 //! ones.
 
-use crate::scene::{Scene, number};
+use super::scene::{Scene, number};
 use std::path::Path;
 
 const GRADED: &str = r#"set = ['mesh.rectangle.grading={x=1.75, y=1.75, toward=["left", "bottom", "top"]}']"#;

@@ -1,6 +1,6 @@
 //! Studies that are refused before anything runs.
 
-use crate::scene::{SOLUTION, SQUARE, Scene};
+use super::scene::{SOLUTION, SQUARE, Scene};
 use clarke::{error::Exit, postprocessing::study::Plan};
 
 /// The refusal of a study.

@@ -1,6 +1,6 @@
 //! Results of studies.
 
-use crate::scene::{SOLUTION, SQUARE, Scene, number};
+use super::scene::{SOLUTION, SQUARE, Scene, number};
 use clarke::postprocessing::study::{Plan, describe};
 use std::path::Path;
 
@@ -78,7 +78,7 @@ fn a_study_has_the_same_numbers_on_one_two_and_three_ranks() {
                 .study(ranks, &["--set", &format!("output.folder=out/{ranks}")])
                 .expect(0)
                 .says("computed/published");
-            let results = crate::scene::read(&scene.path(&format!("out/{ranks}")));
+            let results = super::scene::read(&scene.path(&format!("out/{ranks}")));
             let at = |run: usize, norm: usize| number(&results, &format!("/runs/{run}/errors/{norm}/error"));
             (0..2)
                 .flat_map(|run| (0..3).map(move |norm| (run, norm)))

@@ -1,6 +1,6 @@
 //! A restarted study.
 
-use crate::scene::{SOLUTION, SQUARE, Scene, number};
+use super::scene::{SOLUTION, SQUARE, Scene, number};
 
 fn scene() -> Scene {
     let study = "[[run]]\ncells = [4, 4]\n[[run]]\ncells = [6, 6]\n[[norm]]\nof = \"velocity\"\nin = \"H\"\nover = \"end\"\n";

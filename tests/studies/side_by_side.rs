@@ -1,6 +1,6 @@
 //! Runs of a study side by side, on groups of ranks.
 
-use crate::scene::{SOLUTION, SQUARE, Scene, number};
+use super::scene::{SOLUTION, SQUARE, Scene, number};
 use std::path::Path;
 
 /// A study of four runs; the second fails, because its steps are too long for the explicit stress.

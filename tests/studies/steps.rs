@@ -1,10 +1,7 @@
 //! Errors of the steps apart from those of the mesh, and what reaching an error takes.
 
-use crate::{
-    browser::assert_fits,
-    launch::run_alone,
-    scene::{Scene, number},
-};
+use super::scene::{Scene, number};
+use crate::{browser::assert_fits, launch::run_alone};
 use std::path::Path;
 
 fn paper() -> Scene {

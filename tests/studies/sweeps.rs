@@ -1,9 +1,7 @@
 //! Sweeps over keys of a job.
 
-use crate::{
-    launch::run,
-    scene::{Scene, number},
-};
+use super::scene::{Scene, number};
+use crate::launch::run;
 use serde_json::Value;
 use std::path::Path;
 
@@ -56,7 +54,7 @@ fn members_of_a_sweep_give_the_results_of_runs_alone_and_a_failed_one_does_not_s
 fn a_response_that_no_run_has_fails_with_the_nearest_name() {
     let sweep = "[sweep]\n\"material.density\" = { from = 0.5, to = 2.0, draws = 2, seed = 3 }\n";
     let scene =
-        Scene::new(crate::scene::SQUARE, &format!("{sweep}[[response]]\nof = \"history.kinetic_enery\"\n"));
+        Scene::new(super::scene::SQUARE, &format!("{sweep}[[response]]\nof = \"history.kinetic_enery\"\n"));
     // Before the first run.
     scene.study(1, &[]).expect(2).says("did you mean `kinetic_energy`?");
     let set = "response.0.of=history.kinetic_energy";
@@ -74,7 +72,7 @@ fn a_response_that_no_run_has_fails_with_the_nearest_name() {
 fn a_value_that_the_job_refuses_is_a_failed_run_and_all_its_faults_are_listed() {
     let sweep = "[sweep]\n\"material.density\" = [-1.0, 1.0]\n\"material.viscosity.shear\" = [-50.0, 50.0]\n";
     let response = "[[response]]\nof = \"history.kinetic_energy\"\n";
-    let scene = Scene::new(crate::scene::SQUARE, &format!("{sweep}{response}"));
+    let scene = Scene::new(super::scene::SQUARE, &format!("{sweep}{response}"));
     let outcome = scene.study(2, &[]).expect(1).says("3 of 4 runs failed").says("density-1.0-shear-50.0");
     let refused = |run: &str| outcome.stdout.matches(&format!("run refused   {run}")).count();
     assert_eq!(refused("density--1.0-shear--50.0"), 1, "{}", outcome.stdout);
@@ -86,7 +84,7 @@ fn a_value_that_the_job_refuses_is_a_failed_run_and_all_its_faults_are_listed() 
     assert!(error.contains("density") && error.contains("shear"), "both faults: {error}");
     assert_eq!(results["runs"].as_array().map(Vec::len), Some(4));
     // A sweep without a value that can be used is refused as a whole, before anything is run.
-    let all = Scene::new(crate::scene::SQUARE, "[sweep]\n\"material.densty\" = [0.5, 1.0]\n");
+    let all = Scene::new(super::scene::SQUARE, "[sweep]\n\"material.densty\" = [0.5, 1.0]\n");
     all.study(1, &[]).expect(2).says("did you mean");
     assert!(!all.path("out/study").exists());
 }

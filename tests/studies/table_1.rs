@@ -1,9 +1,7 @@
 //! Table 1 of Wang and Cheng (2022).
 
-use crate::{
-    launch::run,
-    scene::{number, read},
-};
+use super::scene::{number, read};
+use crate::launch::run;
 use std::path::Path;
 
 #[test]

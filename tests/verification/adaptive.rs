@@ -1,7 +1,7 @@
 //! Adaptive steps: the error of a step, and rejected steps, which leave no trace.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     fem::effect::Step,
     mesh::{

@@ -1,8 +1,8 @@
 //! Adhesion against a point mass on one bond, computed here by a separate solver: a nearly rigid plate is torn off the ground or
 //! slides along it.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation, sum};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation, sum};
 use clarke::fem::effect::{DEBONDING, KINETIC};
 use clarke::{
     linear_algebra::tensor::larger,

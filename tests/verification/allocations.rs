@@ -97,7 +97,7 @@ fn whole_run(session: &Session, steps: u32) -> u64 {
 
 #[test]
 fn steps_allocate_nothing() {
-    crate::run_on(&[1], |world| count(&world.session));
+    super::run_on(&[1], |world| count(&world.session));
 }
 
 /// The part under `mpirun`.

@@ -1,7 +1,7 @@
 //! The assembled matrix against a dense matrix computed here by other formulas.
 
-use crate::run_on;
-use crate::scenes::{body, brick, crossed, set_nodal, stir, sum};
+use super::run_on;
+use super::scenes::{body, brick, crossed, set_nodal, stir, sum};
 use clarke::{
     fem::{
         body::Body,

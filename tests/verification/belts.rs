@@ -1,7 +1,7 @@
 //! Friction acts on the velocity relative to the obstacle, and the energy balance contains the work of the obstacle.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::fem::effect::{CONTACT, KINETIC, WORK};
 use clarke::{
     fem::{effect::Step, space::surface_points},

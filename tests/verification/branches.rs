@@ -1,8 +1,8 @@
 //! The number of branch changes in a step is the number of points, over all ranks, whose branch differs between the start and the
 //! end of the step.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, crossed, simulation};
 use clarke::{parallel::session::Session, run::Simulation};
 
 /// A block that falls with `v = g t` on a law whose slope changes at 0.25 m/s: all contact points change their branch in the step

@@ -1,7 +1,8 @@
 //! Newton's method, whose callbacks may fail on one rank.
 
-use crate::petsc_boundary::{assert_owned, matrix, product, set, share, shares, vector};
-use crate::{mpirun, run_on, test_of};
+use super::petsc_boundary::{assert_owned, matrix, product, set, share, shares, vector};
+use super::{run_on, test_of};
+use crate::mpirun;
 use clarke::{
     error::{Error, Exit, Result},
     linear_algebra::petsc::{
@@ -132,11 +133,11 @@ fn solution(unknown: usize) -> f64 {
 }
 
 fn solver(session: &Session) -> Snes {
-    Snes::new("", &vector(session), crate::petsc_boundary::BLOCK).expect("solver")
+    Snes::new("", &vector(session), super::petsc_boundary::BLOCK).expect("solver")
 }
 
 fn linear_solver(session: &Session, matrix: &Matrix) -> ProjectedKsp {
-    let mut solver = ProjectedKsp::new("", &vector(session), crate::petsc_boundary::BLOCK).expect("solver");
+    let mut solver = ProjectedKsp::new("", &vector(session), super::petsc_boundary::BLOCK).expect("solver");
     solver.linear_solver().set_method("cg").expect("cg");
     solver.linear_solver().set_preconditioner("jacobi", None).expect("jacobi");
     solver.set_tolerances(1e-12, 1e-14, 100).expect("tolerances");

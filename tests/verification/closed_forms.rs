@@ -1,7 +1,7 @@
 //! Motions with closed forms in the discrete scheme.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::fem::effect::{KINETIC, VISCOPLASTIC};
 use clarke::{
     mesh::{

@@ -1,8 +1,8 @@
 //! Uniaxial viscoplastic creep, with and without damage, against the recursion (24)-(25) for one homogeneous cell, with separate
 //! projections.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     mesh::{
         GlobalMesh,

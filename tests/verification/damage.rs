@@ -1,8 +1,8 @@
 //! Damage against closed forms: a body fixed on all sides keeps its strain, so that the damage of each cell obeys an ordinary
 //! differential equation.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::fem::effect::{DAMAGE, ELASTIC, WORK};
 use clarke::{linear_algebra::tensor::larger, mesh::GlobalMesh, parallel::session::Session, run::Simulation};
 

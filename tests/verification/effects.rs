@@ -1,7 +1,7 @@
 //! An effect is called in its own phases only, and only fields that an effect needs are gathered.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
     fem::{
         body::Body,

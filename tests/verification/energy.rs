@@ -1,7 +1,7 @@
 //! In every step of random jobs, the energy balance holds and contact points lie on the graph of their law.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, noise, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, noise, simulation};
 use clarke::fem::effect::{CONTACT, DAMAGE, DEBONDING, ELASTIC, VISCOPLASTIC, VISCOUS, WORK};
 use clarke::{
     fem::resultants::{Resultants, Source},
@@ -281,7 +281,7 @@ fn balanced<const D: usize, const S: usize>(
 ) -> (Totals, String) {
     let text = job::<D>(number, hypothesis, scheme);
     let mut run = simulation::<D, S>(session, &text, mesh);
-    let supports = crate::scenes::supports(&text);
+    let supports = super::scenes::supports(&text);
     let mut resultants = Resultants::new(session, &run.body, &run.state, &supports).expect("resultants");
     let mut steps = 0;
     while let Some(outcome) = run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")) {

@@ -1,7 +1,7 @@
 //! Step bounds of explicit flow: for power laws, whose relaxation rate is unbounded, and for flow together with elastic stress.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, noise, set_nodal, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, noise, set_nodal, simulation};
 use clarke::{
     mesh::generate::{Diagonal, rectangle},
     parallel::{agreement::Agreed, session::Session},

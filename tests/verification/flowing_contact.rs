@@ -1,8 +1,8 @@
 //! Steps with contact in which cells flow: corrections on the contact alone, Newton's method on the body where they are slow, and
 //! multigrid find the same motion.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     fem::effect::VISCOPLASTIC,
     mesh::{

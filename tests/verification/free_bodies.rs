@@ -1,7 +1,7 @@
 //! Bodies in free motion: whatever the scheme, the order of the cells and the mass of boundaries, they fall, fly and spin rigidly, and
 //! their momenta change as the resultants of the loads say.
 
-use crate::{
+use super::{
     run_on,
     scenes::{any_mesh, brick, crossed, noise, simulation, stir},
 };

@@ -1,8 +1,8 @@
 //! Nodes of contacts that supports hold or several boundaries share: halves and quarters of bodies with curved boundaries against the
 //! whole bodies, and edges of any angle.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::{
     linear_algebra::tensor::{Vector, larger, norm},
     mesh::{Boundary, GlobalMesh},

@@ -1,8 +1,8 @@
 //! Blocks whose rigid motions are prevented by contact and friction only: quasistatic blocks under loads with uniform stress, and a
 //! block with negligible inertia.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     error::Exit,
     job::Job,

@@ -1,7 +1,7 @@
 //! The distance of the solution of a step to the contact graphs does not depend on the solution method.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, noise, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, noise, simulation};
 use clarke::fem::effect::ELASTIC;
 use clarke::{
     mesh::generate::{Diagonal, rectangle},

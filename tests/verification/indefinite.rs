@@ -1,8 +1,8 @@
 //! A contact law whose decrease exceeds the resistance of a step: CG encounters negative curvature and GMRES solves the system. The
 //! test is a block with known velocities.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     mesh::{
         GlobalMesh,

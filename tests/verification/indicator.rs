@@ -1,10 +1,10 @@
 //! The error indicator: zero for uniform stress, by hand on two cells, against sums over the whole mesh on any number of ranks, and
 //! against the true error of a manufactured solution.
 
-use crate::manufactured::{self, VISCOSITY, elasticity, motion, rule};
-use crate::quadratic::of_second_order;
-use crate::run_on;
-use crate::scenes::{brick, crossed, noise, simulation, stir};
+use super::manufactured::{self, VISCOSITY, elasticity, motion, rule};
+use super::quadratic::of_second_order;
+use super::run_on;
+use super::scenes::{brick, crossed, noise, simulation, stir};
 use clarke::{
     fem::space::cell_rule,
     io::output::error_indicator::{ErrorIndicator, Indicated},

@@ -1,7 +1,7 @@
 //! The Jacobian of a contact step is the derivative of its residual.
 
-use crate::run_on;
-use crate::scenes::{body, brick, crossed, noise, set_nodal};
+use super::run_on;
+use super::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     fem::effect::{
         Blend, Contact, ContactConditions, Effect, Freedom, Inertia, LoadedObstacle, Quadrature, Step,

@@ -1,7 +1,7 @@
 //! The energies of a run have the order of its scheme; `midpoint` conserves that of bodies, elastic foundations and obstacles.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, crossed, simulation};
 use clarke::fem::effect::{
     CONTACT, DAMAGE, ELASTIC, ENERGIES, EnergyKind, KINETIC, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
     OBSTACLE_WORK, Role, STORED_IN_CONTACT, VISCOPLASTIC, VISCOUS, WORK,

@@ -1,7 +1,7 @@
 //! Steps across limit loads, behind which the nearest equilibrium is far away: with any length of steps they end at the same states.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     fem::effect::{CONTACT, DEBONDING, ELASTIC, NUMERICAL, STORED_IN_BONDS, WORK},
     io::output::history::Totals,

@@ -1,9 +1,9 @@
 //! Manufactured solutions. The loads of a known smooth motion are written as expressions; the solver must find
 //! that motion, at the orders of P1 elements and of the scheme.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation, stir};
-use crate::wave::{Field, Wave};
+use super::run_on;
+use super::scenes::{any_mesh, simulation, stir};
+use super::wave::{Field, Wave};
 use clarke::fem::effect::VISCOPLASTIC;
 use clarke::{
     mesh::{

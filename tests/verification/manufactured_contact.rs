@@ -1,9 +1,9 @@
 //! For each effect and scheme the manufactured motion with stress that relaxes, on springs and dampers, sliding
 //! with friction; in the plane and in space.
 
-use crate::manufactured::{Case, Touch, assert_orders, job_of, measured};
-use crate::run_on;
-use crate::scenes::stir;
+use super::manufactured::{Case, Touch, assert_orders, job_of, measured};
+use super::run_on;
+use super::scenes::stir;
 use clarke::{
     mesh::generate::{Diagonal, box_mesh, rectangle},
     parallel::session::Session,

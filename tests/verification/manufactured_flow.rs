@@ -2,9 +2,9 @@
 //! the stress is not. A separate implementation of the flow law is integrated along this strain; polynomials through its stresses
 //! define the loads. The solver must find the stresses at first order.
 
-use crate::manufactured::{VISCOSITY, elasticity, rule};
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation, stir};
+use super::manufactured::{VISCOSITY, elasticity, rule};
+use super::run_on;
+use super::scenes::{any_mesh, simulation, stir};
 use clarke::fem::effect::VISCOPLASTIC;
 use clarke::{
     mesh::{

@@ -1,7 +1,7 @@
 //! Contact memory against a point mass on a foundation, computed here by summation over the whole history in every step.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::fem::effect::CONTACT;
 use clarke::{
     job::Job, linear_algebra::tensor::larger, mesh::GlobalMesh, parallel::session::Session, run::Simulation,

@@ -1,8 +1,8 @@
 //! The energy balance contains the work of moving obstacles; contacts with different laws meet at edges; PETSc's solver for
 //! variational inequalities finds the same solutions of unilateral contact.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::fem::effect::{CONTACT, ELASTIC, VISCOUS, WORK};
 use clarke::{
     linear_algebra::tensor::larger,

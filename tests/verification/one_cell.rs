@@ -1,7 +1,7 @@
 //! One cell with one contact facet: nodal forces computed by hand, for quadrature at nodes and at Gauss points.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, part};
+use super::run_on;
+use super::scenes::{any_mesh, part};
 use clarke::{
     fem::{
         effect::{Contact, ContactConditions, Quadrature, choose_unknowns},

@@ -1,10 +1,10 @@
 //! Effects for which no motion can be prescribed: the order of convergence in the step of each effect with each of its schemes,
 //! from the differences of runs with halved steps.
 
-use crate::manufactured::{Case, Touch, job_of};
-use crate::run_on;
-use crate::scenes::simulation;
-use crate::schemes::{judged, observed};
+use super::manufactured::{Case, Touch, job_of};
+use super::run_on;
+use super::scenes::simulation;
+use super::schemes::{judged, observed};
 use clarke::fem::effect::{CONTACT, DAMAGE, DEBONDING, VISCOPLASTIC};
 use clarke::{
     io::output::history::Totals,

@@ -1,7 +1,7 @@
 //! Fields that the elements can represent are reproduced exactly on irregular meshes.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, simulation, stir};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, simulation, stir};
 use clarke::{linear_algebra::tensor::larger, mesh::GlobalMesh, parallel::session::Session, run::Simulation};
 
 const LOAD: f64 = 3.0;

@@ -1,6 +1,7 @@
 //! The safe handles around PETSc behave as documented.
 
-use crate::{mpirun, run_on, test_of};
+use super::{run_on, test_of};
+use crate::mpirun;
 use clarke::{
     error::Exit,
     linear_algebra::petsc::{

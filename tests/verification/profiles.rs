@@ -1,7 +1,7 @@
 //! Stress and traction in `profiles.csv` on oblique boundaries with facets of unequal size.
 
-use crate::run_on;
-use crate::scenes::{body, brick, crossed, noise, set_nodal};
+use super::run_on;
+use super::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     fem::effect::{Contact, ContactConditions, Effect, Inertia, Quadrature},
     io::output::profiles::Profiles,

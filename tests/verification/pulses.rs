@@ -1,7 +1,7 @@
 //! Steps resolve the changes of loads and obstacles within them, and end at the times given in the job.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     mesh::generate::{Diagonal, rectangle},
     parallel::session::Session,

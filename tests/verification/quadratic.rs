@@ -1,9 +1,9 @@
 //! Quadratic cells: orders of manufactured solutions, bars that linear cells lock, and the same results on any number of ranks.
 
-use crate::manufactured::{Case, Touch, elasticity, job_of, motion, rule};
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation, stir};
-use crate::wave::Field;
+use super::manufactured::{Case, Touch, elasticity, job_of, motion, rule};
+use super::run_on;
+use super::scenes::{any_mesh, simulation, stir};
+use super::wave::Field;
 use clarke::{
     fem::space::{cell_rule, linear_at, values},
     mesh::{
@@ -64,7 +64,7 @@ fn errors<const D: usize, const S: usize>(
             }
         }
     }
-    let parts = [(elasticity(hypothesis), at_end), (crate::manufactured::VISCOSITY, rate)];
+    let parts = [(elasticity(hypothesis), at_end), (super::manufactured::VISCOSITY, rate)];
     run.body
         .visit_stress(&run.state, |batch| {
             let shares = values(D + 1, &cell_rule::<D>()[batch.point].0);

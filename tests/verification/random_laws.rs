@@ -1,8 +1,8 @@
 //! All steps with random contact laws and random loads are solved if they have one solution.
 
+use super::run_on;
+use super::scenes::{noise, simulation};
 use crate::mpirun::scramble;
-use crate::run_on;
-use crate::scenes::{noise, simulation};
 use clarke::{
     mesh::generate::{Diagonal, rectangle},
     parallel::session::Session,

@@ -7,7 +7,8 @@
 mod drawn;
 mod invariants;
 
-use crate::{World, mpirun, test_of};
+use super::{World, test_of};
+use crate::mpirun;
 
 /// Jobs of `make test`; `CLARKE_RANDOM_SCENES=5000`, or `=17..18`, tries others.
 const JOBS: u64 = 60;
@@ -25,8 +26,8 @@ fn chosen() -> std::ops::Range<u64> {
 
 /// The scenario of the jobs whose numbers follow the name of the test.
 fn scenario(world: &World) {
-    let words = std::env::var(mpirun::SCENARIO).expect("a scenario");
-    let numbers: Vec<u64> = words.split(' ').skip(1).map(|text| text.parse().expect("a number")).collect();
+    let words = mpirun::words();
+    let numbers: Vec<u64> = words.split(' ').map(|text| text.parse().expect("a number")).collect();
     invariants::hold(&world.session, numbers[0]..numbers[1], &world.folder);
 }
 

@@ -1,8 +1,8 @@
 //! Rejected steps leave the state, the histories and the data of the surface bitwise unchanged.
 
-use crate::orders::{Acting, EFFECTS, END, SCHEMES};
-use crate::run_on;
-use crate::scenes::simulation;
+use super::orders::{Acting, EFFECTS, END, SCHEMES};
+use super::run_on;
+use super::scenes::simulation;
 use clarke::{
     fem::effect::Step,
     mesh::generate::{Diagonal, rectangle},

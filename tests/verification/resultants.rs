@@ -1,6 +1,6 @@
 //! Resultants of scenes whose forces, pressures and areas are known.
 
-use crate::{
+use super::{
     run_on,
     scenes::{any_mesh, brick, crossed, simulation, supports},
 };

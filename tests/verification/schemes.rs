@@ -1,8 +1,8 @@
 //! The implicit schemes, by their orders and by motions with closed forms.
 
-use crate::manufactured::job;
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::manufactured::job;
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     fem::effect::{Form, Step},
     job::Job,

@@ -1,8 +1,8 @@
 //! Damage, bonds and memory at the end of implicit steps: the derivatives of their forces, and limits with values known by hand.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, crossed, simulation};
-use crate::unloading::tangent;
+use super::run_on;
+use super::scenes::{any_mesh, crossed, simulation};
+use super::unloading::tangent;
 use clarke::fem::effect::{CONTACT, DAMAGE, DEBONDING, VISCOPLASTIC};
 use clarke::{io::output::history::Totals, parallel::session::Session, run::Simulation};
 

@@ -1,7 +1,7 @@
 //! A preconditioner that is built for the subspace of a solve.
 
-use crate::run_on;
-use crate::scenes::{body, brick, crossed, noise, set_nodal};
+use super::run_on;
+use super::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     error::Result,
     fem::effect::{Effect, Inertia, ViscousStress},

@@ -1,7 +1,7 @@
 //! Supports that move and give way, in any direction.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation, supports};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, set_nodal, simulation, supports};
 use clarke::{
     fem::{
         effect::WORK,

@@ -1,8 +1,8 @@
 //! Adaptive steps: the error of a run decreases with the tolerance, also if nothing moves and only stress, damage, bonds or memory
 //! change. The tests use closed forms for bodies with uniform strain.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, simulation};
 use clarke::{
     linear_algebra::tensor::von_mises,
     mesh::generate::{Diagonal, rectangle},

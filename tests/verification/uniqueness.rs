@@ -1,8 +1,8 @@
 //! Certificates of a step against dense generalised eigenvalue problems. The contact matrices are the derivatives that the solver
 //! uses, at nodes and at Gauss points.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
+use super::run_on;
+use super::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
 use clarke::{
     fem::{
         body::Body,
@@ -96,7 +96,7 @@ fn dense<const D: usize, const S: usize>(
         for (at, value) in values.iter().enumerate() {
             mine[body.mesh.node_ids[at / D] as usize * D + at % D] = *value;
         }
-        crate::scenes::sum(session, &mine)
+        super::scenes::sum(session, &mine)
     };
     let free: Vec<f64> =
         body.held.flags()[..body.mesh.owned * D].iter().map(|fixed| f64::from(u8::from(!fixed))).collect();

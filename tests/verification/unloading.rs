@@ -1,7 +1,7 @@
 //! With the formula of second order, flow ends where the stress leaves the yield surface.
 
-use crate::run_on;
-use crate::scenes::{any_mesh, crossed, noise, set_nodal, simulation, sum};
+use super::run_on;
+use super::scenes::{any_mesh, crossed, noise, set_nodal, simulation, sum};
 use clarke::fem::effect::VISCOPLASTIC;
 use clarke::{
     fem::effect::Tangents,

@@ -1,6 +1,6 @@
 //! Scenes drawn at random.
 
-use crate::scenes::{noise, stir};
+use crate::verification::scenes::{noise, stir};
 use clarke::mesh::{
     GlobalMesh,
     generate::{Diagonal, box_mesh, rectangle},

@@ -3,46 +3,31 @@
 //! `make test` tries a sample of each, `make hard` many more (`CLARKE_HARD=1`); docs/stability.md has the counts.
 
 mod agreements;
-#[path = "../runs/case.rs"]
-#[allow(dead_code)]
-mod case;
 mod damage;
 mod disks;
 mod enormous;
 mod folders;
-#[path = "../runs/hdf5_file.rs"]
-#[allow(dead_code)]
-mod hdf5_file;
 mod kills;
-#[path = "../runs/launch.rs"]
-#[allow(dead_code)]
-mod launch;
 mod limits;
 mod matrix;
-#[path = "../mpirun/mod.rs"]
-#[allow(dead_code)]
-mod mpirun;
 mod one_rank;
-#[path = "../runs/results.rs"]
-#[allow(dead_code)]
-mod results;
 mod undisturbed;
+
+use crate::mpirun;
+
+/// The test that others start under `mpirun`.
+const SCENARIO: &str = "faults::scenario";
 
 /// The part of the tests that runs under `mpirun`.
 #[test]
 #[ignore = "started by the other tests, under mpirun"]
 fn scenario() {
-    let name = std::env::var(mpirun::SCENARIO).expect("a scenario");
-    if name.starts_with("restart_") {
-        let folder = std::env::var(mpirun::FOLDER).expect("a folder");
-        return matrix::scenario(&name, folder.as_ref());
+    let (words, folder) = (mpirun::words(), mpirun::folder().expect("a folder"));
+    match words.split_once(' ').expect("a kind of scenario") {
+        ("restart", what) => matrix::scenario(what, &folder),
+        ("agreements", what) => agreements::scenario(what, &folder),
+        (_, what) => std::process::exit(i32::from(one_rank::fail(what) as u8)),
     }
-    if let Some(words) = name.strip_prefix(agreements::SCENARIO) {
-        let folder = std::env::var(mpirun::FOLDER).expect("a folder");
-        return agreements::scenario(words, folder.as_ref());
-    }
-    let exit = one_rank::fail(name.trim_start_matches("one_rank "));
-    std::process::exit(i32::from(exit as u8));
 }
 
 /// Number of cases: a sample, or many in `make hard`.

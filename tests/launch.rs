@@ -1,5 +1,6 @@
 //! The solver under `mpirun` with a time limit: a run that hangs is ended with all its processes, and the test fails.
 
+use crate::cores;
 use std::{
     io::Read,
     os::unix::process::ExitStatusExt,
@@ -18,7 +19,6 @@ fn guard() -> Duration {
     Duration::from_secs(if std::env::var_os("CLARKE_HARD").is_some() { 3000 } else { 120 })
 }
 /// Time after which an `mpirun` whose ranks have ended is ended.
-#[allow(dead_code)]
 const DESERTED: Duration = Duration::from_secs(20);
 /// Time for which processes may outlive their `mpirun`.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -65,9 +65,9 @@ pub fn unwrapped(text: &str) -> String {
     lines.join("\n")
 }
 
-/// Runs the solver on this many ranks to its end.
+/// Runs the solver on this many ranks to its end. One rank is started without `mpirun`, which would take longer than many a run.
 pub fn run<A: AsRef<std::ffi::OsStr>>(ranks: usize, arguments: &[A]) -> Outcome {
-    Running::start(ranks, arguments).wait()
+    if ranks == 1 { run_alone(arguments) } else { Running::start(ranks, arguments).wait() }
 }
 
 /// Runs the solver without `mpirun`.
@@ -119,8 +119,8 @@ pub enum Target {
 
 /// A run in progress.
 pub struct Running {
-    /// The folder of Open MPI: launchers that share one compete in creating and removing it.
-    _own: tempfile::TempDir,
+    /// The folder of Open MPI.
+    _folder: tempfile::TempDir,
     launcher: Child,
     mark: String,
     began: Instant,
@@ -140,19 +140,13 @@ impl Running {
     pub fn spawn(mut command: Command) -> Self {
         static NUMBER: AtomicUsize = AtomicUsize::new(0);
         let mark = format!("{}.{}.", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
-        let own = tempfile::tempdir().expect("folder");
-        command.env("OMPI_MCA_orte_tmpdir_base", own.path());
-        command.env(MARK, &mark).env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
-        // Tests share the cores: waiting ranks yield.
-        command.env("OMPI_MCA_mpi_yield_when_idle", "1");
-        if is_root() {
-            command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-        }
+        let folder = cores::share(&mut command);
+        command.env(MARK, &mark);
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut launcher = command.spawn().expect("mpirun starts");
         let stdout = Collected::from(launcher.stdout.take().expect("stdout"));
         let stderr = Collected::from(launcher.stderr.take().expect("stderr"));
-        Self { _own: own, launcher, mark, began: Instant::now(), stdout, stderr }
+        Self { _folder: folder, launcher, mark, began: Instant::now(), stdout, stderr }
     }
 
     /// Waits until this text is in the output of the run.
@@ -180,14 +174,12 @@ impl Running {
     }
 
     /// Whether the run has not ended; for the tests of faults.
-    #[allow(dead_code)]
     pub fn is_running(&mut self) -> bool {
         self.launcher.try_wait().is_ok_and(|ended| ended.is_none())
     }
 
     /// Waits for the end, but ends an `mpirun` that remains after its ranks have ended, and returns whether this was necessary:
     /// after a kill, Open MPI 4.1 occasionally hangs during its shutdown.
-    #[allow(dead_code)]
     pub fn end_launcher_without_ranks(&mut self) -> bool {
         let mut deserted = Instant::now();
         while self.is_running() {
@@ -276,9 +268,4 @@ fn runs_solver(process: u32) -> bool {
 
 fn process_file(process: u32, name: &str) -> PathBuf {
     PathBuf::from(format!("/proc/{process}/{name}"))
-}
-
-/// Whether the user is the superuser, for whom Open MPI needs two additional options.
-fn is_root() -> bool {
-    std::os::unix::fs::MetadataExt::uid(&std::fs::metadata("/proc/self").expect("/proc/self")) == 0
 }

@@ -1,11 +1,6 @@
 //! Studies: refusals of the study file, and complete studies under `mpirun`.
 
-#[path = "../runs/browser.rs"]
-mod browser;
 mod corners;
-#[path = "../runs/launch.rs"]
-#[allow(dead_code)]
-mod launch;
 mod refusals;
 mod resume;
 mod results;

@@ -3,8 +3,5 @@
 
 mod command_line;
 mod jobs;
-#[path = "../runs/launch.rs"]
-#[allow(dead_code)]
-mod launch;
 mod meshes;
 mod refusal;

@@ -2,8 +2,6 @@
 
 mod adaptive;
 mod batch;
-mod browser;
-mod case;
 mod certificates;
 mod compression;
 mod check_values;
@@ -13,11 +11,9 @@ mod example;
 mod failures;
 mod friction;
 mod graded;
-mod hdf5_file;
 mod indicator;
 mod iterations;
 mod landings;
-mod launch;
 mod materials;
 mod obstacles;
 mod outputs;
@@ -29,7 +25,6 @@ mod readers;
 mod regions;
 mod report;
 mod restart;
-mod results;
 mod schemes;
 mod signals;
 mod stages;

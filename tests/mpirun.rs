@@ -1,10 +1,21 @@
-//! Starts scenarios: words for the test `scenario` of this program, or a test with its path, and words for it.
+//! Starts scenarios: a test of this program by its path, and words for it.
 
-use std::path::Path;
+use crate::cores;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-pub const SCENARIO: &str = "CLARKE_TEST_SCENARIO";
-pub const FOLDER: &str = "CLARKE_TEST_FOLDER";
+const WORDS: &str = "CLARKE_TEST_SCENARIO";
+const FOLDER: &str = "CLARKE_TEST_FOLDER";
+
+/// The words for the test that was started under `mpirun`.
+pub fn words() -> String {
+    std::env::var(WORDS).expect("a scenario")
+}
+
+/// The folder of the test that was started under `mpirun`; none where it has still to be started.
+pub fn folder() -> Option<PathBuf> {
+    std::env::var_os(FOLDER).map(PathBuf::from)
+}
 
 pub fn run(ranks: usize, scenario: &str, folder: &Path) {
     let output = start(ranks, scenario, folder);
@@ -17,21 +28,15 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
 }
 
 pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
-    let test = scenario.split(' ').next().filter(|test| test.contains("::")).unwrap_or("scenario");
-    // Launchers that share this folder compete in creating and removing it.
-    let own = tempfile::tempdir().expect("folder");
-    Command::new("mpirun")
-        .env("OMPI_MCA_orte_tmpdir_base", own.path())
+    let (test, words) = scenario.split_once(' ').unwrap_or((scenario, ""));
+    let mut launcher = Command::new("mpirun");
+    let _folder = cores::share(&mut launcher);
+    launcher
         .args(["--oversubscribe", "--bind-to", "none", "--timeout", "300", "-n", &ranks.to_string()])
         .arg(std::env::current_exe().expect("this program"))
         .args(["--include-ignored", "--exact", test, "--nocapture", "--test-threads", "1"])
-        .env(SCENARIO, scenario)
+        .env(WORDS, words)
         .env(FOLDER, folder)
-        .env("OMP_NUM_THREADS", "1")
-        // Tests share the cores: waiting ranks yield.
-        .env("OMPI_MCA_mpi_yield_when_idle", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
         .output()
         .expect("mpirun")
 }

@@ -31,8 +31,6 @@ mod manufactured_contact;
 mod manufactured_flow;
 mod memory;
 mod midsides;
-#[path = "../mpirun/mod.rs"]
-mod mpirun;
 mod obstacles;
 mod one_cell;
 mod orders;
@@ -55,33 +53,34 @@ mod uniqueness;
 mod unloading;
 mod wave;
 
+use crate::mpirun;
 use clarke::parallel::session::{Mpi, Session};
 use std::path::PathBuf;
 
 /// What a scenario runs with under `mpirun`.
-struct World {
-    session: Session,
+pub struct World {
+    pub session: Session,
     /// The folder of the test.
-    folder: PathBuf,
+    pub folder: PathBuf,
     // Dropped after the session.
     mpi: Mpi,
 }
 
 /// The name of the test that calls this with a closure. Under `mpirun`, where this test was started again, it runs the closure instead.
 fn test_of<F: FnOnce(World)>(scenario: F) -> Option<&'static str> {
-    let Some(folder) = std::env::var_os(mpirun::FOLDER) else {
+    let Some(folder) = mpirun::folder() else {
         let closure = std::any::type_name::<F>();
         let test = closure.split_once("::").and_then(|(_, path)| path.split_once("::{{closure}}"));
         return Some(test.expect("a closure of a test").0);
     };
     let mpi = Mpi::start().expect("MPI");
     let session = mpi.session().expect("PETSc");
-    scenario(World { session, folder: folder.into(), mpi });
+    scenario(World { session, folder, mpi });
     None
 }
 
 /// Runs the scenario of a test on each of these numbers of ranks, with one folder for all of them.
-fn run_on(ranks: &[usize], scenario: impl FnOnce(World)) {
+pub fn run_on(ranks: &[usize], scenario: impl FnOnce(World)) {
     let Some(test) = test_of(scenario) else { return };
     let folder = tempfile::tempdir().expect("folder");
     for &ranks in ranks {

@@ -3,19 +3,26 @@
 
 mod checkpoints;
 mod fields;
-#[path = "../mpirun/mod.rs"]
-mod mpirun;
 mod rows;
 
+use crate::mpirun;
 use mpi::Threading;
 use mpi::traits::Communicator;
+use std::path::Path;
+
+/// The test that others start under `mpirun`.
+const SCENARIO: &str = "parallel_files::scenario";
+
+/// Runs a scenario on some ranks.
+fn run(ranks: usize, scenario: &str, folder: &Path) {
+    mpirun::run(ranks, &format!("{SCENARIO} {scenario}"), folder);
+}
 
 /// The part of the tests that runs under `mpirun`.
 #[test]
 #[ignore = "started by the other tests, under mpirun"]
 fn scenario() {
-    let name = std::env::var(mpirun::SCENARIO).expect("a scenario");
-    let folder = std::path::PathBuf::from(std::env::var(mpirun::FOLDER).expect("a folder"));
+    let (name, folder) = (mpirun::words(), mpirun::folder().expect("a folder"));
     let (universe, _) = mpi::initialize_with_threading(Threading::Funneled).expect("MPI");
     let world = universe.world();
     std::panic::set_hook(Box::new({

@@ -4,22 +4,13 @@
 //! print the measured numbers.
 
 mod bounds;
-#[path = "../runs/case.rs"]
-#[allow(dead_code)]
-mod case;
 mod flow;
 mod impact;
 mod incompressible;
 mod jumps;
-#[path = "../runs/launch.rs"]
-#[allow(dead_code)]
-mod launch;
 mod loads;
 mod long;
 mod meshes;
-#[path = "../runs/results.rs"]
-#[allow(dead_code)]
-mod results;
 mod theta;
 mod units;
 mod vanishing;

@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Every test, beside random input for the readers of files; then the slowest tests, and the summaries of all tests.
+#
+#   scripts/test.sh [--write]        --write puts the slowest tests into docs/tests.md
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+logs=${CARGO_TARGET_DIR:-target}/tmp
+mkdir -p "$logs"
+
+fuzz/run.sh 20 >"$logs/random-input.log" 2>&1 &
+random_input=$!
+
+# One test more than there are cores: launchers wait a third of their time.
+export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$(($(nproc) + 1))}
+failed=0
+{
+    # What each test takes is told by an unstable option of libtest, which this variable allows.
+    cargo --config "target.'cfg(all())'.runner = ['env', 'RUSTC_BOOTSTRAP=1']" \
+        test --release --locked --lib --test all -- -Zunstable-options --report-time &&
+        cargo test --release --locked --doc
+} 2>&1 | tee "$logs/tests.log" || failed=1
+wait "$random_input" || failed=1
+echo 'Random input:'
+cat "$logs/random-input.log"
+
+slowest() {
+    sed -nE 's/^test (.*) \.\.\. ok <([0-9.]+)s>$/\2 \1/p' "$logs/tests.log" | sort -rn | sed -n 1,20p
+}
+echo 'The slowest tests, in seconds:'
+slowest
+
+if [[ ${1:-} == --write ]]; then
+    page=docs/tests.md
+    machine="$(nproc) cores of $(sed -n '/^model name/{s/.*: //p;q}' /proc/cpuinfo)"
+    {
+        sed '/^<!-- table slowest -->$/q' $page
+        printf '`make test ARGS=--write` on %s, %s:\n\n| test | s |\n|---|---|\n' "$machine" "$(date --utc +%F)"
+        slowest | while read -r seconds name; do printf '| %s | %s |\n' "$name" "$seconds"; done
+        printf '\n'
+        sed -n '/^<!-- end of table slowest -->$/,$p' $page
+    } >"$logs/tests.md"
+    mv "$logs/tests.md" $page
+fi
+grep '^test result' "$logs/tests.log"
+exit $failed
