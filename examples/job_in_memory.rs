@@ -15,6 +15,7 @@ use std::path::Path;
 
 const JOB: &str = include_str!("../jobs/papers/wang_cheng_2022.toml");
 
+/// Runs the job; `tests/runs/example.rs` calls this, too.
 pub fn main() -> Result<(), Error> {
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
