@@ -282,7 +282,7 @@ fn turn(session: &Session, mesh: &GlobalMesh<2>, cells: usize, order: usize) -> 
 }
 
 /// A square that hits a wall with one side rebounds without rotation, exactly so on a symmetric mesh; on others the rotation is an error of
-/// the mesh, at least of the second order.
+/// the mesh, about of second order.
 fn square_rebounds_straight(session: &Session) {
     let square = |cells, diagonal| rectangle([1.0, 1.0], [cells; 2], diagonal, [1.0, 1.0]).expect("mesh");
     for (order, most) in [(1, [0.022, 0.0065]), (2, [0.022, 0.0065])] {
