@@ -153,8 +153,10 @@ fn bars_without_inertia_at_the_bottom_bounce_without_loss() {
             lost <= accepted[0] * impact && gained <= accepted[1] * impact,
             "{what}: {lost} J lost, {gained} J gained"
         );
+        // In space the nodes at the ends of the diagonals have three times the mass of the others.
+        let largest = if dimension == 2 { 1.6 } else { 1.65 };
         assert!(
-            first <= 300.0 && most < 1.65,
+            first <= 300.0 && most < largest,
             "{what}: {first} Pa at first, at most {most} of the exact one"
         );
     }

@@ -3,6 +3,7 @@
 use crate::{
     case::Case,
     launch::{self, Outcome},
+    results::assert_same_answer,
 };
 
 /// A clamped elastic block without mass, 2 m x 0.5 m, under this obstacle.
@@ -136,20 +137,151 @@ fn nodes_that_a_support_holds_inside_of_an_obstacle_are_warned_of() {
     );
 }
 
-#[test]
-fn a_force_that_presses_a_constraint_beyond_held_nodes_fails_and_its_remedies_work() {
-    let case = || {
-        under("{plane = {point = [0, 0.5], normal = [0, -1]}}")
-            .set("support", "[{on = ['left'], fix = 'all'}, {on = ['bottom'], fix = ['y']}]")
-            .set("contact.0.obstacle_load", "{direction = [0, -1], force = '1e3*t'}")
-    };
-    for ranks in [1, 2, 3] {
-        let outcome = case().run_with(ranks, &["--force"]).expect(1);
-        outcome.says("where a support holds the normal").says("key `where`");
+/// A clamped corner under an obstacle that a force presses down: at all times the resultant balances the force, no node is beyond the
+/// obstacle, and none is pulled. `force` is that at a time.
+fn assert_stopped(case: &Case, ranks: usize, force: impl Fn(f64) -> f64) {
+    case.run(ranks);
+    let results = case.results();
+    let contact = results.table("resultants.csv").only("source", "contact top");
+    let last = contact.columns.iter().rfind(|name| name.starts_with("force_")).expect("a force").clone();
+    for (time, found) in contact.numbers("time").into_iter().zip(contact.numbers(&last)) {
+        let right = -force(time);
+        assert!((found - right).abs() <= 1e-6 * right.abs(), "{found} N at {time} s, not {right}");
     }
-    case().set("support.0.fix", "['x']").run(1);
-    case().set("contact.0.where", "'x > 0.04'").run(1);
-    case().set("contact.0.normal", "{compliance = {stiffness = 1e6, exponent = 1.0}}").run(2);
+    let top = results.table("profiles.csv");
+    for (gap, pressure) in top.numbers("gap").into_iter().zip(top.numbers("contact_pressure")) {
+        assert!(gap >= -1e-9 && pressure >= 0.0, "gap {gap} m, pressure {pressure} Pa");
+        assert!(gap.abs() <= 1e-9 || pressure == 0.0, "gap {gap} m, pressure {pressure} Pa");
+    }
+    let imbalance = results.number("max_energy_imbalance");
+    assert!(imbalance < 1e-9, "{imbalance}");
+}
+
+/// The force that rises while the block swells, lifts the obstacle off the corner, and is pressed back.
+const LIFTED: &str = "[{value = [0, '4000*min(1, 20*t)']}]";
+const CORNER: &str = "[{on = ['left'], fix = 'all'}, {on = ['bottom'], fix = ['y']}]";
+
+#[test]
+fn a_plane_that_a_force_moves_stops_at_a_clamped_corner() {
+    let rigid = |case: Case| {
+        case.set("support", CORNER)
+            .set("contact.0.obstacle_load", "{direction = [0, -1], force = '100 + 4e3*t'}")
+    };
+    for (scheme, above, ranks) in
+        [("implicit_euler", 0.5, 1), ("implicit_euler", 0.51, 2), ("bdf2", 0.51, 1), ("bdf2", 0.5, 2)]
+    {
+        let plane = format!("{{plane = {{point = [0, {above}], normal = [0, -1]}}}}");
+        let case = rigid(under(&plane)).set("time.scheme", &format!("'{scheme}'"));
+        assert_stopped(&case, ranks, |time| 100.0 + 4e3 * time);
+        // Nothing lifts the plane: it rests on the corner, and the block stays as it is.
+        let results = case.results();
+        let moved =
+            results.table("resultants.csv").only("source", "contact top").last("obstacle_displacement");
+        assert!((moved - (above - 0.5)).abs() < 1e-9, "{moved} m");
+        let support = results.table("resultants.csv").only("source", "support left").last("force_y");
+        assert!(support > 0.0, "the support of the corner takes a part of 4100 N: {support} N");
+
+        let lifted = case.set("body_force", LIFTED);
+        assert_stopped(&lifted, ranks, |time| 100.0 + 4e3 * time);
+        let results = lifted.results();
+        let contact = results.table("resultants.csv").only("source", "contact top");
+        let moved = contact.numbers("obstacle_displacement");
+        let lowest = moved.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(lowest < above - 0.5 - 1e-3, "{scheme}: lifted by {moved:?}");
+        assert!((moved[moved.len() - 1] - (above - 0.5)).abs() < 1e-9, "{scheme}: back {moved:?}");
+    }
+    let plane = "{plane = {point = [0, 0.5], normal = [0, -1]}}";
+    let massive = |scheme: &str| {
+        rigid(Case::of("pressing_disc"))
+            .set("contact.0.obstacle", plane)
+            .set("output", "{folder = 'out', profile = [{on = 'top'}]}")
+            .set("body_force", LIFTED)
+            .set("time", &format!("{{end = 0.5, step = 0.005, scheme = '{scheme}'}}"))
+    };
+    for (scheme, ranks) in [("lagged_euler", 1), ("implicit_euler", 2), ("bdf2", 1), ("midpoint", 2)] {
+        let redistributes = if scheme == "midpoint" { "true" } else { "false" };
+        let case = massive(scheme).set("contact.0.redistribute_mass", redistributes);
+        assert_stopped(&case, ranks, |time| 100.0 + 4e3 * time);
+    }
+}
+
+#[test]
+fn a_run_that_starts_again_while_held_nodes_stop_its_obstacle_continues_alike() {
+    // The plane leaves the corner at 0.525 s.
+    let case = |name: &str, end: &str| {
+        under("{plane = {point = [0, 0.5], normal = [0, -1]}}")
+            .set("support", CORNER)
+            .set("contact.0.obstacle_load", "{direction = [0, -1], force = '4100 - 4e3*t'}")
+            .set("body_force", LIFTED)
+            .set("checkpoint", "{every = 10}")
+            .set("output.probe", "[{name = 'middle', point = [1, 0.5]}]")
+            .set("time.scheme", &format!("'{name}'"))
+            .set("time.end", end)
+    };
+    for scheme in ["implicit_euler", "bdf2"] {
+        let whole = case(scheme, "1.0");
+        whole.run(2);
+        let parts = case(scheme, "0.5");
+        parts.run(1);
+        let parts = parts.set("time.end", "1.0");
+        parts.run_with(2, &["--restart"]).expect(0);
+        assert_same_answer(&parts.results(), &whole.results(), 1e-9, scheme);
+        assert!(parts.results().number("max_energy_imbalance") < 1e-9, "{scheme}");
+    }
+}
+
+#[test]
+fn a_disc_and_a_ball_that_forces_move_stop_at_held_nodes() {
+    for (scheme, ranks) in [("implicit_euler", 1), ("bdf2", 2)] {
+        let case = under("{sphere = {centre = [0.02, 0.81], radius = 0.3}}")
+            .set("support", CORNER)
+            .set("contact.0.obstacle_load", "{direction = [0, -1], force = '1e3*t'}")
+            .set("time.scheme", &format!("'{scheme}'"));
+        assert_stopped(&case, ranks, |time| 1e3 * time);
+    }
+    let case = || {
+        Case::cube(2)
+            .set("support", "[{on = ['left'], fix = 'all'}, {on = ['bottom'], fix = ['z']}]")
+            .set("contact", "[{on = ['top'], normal = {unilateral = {}}}]")
+            .set("contact.0.obstacle.plane", "{point = [0, 0, 1.01], normal = [0, 0, -1]}")
+            .set("contact.0.obstacle_load", "{direction = [0, 0, -1], force = '1e3*t'}")
+            .set("output.profile", "[{on = 'top'}]")
+            .without("traction")
+            .without("body_force")
+            .without("initial")
+    };
+    for (scheme, ranks) in [("implicit_euler", 2), ("bdf2", 1)] {
+        let case = case()
+            .without("material.density")
+            .set("time", &format!("{{end = 0.2, step = 0.02, scheme = '{scheme}'}}"));
+        assert_stopped(&case, ranks, |time| 1e3 * time);
+    }
+}
+
+#[test]
+fn a_plane_with_mass_that_falls_on_held_nodes_comes_to_rest() {
+    // 10 kg at 1 m/s, 5 J, and a force of 100 N over 0.05 m.
+    for ranks in [1, 2] {
+        let case = under("{plane = {point = [0, 0.55], normal = [0, -1]}}")
+            .set("mesh.rectangle.cells", "[1, 2]")
+            .set("support", "[{on = ['left'], fix = 'all'}, {on = ['right'], fix = ['y']}]")
+            .set("contact.0.obstacle_load", "{direction = [0, -1], force = 100, mass = 10, velocity = 1}")
+            .set("time", "{end = 0.2, step = 0.01, scheme = 'implicit_euler'}");
+        case.run(ranks);
+        let results = case.results();
+        let resultants = results.table("resultants.csv");
+        let contact = resultants.only("source", "contact top");
+        assert!((contact.last("force_y") + 100.0).abs() < 1e-6, "{}", contact.last("force_y"));
+        assert!((contact.last("obstacle_displacement") - 0.05).abs() < 1e-12);
+        for support in ["support left", "support right"] {
+            let force = resultants.only("source", support).last("force_y");
+            assert!((force - 50.0).abs() < 1e-6, "{support}: {force} N");
+        }
+        let history = results.table("history.csv");
+        let lost = history.last("contact_dissipation") + history.last("obstacle_numerical_dissipation");
+        assert!((lost - 10.0).abs() < 1e-6, "{lost} J are lost");
+        assert!(results.number("max_energy_imbalance") < 1e-9);
+    }
 }
 
 #[test]

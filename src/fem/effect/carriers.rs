@@ -3,8 +3,9 @@
 //! A cell without mass of its own moves in the kinetic energy as the continuation of its carriers: `v(x) = sum_i l_i(x) v_i` with the
 //! barycentric coordinates `l_i` of a carrier. This is exact for affine motions, therefore total mass, first moments and moments of
 //! inertia remain, and resultants and moments of loads. Only moments of mass and loads matter, of degree 2 and 1 in the position. They
-//! are passed on from node to node until a node belongs to carriers: cells all of whose nodes have mass. Where there are none near,
-//! facets, edges or corners with mass carry it, and `l_i` are coordinates of the nearest point on their plane or line.
+//! are passed on from node to node until a node belongs to carriers: cells all of whose nodes have mass. From there they spread over the
+//! carriers around, the most to the nearest. Where there are none near, facets, edges or corners with mass carry it, and `l_i` are
+//! coordinates of the nearest point on their plane or line.
 
 use crate::{
     error::Result,
@@ -12,10 +13,10 @@ use crate::{
         petsc::DistributedVector,
         tensor::{Vector, add_scaled, dot},
     },
-    mesh::Mesh,
+    mesh::{Mesh, shape::signed_measure},
     parallel::session::Session,
 };
-use std::cell::RefCell;
+use std::{cell::RefCell, collections::BTreeMap};
 
 /// Products of components with 1 and the place relative to a node: forces, or again 1 and the place.
 type Moment = [[f64; 4]; 4];
@@ -23,6 +24,8 @@ type Moment = [[f64; 4]; 4];
 /// Levels for each number of corners of carriers: nodes of carriers, and those one and two cells away from them. A part of a body that is
 /// one cell thick keeps its mass near.
 const RINGS: usize = 3;
+/// How often moments spread from nodes of carriers to the other nodes of the same carriers.
+const SPREADS: usize = 2;
 /// The level of nodes that reach no carrier.
 const NONE: usize = usize::MAX;
 
@@ -40,7 +43,7 @@ pub(super) struct Carriers<const D: usize> {
     nodes: Vec<u32>,
     /// The moved cells in ascending order, each with the positions in `nodes` of the corners that take their shares of it.
     moved: Vec<(usize, Vec<usize>)>,
-    /// What nodes far from carriers pass on, from the farthest.
+    /// What nodes far from carriers pass on, from the farthest; then what spreads among carriers.
     stages: Vec<Vec<Pass>>,
     carriers: Vec<Carrier<D>>,
     work: RefCell<Work>,
@@ -86,9 +89,10 @@ impl<const D: usize> Carriers<D> {
         let is_moved: Vec<bool> = (0..mesh.cell_count())
             .map(|cell| mesh.cell_nodes(cell).any(|node| is_massless[node as usize]))
             .collect();
-        let Levels { is_near, level, candidates } =
+        let Levels { level, candidates } =
             Levels::new(session, mesh, (is_massless, &is_moved), &mut exchanged)?;
-        let nodes: Vec<u32> = (0..mesh.nodes.len() as u32).filter(|node| is_near[*node as usize]).collect();
+        let nodes: Vec<u32> =
+            (0..mesh.nodes.len() as u32).filter(|node| level[*node as usize] != NONE).collect();
         let mut position = vec![NONE; mesh.nodes.len()];
         nodes.iter().enumerate().for_each(|(at, node)| position[*node as usize] = at);
         let level_of = |node: &u32| level[*node as usize];
@@ -130,31 +134,83 @@ impl<const D: usize> Carriers<D> {
             }
         }
 
-        let mut totals = vec![0.0; mesh.nodes.len()];
         let mut carriers = Vec::new();
         for (cell, served) in candidates {
             let corners: Vec<u32> =
                 mesh.cell(cell).iter().copied().filter(|node| !is_massless[*node as usize]).collect();
             let places: Vec<Vector<D>> = corners.iter().map(|node| mesh.nodes[*node as usize]).collect();
             let gradients = barycentric_gradients(&places);
-            // Narrow cells would exaggerate the motion beside them.
-            let steepness: f64 = gradients.iter().map(|gradient| dot(gradient, gradient)).sum();
-            let weight = if corners.len() == 1 { 1.0 } else { 1.0 / steepness };
-            let takes: Vec<(usize, f64)> = corners
-                .iter()
-                .filter(|node| level_of(node) == served)
-                .map(|node| (position[*node as usize], weight))
-                .collect();
-            takes.iter().for_each(|(at, weight)| totals[nodes[*at] as usize] += weight);
+            let takes = corners.iter().filter(|node| level_of(node) == served);
+            let takes = takes.map(|node| (position[*node as usize], 0.0)).collect();
             carriers.push(Carrier { cell, corners, gradients, takes });
-        }
-        sum_over_ranks::<D>(&mut exchanged, &mut totals)?;
-        for Carrier { takes, .. } in &mut carriers {
-            takes.iter_mut().for_each(|(at, share)| *share /= totals[nodes[*at] as usize]);
         }
         let moments = vec![[[0.0; 4]; 4]; nodes.len()];
         let work = RefCell::new(Work { passed: moments.clone(), moments, exchanged });
-        Ok(Self { nodes, moved, stages, carriers, work })
+        let mut out = Self { nodes, moved, stages, carriers, work };
+        out.choose_shares(mesh)?;
+        for _ in 0..SPREADS {
+            let spread = out.passes_among_carriers(&position);
+            if session.total(spread.len()) == 0 {
+                break;
+            }
+            out.stages.push(spread);
+            out.choose_shares(mesh)?;
+        }
+        Ok(out)
+    }
+
+    /// Chooses the shares that carriers take of the moments at their nodes, by their distance from the volume that is carried there.
+    /// Collective.
+    fn choose_shares(&mut self, mesh: &Mesh<D>) -> Result<()> {
+        self.restart_forces();
+        for (cell, _) in &self.moved {
+            let corners = mesh.cell(*cell);
+            let places: Vec<Vector<D>> = corners.iter().map(|node| mesh.nodes[*node as usize]).collect();
+            let mut share = [0.0; D];
+            share[0] = signed_measure(&places) / corners.len() as f64;
+            corners.iter().for_each(|node| {
+                self.take_force(mesh, *cell, *node, &share);
+            });
+        }
+        let mut work = self.work.borrow_mut();
+        self.pass_on(mesh, Carried::Force, &mut work)?;
+        let mut totals = vec![0.0; mesh.nodes.len()];
+        for Carrier { corners, gradients, takes, .. } in &mut self.carriers {
+            // Narrow cells would exaggerate the motion beside them.
+            let steepness: f64 = gradients.iter().map(|gradient| dot(gradient, gradient)).sum();
+            for (at, share) in takes {
+                let [volume, first @ ..] = work.moments[*at][0];
+                let squares = corners.iter().map(|corner| {
+                    let [_, place @ ..] = relative(mesh, *corner, self.nodes[*at]);
+                    place.iter().zip(first).map(|(x, first)| (x - first / volume).powi(2)).sum::<f64>()
+                });
+                *share = match (volume > 0.0, corners.len()) {
+                    (false, _) => 0.0,
+                    (true, 1) => 1.0,
+                    (true, _) => (steepness * squares.sum::<f64>().powi(2)).recip(),
+                };
+                totals[self.nodes[*at] as usize] += *share;
+            }
+        }
+        sum_over_ranks::<D>(&mut work.exchanged, &mut totals)?;
+        for (at, share) in self.carriers.iter_mut().flat_map(|carrier| &mut carrier.takes) {
+            *share /= totals[self.nodes[*at] as usize].max(f64::MIN_POSITIVE);
+        }
+        Ok(())
+    }
+
+    /// What nodes of carriers with all of their corners pass on: the share of each carrier to its corners alike.
+    fn passes_among_carriers(&self, position: &[usize]) -> Vec<Pass> {
+        let mut shares = BTreeMap::new();
+        for Carrier { corners, takes, .. } in self.carriers.iter().filter(|c| c.corners.len() == D + 1) {
+            for (from, share) in takes.iter().filter(|(_, share)| *share > 0.0) {
+                for to in corners {
+                    *shares.entry((*from, position[*to as usize])).or_insert(0.0) +=
+                        share / corners.len() as f64;
+                }
+            }
+        }
+        shares.into_iter().map(|((from, to), share)| Pass { from, to, share }).collect()
     }
 
     /// The moved cells.
@@ -267,6 +323,7 @@ impl<const D: usize> Carriers<D> {
                 }
             }
             self.sum_moments(carried, passed, exchanged)?;
+            stage.iter().for_each(|Pass { from, .. }| moments[*from] = [[0.0; 4]; 4]);
             for (moment, passed) in moments.iter_mut().zip(&*passed) {
                 let both = moment.as_flattened_mut().iter_mut().zip(passed.as_flattened());
                 both.for_each(|(sum, passed)| *sum += passed);
@@ -322,10 +379,8 @@ impl<const D: usize> Carrier<D> {
 
 /// How far the corners of moved cells are from carriers.
 struct Levels {
-    /// Whether a local node is a corner of a moved cell of any rank.
-    is_near: Vec<bool>,
-    /// Its level: for each number of corners of carriers, from all corners of a cell to one, [`RINGS`] levels; those of single corners
-    /// have no end.
+    /// Of each local node: for each number of corners of carriers, from all corners of a cell to one, [`RINGS`] levels; those of single
+    /// corners have no end. Nodes over which moments spread have level 0.
     level: Vec<usize>,
     /// The cells that carry mass, each with the level of the nodes that it serves.
     candidates: Vec<(usize, usize)>,
@@ -358,14 +413,26 @@ impl Levels {
                 is_near[node] && !is_massless[node] && level[node] == NONE
             };
             let with_mass = |cell: usize| mesh.cell(cell).iter().filter(|node| !is_massless[**node as usize]);
-            let all = (0..mesh.cell_count())
+            let carriers: Vec<usize> = (0..mesh.cell_count())
                 .filter(|cell| is_moved[*cell] != (corners == D + 1) && with_mass(*cell).count() == corners)
-                .filter(|cell| mesh.cell(*cell).iter().any(is_open));
-            let found: Vec<(usize, usize)> = all.map(|cell| (cell, first)).collect();
-            let serving = || found.iter().flat_map(|(cell, _)| mesh.cell(*cell)).filter(|node| is_open(node));
+                .collect();
+            let serving = || carriers.iter().flat_map(|cell| mesh.cell(*cell)).filter(|node| is_open(node));
             let is_next = marked(&mut |marks| serving().for_each(|node| marks[*node as usize] = 1.0))?;
             raise(&mut level, &is_next, first);
-            candidates.extend(found);
+            let spreads = if corners == D + 1 { SPREADS } else { 0 };
+            let serves = |level: &[usize], cell: &usize| {
+                mesh.cell(*cell).iter().any(|node| level[*node as usize] == first)
+            };
+            for _ in 0..spreads {
+                let around = || {
+                    let serving = carriers.iter().filter(|cell| serves(&level, cell));
+                    serving.flat_map(|cell| mesh.cell(*cell))
+                };
+                let is_next = marked(&mut |marks| around().for_each(|node| marks[*node as usize] = 1.0))?;
+                raise(&mut level, &is_next, first);
+            }
+            candidates
+                .extend(carriers.into_iter().filter(|cell| serves(&level, cell)).map(|cell| (cell, first)));
             for at in first + 1.. {
                 if corners > 1 && at == first + RINGS {
                     break;
@@ -380,7 +447,7 @@ impl Levels {
                 }
             }
         }
-        Ok(Self { is_near, level, candidates })
+        Ok(Self { level, candidates })
     }
 }
 

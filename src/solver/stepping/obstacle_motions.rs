@@ -76,6 +76,11 @@ struct Motion {
     inertia: f64,
     /// What held points add to its `s`.
     held: f64,
+    /// Whether held points may stop it; the changes of its velocity at which it is beyond none of them; and the change with which it reaches
+    /// those that stop it.
+    has_stops: bool,
+    room: [f64; 2],
+    stop: Option<f64>,
     /// The change of its velocity in the next iteration, if nothing holds it.
     approach: Option<f64>,
 }
@@ -157,12 +162,17 @@ impl ObstacleMotions {
                     size: 0.0,
                     inertia,
                     held: 0.0,
+                    has_stops: false,
+                    room: ANYWHERE,
+                    stop: None,
                     approach: None,
                 });
             }
             let motion = &mut self.motions[at];
             (motion.place, motion.inertia, motion.held, motion.approach) = (place, inertia, 0.0, None);
             let (contact, freedom) = place;
+            let has_stops = freedom == Freedom::Translation && contacts[contact].has_stops();
+            (motion.has_stops, motion.stop) = (session.total(usize::from(has_stops)) > 0, None);
             motion.velocities.fill(0.0)?;
             contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
             motion.size = motion.velocities.norm()?;
@@ -225,6 +235,10 @@ impl ObstacleMotions {
         for Motion { place: (contact, freedom), .. } in &self.motions {
             self.work.push(contacts[*contact].held_stiffness(*freedom, velocity));
         }
+        for Motion { place: (contact, freedom), .. } in &self.motions {
+            let reaction = if *freedom == Freedom::Translation { contacts[*contact].reaction() } else { 0.0 };
+            self.work.push(reaction);
+        }
         session.sum_lists_into(&self.work, &mut self.sums);
         let sums = &self.sums;
         self.motions.iter_mut().zip(&sums[3 * count..]).for_each(|(motion, held)| motion.held = *held);
@@ -234,28 +248,37 @@ impl ObstacleMotions {
         }
         self.values.clear();
         self.unbalanced.clear();
-        let mut largest = 0.0;
-        for (at, Motion { place: (contact, freedom), size, .. }) in self.motions.iter().enumerate() {
+        for (at, Motion { place: (contact, freedom), .. }) in self.motions.iter().enumerate() {
             let Some(motion) = contacts[*contact].driven_mut(*freedom) else { continue };
-            let [open, terms] = motion.unbalanced(sums[at]);
-            let value = open + sums[count + at];
-            let enough = f64::max(SHARE * self.tolerance * size, ROUNDING * terms);
-            self.values.push(value);
+            let [open, terms] = motion.unbalanced(sums[at] - sums[4 * count + at]);
+            self.values.push(open + sums[count + at]);
             self.unbalanced.push([open, terms]);
+        }
+        self.find_stops(session, contacts, velocity);
+        let mut largest = 0.0;
+        for (at, Motion { size, stop, .. }) in self.motions.iter().enumerate() {
+            let (value, [_, terms]) = (self.values[at], self.unbalanced[at]);
+            let enough = f64::max(SHARE * self.tolerance * size, ROUNDING * terms);
             largest = if value == 0.0 { largest } else { f64::max(largest, value.abs() / enough) };
             if !value.is_finite() {
                 largest = f64::NAN;
+            } else if stop.is_some_and(|change| change != 0.0) {
+                largest = f64::MAX;
             }
         }
-        let rests = self.motions.iter().any(|motion| motion.held > 0.0);
+        let rests = self.motions.iter().any(|motion| motion.held > 0.0 || motion.has_stops);
         let [patience, most] = if rests { HELD_EVALUATIONS } else { EVALUATIONS };
         let is_slow = evaluation > patience && largest > LEAST_DECREASE * self.largest;
         self.largest = largest;
         if largest <= 1.0 || !largest.is_finite() || is_slow || evaluation + 1 == most {
             return Ok(false);
         }
-        self.solve(|_| true);
+        self.solve(|motion| motion.stop.is_none());
         self.press_on_held(session, contacts, velocity);
+        for (Motion { room: [least, greatest], stop, .. }, value) in self.motions.iter().zip(&mut self.values)
+        {
+            *value = -stop.unwrap_or(-*value).max(*least).min(*greatest);
+        }
         let mut placed = Ok(());
         for (Motion { place: (contact, freedom), .. }, change) in self.motions.iter().zip(&self.values) {
             if let Some(motion) = contacts[*contact].driven_mut(*freedom) {
@@ -278,17 +301,51 @@ impl ObstacleMotions {
         velocity: &[f64],
     ) {
         for (at, motion) in self.motions.iter().enumerate() {
-            let ([open, _], (contact, freedom)) = (self.unbalanced[at], motion.place);
-            if open == 0.0 || freedom != Freedom::Translation || self.diagonal(at) != 0.0 {
+            let [open, _] = self.unbalanced[at];
+            if open == 0.0 || motion.stop.is_some() || self.diagonal(at) != 0.0 {
                 continue;
             }
-            let (laws, sign) = (&contacts[contact], -open.signum());
-            let [away] = session.largest([-laws.change_to_touch(velocity, sign)]);
-            let [area] = session.sum([laws.area()]);
-            let change = -away + open.abs() / (laws.scale * area);
-            if change.is_finite() {
-                self.values[at] = -sign * change;
-                self.largest = f64::INFINITY;
+            if let Some(change) = change_to_press(session, contacts, motion, (open, velocity)) {
+                self.values[at] = -change;
+                self.largest = f64::MAX;
+            }
+        }
+    }
+
+    /// Finds the motions that held points stop, and balances their forces by pressures at these points. Collective.
+    fn find_stops<const D: usize>(
+        &mut self,
+        session: &Session,
+        contacts: &mut [Contact<D>],
+        velocity: &[f64],
+    ) {
+        let count = self.motions.len();
+        for (at, motion) in self.motions.iter_mut().enumerate() {
+            (motion.room, motion.stop) = (ANYWHERE, None);
+            if !motion.has_stops {
+                continue;
+            }
+            let (contact, freedom) = motion.place;
+            let (laws, [open, _]) = (&mut contacts[contact], self.unbalanced[at]);
+            let [least, greatest] = laws.room(velocity);
+            let [least, greatest] = session.largest([least, -greatest]);
+            motion.room = [least, -greatest];
+            // Beyond a stop the obstacle is moved back, whatever its force.
+            let sign = match motion.room {
+                [_, greatest] if greatest < 0.0 => 1.0,
+                [least, _] if least > 0.0 => -1.0,
+                _ => -self.values[at].signum(),
+            };
+            let [area] = session.sum([laws.stopping_area(sign, velocity)]);
+            let reaction = if area > 0.0 && sign * open < 0.0 { open } else { 0.0 };
+            laws.stop(sign, if reaction == 0.0 { 0.0 } else { reaction / area }, velocity);
+            if area > 0.0
+                && let Some(driven) = laws.driven_mut(freedom)
+            {
+                let others = self.sums[at] - self.sums[4 * count + at];
+                self.unbalanced[at] = driven.unbalanced(others + reaction);
+                motion.stop = Some(f64::max(0.0, least).min(-greatest));
+                self.values[at] = 0.0;
             }
         }
     }
@@ -327,9 +384,8 @@ impl ObstacleMotions {
             motion.approach = None;
             let (contact, freedom) = motion.place;
             let laws = &contacts[contact];
-            let [grip, area] =
-                session.sum([laws.grip(freedom) + laws.held_stiffness(freedom, velocity), laws.area()]);
-            if grip > 0.0 {
+            let [grip] = session.sum([laws.grip(freedom) + laws.held_stiffness(freedom, velocity)]);
+            if grip > 0.0 || motion.stop.is_some() {
                 continue;
             }
             let driving = laws.driven()[freedom as usize].map_or(0.0, |motion| motion.driving());
@@ -338,27 +394,18 @@ impl ObstacleMotions {
                 motion.approach = Some(0.0);
                 continue;
             }
-            let (sign, open) = (-open.signum(), open.abs());
-            let nearest = if freedom == Freedom::Translation {
-                laws.change_to_touch(velocity, sign)
-            } else {
-                f64::INFINITY
-            };
-            let nearest = -session.largest([-nearest])[0];
-            let change = if motion.inertia * nearest < open {
-                nearest + (open - motion.inertia * nearest) / (motion.inertia + laws.scale * area)
-            } else {
-                // Relative to a distant obstacle, velocities of the body would be rounding errors.
-                if freedom == Freedom::Translation && self.may_part && laws.follows_obstacle() {
-                    self.parted = Some(contact);
-                    return Err(Error::Failed(NO_CONTACT.into()));
-                }
-                open / motion.inertia
-            };
+            let press = change_to_press(session, contacts, motion, (open, velocity));
+            // Relative to a distant obstacle, velocities of the body would be rounding errors.
+            if press.is_none() && freedom == Freedom::Translation && self.may_part && laws.follows_obstacle()
+            {
+                self.parted = Some(contact);
+                return Err(Error::Failed(NO_CONTACT.into()));
+            }
+            let change = press.unwrap_or(-open / motion.inertia);
             if !change.is_finite() {
                 return Err(Error::Failed(NO_CONTACT.into()));
             }
-            motion.approach = Some(sign * change);
+            motion.approach = Some(change);
         }
         Ok(())
     }
@@ -383,7 +430,7 @@ impl ObstacleMotions {
             self.work.push(own_dot(&motion.velocities, forces)?);
         }
         session.sum_lists_into(&self.work, &mut self.values);
-        self.solve(|motion| motion.approach.is_none());
+        self.solve(|motion| motion.approach.is_none() && motion.stop.is_none());
         for (motion, change) in self.motions.iter().zip(&self.values) {
             if *change != 0.0 {
                 forces.add_scaled(-change, &motion.forces)?;
@@ -441,10 +488,33 @@ impl ObstacleMotions {
     }
 }
 
+/// The changes of a velocity that nothing limits.
+const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
 const NO_BALANCE: &str = "no motion of the obstacles balances their forces and moments";
 const NO_CONTACT: &str = "no motion of the obstacles balances their forces and moments: an obstacle without mass touches nothing that holds \
      it; let the forces press the obstacles against the body, or give them a mass; an obstacle that a moment turns may need a \
      moment_of_inertia";
+
+/// The change of the velocity of a motion that nothing holds with which it touches a point in the step and its unbalanced force in N presses
+/// it on; `None` if the force does not move it so far. Velocities are those of Newton's method. Collective.
+fn change_to_press<const D: usize>(
+    session: &Session,
+    contacts: &[Contact<D>],
+    motion: &Motion,
+    (open, velocity): (f64, &[f64]),
+) -> Option<f64> {
+    let (contact, freedom) = motion.place;
+    let (laws, sign) = (&contacts[contact], -open.signum());
+    let nearest = match freedom {
+        Freedom::Translation => laws.change_to_touch(velocity, sign),
+        Freedom::Rotation => f64::INFINITY,
+    };
+    let nearest = -session.largest([-nearest])[0];
+    let [area] = session.sum([laws.area()]);
+    let left = open.abs() - motion.inertia * nearest;
+    (left > 0.0).then(|| sign * (nearest + left / (motion.inertia + laws.scale * area)))
+}
 
 /// Lets the unknowns of the contacts follow their obstacles, except those that are apart at the velocities from which a step starts.
 /// Collective.

@@ -13,7 +13,7 @@ impl<const D: usize> Contact<D> {
     /// The first position in m where the law is not merely a bound on a velocity component, if there is one.
     pub fn oblique_normal(&self) -> Option<&[f64; D]> {
         let is_bound = self.law.velocity_bound(NodeContext::default()).is_some();
-        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held);
+        let free = self.points.iter().filter(|p| !matches!(p.unknown, Unknown::Held | Unknown::Stop));
         let is_simple = |axis: Option<usize>| is_bound && axis.is_some();
         free.into_iter().find(|p| !is_simple(axis(&p.direction))).map(|p| &p.place)
     }

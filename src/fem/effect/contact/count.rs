@@ -3,7 +3,7 @@
 use super::{
     Contact,
     friction::{Friction, FrictionStatus},
-    point::{Unknown, Vectors::Newton},
+    point::Vectors::Newton,
 };
 
 /// Number of branches of normal laws that are counted separately; the last count includes all further branches.
@@ -52,7 +52,7 @@ impl<const D: usize> Contact<D> {
         for point in self.points.iter().filter(|point| point.carries(&self.law)) {
             count.open += usize::from(point.pressure_at(&self.law, Newton, velocity) == 0.0);
             let along = point.normal_component(Newton, velocity);
-            let branch = if point.unknown == Unknown::Parameter {
+            let branch = if point.unknown.has_pressure() {
                 let found =
                     self.law.resolve_worn(self.scale * along + point.pressure, self.scale, point.context);
                 count.held += usize::from(found.derivative == 0.0);

@@ -27,7 +27,7 @@ pub fn contact_nodes<const D: usize>(
             let active = match point.unknown {
                 Unknown::Parameter => Some(point.direction),
                 Unknown::Velocity => None,
-                Unknown::Held => Some([0.0; D]),
+                Unknown::Held | Unknown::Stop => Some([0.0; D]),
             };
             nodes.entry(point.node()).or_default().push(active);
         }

@@ -23,9 +23,17 @@ use crate::{
 /// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
 const NEAR: f64 = 1e-6;
 
+/// Distance from a point that stops the obstacle at which they touch, as a share of the body's size.
+const TOUCH: f64 = 1e-12;
+
 /// The penetration in m of a point at the end of the step, at these velocities of Newton's method.
 fn depth<const D: usize>(point: &Point<D>, velocity: &[f64]) -> f64 {
     point.context.penetration + point.context.step_length * point.normal_component(Newton, velocity)
+}
+
+/// Whether a point and the obstacle touch at the end of the step, at these velocities of Newton's method; the size is that of the body in m.
+fn is_touched<const D: usize>(point: &Point<D>, velocity: &[f64], size: f64) -> bool {
+    depth(point, velocity) >= -TOUCH * size
 }
 
 /// The place at which the ray of a point meets the obstacle relative to its centre.
@@ -268,6 +276,61 @@ impl<const D: usize> Contact<D> {
         .sum()
     }
 
+    /// Whether points on this rank may stop the obstacle.
+    pub fn has_stops(&self) -> bool {
+        self.points.iter().any(|point| point.unknown == Unknown::Stop)
+    }
+
+    /// The points on this rank that may stop the obstacle, each with the component of its normal along the direction of the obstacle.
+    fn stops(&self) -> impl Iterator<Item = (&Point<D>, f64)> {
+        let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
+        let points = self.points.iter().filter(|point| point.unknown == Unknown::Stop);
+        points
+            .filter_map(move |point| translation.map(|(direction, _)| (point, dot(&point.normal, direction))))
+    }
+
+    /// The least and the greatest change in m/s of the obstacle's velocity at which it is beyond no point on this rank that stops it, at
+    /// these velocities of Newton's method.
+    pub fn room(&self, velocity: &[f64]) -> [f64; 2] {
+        let [mut least, mut greatest] = [f64::NEG_INFINITY, f64::INFINITY];
+        for (point, along) in self.stops() {
+            let depth = depth(point, velocity);
+            let depth = if depth.abs() <= TOUCH * self.size { 0.0 } else { depth };
+            let change = depth / (along * point.context.step_length);
+            if along > 0.0 {
+                least = f64::max(least, change);
+            } else if along < 0.0 {
+                greatest = f64::min(greatest, change);
+            }
+        }
+        [least, greatest]
+    }
+
+    /// The sum over points on this rank that stop a motion of this sign where the obstacle is of their weights in m^(D-1) times the squares
+    /// of the components of their normals along the direction; 0 if nothing stops it.
+    pub fn stopping_area(&self, sign: f64, velocity: &[f64]) -> f64 {
+        let touched = self
+            .stops()
+            .filter(|(point, along)| is_touched(point, velocity, self.size) && sign * along < 0.0);
+        touched.map(|(point, along)| point.weight * along * along).sum()
+    }
+
+    /// The resultant in N along the direction of the pressures at points on this rank that stop the obstacle.
+    pub fn reaction(&self) -> f64 {
+        self.stops().map(|(point, along)| point.weight * point.pressure * along).sum()
+    }
+
+    /// Sets the pressures at points that stop a motion of this sign to `share` in Pa times the components of their normals, at other
+    /// points to 0. Of all pressures with the same resultant these have the smallest sum of squares over the area.
+    pub fn stop(&mut self, sign: f64, share: f64, velocity: &[f64]) {
+        let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
+        for point in self.points.iter_mut().filter(|point| point.unknown == Unknown::Stop) {
+            let along = translation.map_or(0.0, |(direction, _)| dot(&point.normal, direction));
+            let stops = is_touched(point, velocity, self.size) && sign * along < 0.0;
+            point.pressure = if stops { share * along } else { 0.0 };
+        }
+    }
+
     /// Whether the obstacle may press on a point with a known or unknown pressure.
     fn is_pressed(&self, point: &Point<D>) -> bool {
         point.unknown != Unknown::Velocity && point.carries(&self.law) && point.can_touch()
@@ -279,7 +342,7 @@ impl<const D: usize> Contact<D> {
         let direction = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
         let change = |point: &Point<D>| {
             let along = match direction {
-                Some((direction, _)) if point.unknown == Unknown::Held => dot(&point.normal, direction),
+                Some((direction, _)) if point.unknown != Unknown::Parameter => dot(&point.normal, direction),
                 _ => point.follows,
             };
             let approach = -sign * along * point.context.step_length;

@@ -33,7 +33,8 @@ impl<const D: usize> Contact<D> {
         let share = if self.law.is_zero() || self.law.depends_on_displacement() { 1.0 } else { FORCE_SHARE };
         let reference = self.reference;
         let range = reference.range([range[0], range[1]], share, 0);
-        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
+        let is_free = |p: &&Point<D>| !matches!(p.unknown, Unknown::Held | Unknown::Stop);
+        let free = self.points.iter().filter(is_free).filter(|p| p.can_touch());
         let distance = |p: &Point<D>| {
             let pressure = p.pressure_at(&self.law, Newton, velocity) - p.open_pressure(residual);
             self.law.distance_worn(p.normal_component(Newton, velocity), pressure, p.context, range)

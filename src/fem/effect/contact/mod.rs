@@ -259,7 +259,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`
-    /// along the free normal, and `-sigma_tau` with what supports take up of it.
+    /// along the free normal, or along the normal where the point stops the obstacle, and `-sigma_tau` with what supports take up of it.
     pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
             point.add_traction(point.pressure_at(&self.law, Body, velocity), nodal);

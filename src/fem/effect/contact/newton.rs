@@ -78,6 +78,7 @@ impl<const D: usize> Contact<D> {
                         .branch
                 }
                 Unknown::Velocity => self.law.branch(along, point.context),
+                Unknown::Stop => usize::from(point.pressure > 0.0),
                 Unknown::Held => 0,
             };
             branch.min(255) as u8
@@ -93,7 +94,7 @@ impl<const D: usize> Contact<D> {
             match point.unknown {
                 Unknown::Parameter => point.add_along(Newton, -point.along(Newton, values), values),
                 Unknown::Velocity => values[point.first(Newton) * D..][..D].fill(0.0),
-                Unknown::Held => {}
+                Unknown::Held | Unknown::Stop => {}
             }
         }
         if let Some(friction) = &self.friction {
@@ -181,7 +182,7 @@ impl<const D: usize> Contact<D> {
             let change = match point.unknown {
                 Unknown::Parameter => of_parameter(point),
                 Unknown::Velocity => point.slope * point.normal_component(Newton, direction),
-                Unknown::Held => continue,
+                Unknown::Held | Unknown::Stop => continue,
             };
             point.add_force(Newton, change, forces);
         }

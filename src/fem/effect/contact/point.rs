@@ -21,6 +21,15 @@ pub(super) enum Unknown {
     Velocity,
     /// None: supports prescribe all components along the normal.
     Held,
+    /// The same at a constraint that stops an obstacle which a force moves: the pressure is a share of the reaction.
+    Stop,
+}
+
+impl Unknown {
+    /// Whether the point stores its pressure, which is not a function of the velocity.
+    pub(super) fn has_pressure(self) -> bool {
+        matches!(self, Self::Parameter | Self::Stop)
+    }
 }
 
 /// The vectors of nodal values that contacts read and write, `D` values for each node.
@@ -56,7 +65,7 @@ pub(super) struct Point<const D: usize> {
     force: [Vector<D>; D],
     /// The nodes on the edges of a quadratic facet.
     others: Box<[OtherNode<D>]>,
-    /// At nodal points: the normal without prescribed components, scaled to length 1.
+    /// At nodal points: the normal without prescribed components, scaled to length 1; the normal at those that stop an obstacle.
     pub direction: Vector<D>,
     /// The change of a velocity that changes its component along `direction` by 1 and those along the directions of other points at the
     /// node not at all. Forces along the directions of all of them have this component: only that of this point.
@@ -88,9 +97,9 @@ pub(super) struct Point<const D: usize> {
     pub growth: f64,
     /// Contribution of the blend of a two-step scheme to the penetration, in m.
     pub blend_offset: f64,
-    /// Pressure in Pa before the step, where the unknown is the parameter.
+    /// Pressure in Pa before the step, where the point stores its pressure.
     pub pressure_before: f64,
-    /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
+    /// Pressure in Pa at the last evaluation, where the point stores its pressure.
     pub pressure: f64,
     /// Ratio of the change of velocity to the change of the unknown, at the last linearisation: `c V'(s)`.
     pub theta: f64,
@@ -334,7 +343,7 @@ impl<const D: usize> Point<D> {
     /// Pressure in Pa, given nodal velocities.
     pub(super) fn pressure_at(&self, law: &NormalResponse, vectors: Vectors, velocity: &[f64]) -> f64 {
         match self.unknown {
-            Unknown::Parameter => self.pressure,
+            Unknown::Parameter | Unknown::Stop => self.pressure,
             Unknown::Velocity => law.pressure(self.normal_component(vectors, velocity), self.context),
             // Supports prescribe the velocity, and with it a pressure that is a function of it.
             Unknown::Held if self.carries(law) && self.can_touch() => {
@@ -344,7 +353,8 @@ impl<const D: usize> Point<D> {
         }
     }
 
-    /// Whether its pressure is known from the motion: not that of a constraint where supports hold the normal, and would carry it.
+    /// Whether its pressure is known: not that of a constraint where supports hold the normal, and would carry it, unless it stops an
+    /// obstacle.
     pub(super) fn carries(&self, law: &NormalResponse) -> bool {
         self.unknown != Unknown::Held || !law.has_vertical_parts()
     }

@@ -1,10 +1,6 @@
 //! Preparation of a step at the points of a contact. Vectors are those of the body.
 
-use super::{
-    Contact,
-    point::{Unknown, Vectors::Body},
-    tangential_point::ROUNDING,
-};
+use super::{Contact, point::Vectors::Body, tangential_point::ROUNDING};
 use crate::{
     error::{Error, Result},
     fem::effect::{Blend, Step},
@@ -60,7 +56,7 @@ impl<const D: usize> Contact<D> {
 
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
     pub fn restore_pressures(&mut self, traction: &[f64]) {
-        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+        for point in self.points.iter_mut().filter(|p| p.unknown.has_pressure()) {
             point.pressure = point.pressure_in(traction);
             point.pressure_before = point.pressure;
         }

@@ -1,17 +1,13 @@
 //! Forces of a contact on the body, and the parts of its area by state.
 
-use super::{
-    Contact,
-    friction::FrictionStatus,
-    point::{Unknown, Vectors::Body},
-};
+use super::{Contact, friction::FrictionStatus, point::Vectors::Body};
 use crate::{
     error::Result,
     linear_algebra::tensor::{Vector, add_scaled, larger},
 };
 
 /// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points of constraints whose normal a support
-/// holds count for friction only.
+/// holds count for friction only, unless they stop an obstacle that a force moves.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactAreas {
     /// With contact pressure.
@@ -33,7 +29,8 @@ pub struct ContactAreas {
 pub struct PointState<const D: usize> {
     /// Outward unit normal of the boundary.
     pub normal: Vector<D>,
-    /// The direction of the pressure in the traction: the normal without what supports hold, scaled to length 1; 0 if nothing is left.
+    /// The direction of the pressure in the traction: the normal without what supports hold, scaled to length 1; if nothing is left, the
+    /// normal where the point stops an obstacle, otherwise 0.
     pub direction: Vector<D>,
     /// Contact pressure in Pa.
     pub pressure: f64,
@@ -105,16 +102,15 @@ impl<const D: usize> Contact<D> {
                 state.sticks = motions.next().map(|(motion, _)| motion == FrictionStatus::Sticks);
             }
             if point.carries(&self.law) {
-                state.pressure = match point.unknown {
-                    Unknown::Parameter => point.pressure_in(traction),
-                    _ => point.pressure_at(&self.law, Body, velocity),
-                };
                 let along = point.normal_component(Body, velocity);
-                let parameter = self.scale * along + state.pressure;
-                state.branch = match point.unknown {
-                    Unknown::Parameter => self.law.resolve_worn(parameter, self.scale, point.context).branch,
-                    _ => self.law.branch(along, point.context),
-                };
+                if point.unknown.has_pressure() {
+                    state.pressure = point.pressure_in(traction);
+                    let parameter = self.scale * along + state.pressure;
+                    state.branch = self.law.resolve_worn(parameter, self.scale, point.context).branch;
+                } else {
+                    state.pressure = point.pressure_at(&self.law, Body, velocity);
+                    state.branch = self.law.branch(along, point.context);
+                }
             }
             if self.law.depends_on_displacement() {
                 let [along, gap] = self.position_at(time, displacement, point)?;

@@ -5,7 +5,7 @@ use super::{
     closeness::{Closeness, Gaps},
     loaded_obstacle::LoadedObstacle,
     point::{
-        Point,
+        Point, Unknown,
         Vectors::{self, Body},
     },
 };
@@ -22,7 +22,7 @@ pub const OVERRUN: f64 = 1e-6;
 
 impl<const D: usize> Contact<D> {
     /// Fails where the obstacle has passed a point in the step just solved, from displacements at its start and velocities at its end
-    /// (with ghosts), and where a force has moved it beyond a point that supports hold, whose constraint would stop it.
+    /// (with ghosts), and where it is beyond points that should have stopped it.
     pub fn refuse_passage(&self, step: Step, displacement: &[f64], velocity: &[f64]) -> Result<()> {
         if !self.law.depends_on_displacement() || matches!(self.gap, Gap::Distance(_)) {
             return Ok(());
@@ -31,12 +31,12 @@ impl<const D: usize> Contact<D> {
         let is_loaded = self.obstacle.as_ref().is_some_and(LoadedObstacle::moves);
         for point in &self.points {
             let depth = point.context.penetration + self.advance(point, Body, velocity);
-            if is_loaded && !point.carries(&self.law) && depth > OVERRUN * self.size {
+            if point.unknown == Unknown::Stop && depth > OVERRUN * self.size {
                 return Err(Error::Failed(format!(
-                    "the step to t = {:.6e} s (length {:.3e} s) failed: the force on its obstacle presses it {depth:.3e} m beyond the \
-                     boundary at {:?} m, where a support holds the normal; the constraint there would stop the obstacle, with a force \
-                     that is not determined; let the contact end before the support (key `where`), free the normal component there, \
-                     or take a law with a finite pressure, as normal.compliance",
+                    "the step to t = {:.6e} s (length {:.3e} s) failed: the obstacle that a force moves is {depth:.3e} m \
+                     beyond the boundary at {:?} m, where a support holds the normal, and nowhere along its direction it is outside of \
+                     all such points; let the contact end before the support (key `where`), free the normal component there, or take a \
+                     law with a finite pressure, as normal.compliance",
                     step.time, step.length, point.place
                 )));
             }

@@ -1,6 +1,6 @@
 //! Choice of the unknown at the points: the parameter of the law's graph or the velocity.
 
-use super::{Contact, point::Unknown};
+use super::{Contact, LoadedObstacle, point::Unknown};
 use crate::{
     error::{Error, Result},
     linear_algebra::tensor::{Vector, dot, dual_basis, outside},
@@ -15,11 +15,20 @@ const INDEPENDENT: f64 = 0.02;
 /// Cosine of 40 degrees, the angle by which facets of a smooth boundary turn at most.
 const SMOOTH: f64 = 0.766;
 
-/// Gives each node of a smooth boundary to one contact, and each edge to the friction of one boundary. Where directions at a node
-/// are not orthogonal, selects their dual basis or, for smooth laws without friction, the velocity as the unknown. Refuses laws with
-/// vertical parts at Gauss points.
+/// Lets held nodes stop obstacles that forces move. Gives each node of a smooth boundary to one contact, and each edge to the friction of
+/// one boundary. Where directions at a node are not orthogonal, selects their dual basis or, for smooth laws without friction, the
+/// velocity as the unknown. Refuses laws with vertical parts at Gauss points.
 pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
     give_nodes_to_one_contact(contacts);
+    let stopping = |contact: &&mut Contact<D>| {
+        contact.law.has_vertical_parts() && contact.obstacle.as_ref().is_some_and(LoadedObstacle::moves)
+    };
+    for point in contacts.iter_mut().filter(stopping).flat_map(|contact| &mut contact.points) {
+        if point.unknown == Unknown::Held {
+            point.unknown = Unknown::Stop;
+            (point.direction, point.dual) = (point.normal, point.normal);
+        }
+    }
     let mut around: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
     for (number, contact) in contacts.iter().enumerate() {
         if contact.needs_ghosts {
