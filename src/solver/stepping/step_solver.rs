@@ -391,7 +391,11 @@ impl StepSolver {
         let size = norm.max(rounding.max(product) / accuracy);
         let size = if size > 0.0 { size.max(LEAST_FORCE / accuracy) } else { 0.0 };
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
-        body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
+        for contact in &mut body.contacts {
+            // The force that drives an obstacle is one of the step.
+            let [along, _] = contact.driven();
+            contact.reference.forces = along.map_or(total, |motion| total.max(motion.driving().abs()));
+        }
         let size = size_of(norm, *scale);
         let tolerance =
             (self.settings.tolerance * size).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product);
