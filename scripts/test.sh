@@ -10,8 +10,6 @@ mkdir -p "$logs"
 fuzz/run.sh 20 >"$logs/random-input.log" 2>&1 &
 random_input=$!
 
-# One test more than there are cores: launchers wait a third of their time.
-export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$(($(nproc) + 1))}
 failed=0
 {
     # What each test takes is told by an unstable option of libtest, which this variable allows.
