@@ -104,11 +104,9 @@ pub struct Contact<const D: usize> {
     pub closeness: Closeness,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
-    /// Length in s of the current step, as laws of the displacement see it.
-    step_length: f64,
     /// The formula of the obstacle's velocity in the current step.
     rate: Rate,
-    /// The blend of earlier histories from which those of friction and wear start in the current step.
+    /// The blend of earlier states from which the current step starts.
     blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
     pub reference: ReferenceValues,
@@ -179,7 +177,6 @@ impl<const D: usize> Contact<D> {
             wear: None,
             closeness: Closeness::default(),
             scale,
-            step_length: 0.0,
             rate: Rate::euler(0.0, 1.0),
             blend: Blend::euler(0.0),
             reference,

@@ -20,7 +20,7 @@ impl<const D: usize> Contact<D> {
             return Ok(());
         }
         let (time, time_before) = (step.time, step.time - step.length);
-        self.step_length = blend.way();
+        let step_length = blend.way();
         for point in &mut self.points {
             let [after, before] = match &self.obstacle {
                 None => [point.place; 2],
@@ -41,7 +41,7 @@ impl<const D: usize> Contact<D> {
             let means = blend.extrapolates() && point.penetration_before.is_finite();
             point.context = NodeContext {
                 penetration: along - gap - worn + (point.blend_offset - point.continued_wear),
-                step_length: self.step_length,
+                step_length,
                 mean_from: means.then_some(point.penetration_before),
                 erosion: 0.0,
             };
@@ -49,8 +49,8 @@ impl<const D: usize> Contact<D> {
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
         self.follow_obstacle(true);
-        let recent = [time_before, blend.recent / self.step_length];
-        let earlier = [time_before - step.previous_length, blend.earlier / self.step_length];
+        let recent = [time_before, blend.recent / step_length];
+        let earlier = [time_before - step.previous_length, blend.earlier / step_length];
         self.set_obstacle_velocities(Rate { time, before: [recent, earlier] })
     }
 

@@ -76,7 +76,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Advances the histories of friction and wear by a step of this length in s, at its velocities with ghosts.
+    /// Advances the histories of friction and wear by the current step, at its velocities with ghosts.
     pub fn advance_histories(&mut self, velocity: &[f64]) {
         let blend = self.blend.to_end();
         let Some(friction) = &mut self.friction else { return };
@@ -124,8 +124,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// The errors of what friction, wear and the obstacle keep, on this rank, in a step that was solved and not yet
-    /// committed, at its velocities with ghosts; see [`CONTACT_QUANTITIES`]. All ranks have the same obstacle.
+    /// The errors of what friction, wear and the obstacle keep, on this rank, in a step that was solved and not yet committed, at its
+    /// velocities with ghosts; see [`CONTACT_QUANTITIES`]. All ranks have the same obstacle.
     pub fn deviations(
         &self,
         curvature: Curvature,
@@ -187,7 +187,7 @@ impl<const D: usize> Contact<D> {
 
     /// The steepest decrease in Pa s/m of the normal graph in the current step.
     pub fn monotonicity_constant(&self) -> f64 {
-        self.law.monotonicity_constant(self.step_length)
+        self.law.monotonicity_constant(self.blend.way())
     }
 
     /// The steepest decreases in Pa s/m of the normal and of the friction graph in a step of this length in s, as far as they are known
