@@ -9,6 +9,7 @@ pub use traffic::PassBytes;
 use crate::{
     error::Result,
     fem::{
+        coupling::{Coupling, add_between, seen_by_contacts},
         effect::{
             Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
             HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, Quantity,
@@ -27,7 +28,7 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-use std::cell::RefCell;
+use std::{borrow::Cow, cell::RefCell};
 
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
@@ -48,6 +49,8 @@ pub struct Body<const D: usize, const S: usize> {
     pub load: Load,
     /// What supports hold.
     pub held: Held<D>,
+    /// The change of basis by contact between bodies, if there is any, on all ranks alike.
+    pub coupling: Option<Coupling<D>>,
     /// Springs and dashpots of supports.
     pub elastic_support: ElasticSupport<D>,
     /// The mass that contact boundaries have passed on, if some have, on all ranks alike.
@@ -85,6 +88,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             surface_effects: Vec::new(),
             load: Load::default(),
             held,
+            coupling: None,
             elastic_support: ElasticSupport::default(),
             redistributed_mass: None,
             support_motion: None,
@@ -129,8 +133,17 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(())
     }
 
-    /// The constant matrix of a step in which velocity and displacement change by `length` in s times their rates. Collective.
+    /// The constant matrix, in the unknowns of a step, of a step in which velocity and displacement change by `length` in s times their rates. Collective.
     pub fn matrix(&self, session: &Session, length: f64) -> Result<BlockRows, Agreed> {
+        let rows = self.matrix_of_bodies(session, length)?;
+        match &self.coupling {
+            Some(coupling) => coupling.transform(session, &self.mesh, rows),
+            None => Ok(rows),
+        }
+    }
+
+    /// The same matrix in the velocities of the bodies. Collective.
+    pub fn matrix_of_bodies(&self, session: &Session, length: f64) -> Result<BlockRows, Agreed> {
         let terms: Vec<_> = self
             .terms()
             .filter(|term| !(self.is_explicit() && term.form() == Some(Form::Elasticity)))
@@ -145,6 +158,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let length = (!self.is_explicit()).then_some(length);
         self.elastic_support.add_to_rows(&self.mesh, &self.held, length, &mut rows);
         Ok(rows)
+    }
+
+    /// Local nodal values with ghosts as contacts see them: at slave nodes relative to the surface that they face.
+    pub fn seen_by_contacts<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
+        seen_by_contacts(self.coupling.as_ref(), &self.held, values)
+    }
+
+    /// Replaces velocities by those that are the unknowns of a step: at slave nodes relative to the surface that they face. Collective.
+    pub fn make_relative(&self, velocity: &mut DistributedVector) -> Result<()> {
+        self.coupling.as_ref().map_or(Ok(()), |coupling| coupling.make_relative(&self.held, velocity))
     }
 
     /// Adds the forces of the converged state at the start of a step to `forces` (with ghosts), and gives the energies that are known
@@ -175,9 +198,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if let (Some(mass), Evaluation::Start(blend)) = (&self.redistributed_mass, at) {
             mass.add_product(1.0 / blend.length, |at| nodal.velocity[at], forces);
         }
-        for effect in &mut self.surface_effects {
-            effect.evaluate(at, step, nodal.previous_displacement, forces, &mut outcome);
-        }
+        let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, nodal.previous_displacement);
+        add_between(self.coupling.as_ref(), &self.held, forces, |forces| {
+            for effect in &mut self.surface_effects {
+                effect.evaluate(at, step, &seen, forces, &mut outcome);
+            }
+        });
         let Some(needs) = self.needs(|p| p.start) else { return (outcome.energy, squares) };
         // Those that weaken before the others.
         let called = [true, false].map(|weakens| self.called(|p| p.start.is_some() && p.weakens == weakens));
@@ -205,7 +231,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let SupportForces { runs, forces } = &mut *self.at_supports.borrow_mut();
         forces.fill(0.0);
         with_nodal(state, |nodal| {
-            let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, nodal.displacement));
+            let seen = self.seen_by_contacts(nodal.displacement);
+            let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &seen));
             energy[STORED_IN_CONTACT] = stored.sum::<Result<f64>>()?;
             self.elastic_support.add_energy(self.evaluation, step, nodal, &mut energy);
             if let Some(mass) = &self.redistributed_mass {
@@ -214,7 +241,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 energy[NUMERICAL] -= 0.5 * mass.square(change);
             }
             let effects = self.surface_effects.iter();
-            effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
+            with_seen(self.coupling.as_ref(), &self.held, nodal, |nodal| {
+                effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
+            });
             let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
             let weakening = self.called(|p| p.weakens);
             let with_energy = self.called(|p| p.energy.is_some());
@@ -285,7 +314,10 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Adds `F x` with the matrix `F` of a form to `forces`; both have ghosts, and held components are not yet zero.
     pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         if form == Form::Elasticity {
-            self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
+            let seen = self.seen_by_contacts(x);
+            add_between(self.coupling.as_ref(), &self.held, forces, |forces| {
+                self.surface_effects.iter().for_each(|e| e.add_stiffness(&seen, forces));
+            });
         }
         self.add_linear_form(form, x, forces);
     }
@@ -361,6 +393,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             return Ok(None);
         }
         let velocity = state.velocity.local()?;
+        let velocity = self.seen_by_contacts(&velocity);
         Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
     }
 
@@ -398,7 +431,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// The part of bonds and contact memory in [`stress_error`](Self::stress_error).
     pub fn surface_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
         let mut error = StressError::default();
-        self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, displacement, &mut error));
+        let seen = self.seen_by_contacts(displacement);
+        self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, &seen, &mut error));
         error
     }
 
@@ -450,7 +484,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let step = Step { time: state.time, ..Step::default() };
         self.elastic_support.add_start_forces(&displacement, forces);
         let mut surface = Vec::new();
-        self.surface_effects.iter().for_each(|e| e.write_forces(self.evaluation, step, nodal, &mut surface));
+        with_seen(self.coupling.as_ref(), &self.held, nodal, |nodal| {
+            self.surface_effects
+                .iter()
+                .for_each(|e| e.write_forces(self.evaluation, step, nodal, &mut surface));
+        });
         for SurfaceForce { node, force, .. } in surface {
             let sums = &mut forces[node as usize * D..][..D];
             sums.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
@@ -476,7 +514,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
     pub fn write_surface_forces(&self, state: &State, forces: &mut Vec<SurfaceForce<D>>) -> Result<()> {
         let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
         with_nodal(state, |nodal| {
-            self.surface_effects.iter().for_each(|e| e.write_forces(self.evaluation, step, nodal, forces));
+            with_seen(self.coupling.as_ref(), &self.held, nodal, |nodal| {
+                self.surface_effects
+                    .iter()
+                    .for_each(|e| e.write_forces(self.evaluation, step, nodal, forces));
+            });
         })
     }
 
@@ -767,4 +809,20 @@ fn with_nodal<T>(state: &State, function: impl FnOnce(Nodal<'_>) -> T) -> Result
         velocity: &velocity,
         previous_velocity: &previous_velocity,
     }))
+}
+
+/// Passes on nodal values as contacts see them.
+fn with_seen<T, const D: usize>(
+    coupling: Option<&Coupling<D>>,
+    held: &Held<D>,
+    nodal: Nodal<'_>,
+    read: impl FnOnce(Nodal<'_>) -> T,
+) -> T {
+    let seen = |values| seen_by_contacts(coupling, held, values);
+    read(Nodal {
+        displacement: &seen(nodal.displacement),
+        previous_displacement: &seen(nodal.previous_displacement),
+        velocity: &seen(nodal.velocity),
+        previous_velocity: &seen(nodal.previous_velocity),
+    })
 }

@@ -2,6 +2,8 @@
 
 pub mod space;
 pub mod state;
+pub mod coupling;
+pub mod pairs;
 pub mod effect;
 pub mod body;
 pub mod resultants;

@@ -229,9 +229,10 @@ impl<const D: usize> Resultants<D> {
                 sums.add_and_react(Source::Support(support), node, &force);
             });
         }
+        let seen = body.seen_by_contacts(&velocity);
         for (at, contact) in body.contacts.iter().enumerate() {
-            contact.forces(&velocity, |node, force| sums.add_and_react(Source::Contact(at), node, &force));
-            let found = contact.areas(&velocity);
+            contact.forces(&seen, |node, force| sums.add_and_react(Source::Contact(at), node, &force));
+            let found = contact.areas(&seen);
             areas[at * AREAS..][..AREAS].copy_from_slice(&[
                 found.touching,
                 found.open,

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
 use crate::parallel::session::Session;
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// Cells whose [quality](super::shape::quality) is smaller are called poor: they reduce the accuracy and the condition of the
 /// matrices.
@@ -109,14 +110,54 @@ pub(super) fn curved_cells<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) ->
     Ok(())
 }
 
-/// Refuses coincident and hanging nodes.
+/// Refuses coincident and hanging nodes, except where the named boundaries of two bodies touch.
 pub(super) fn nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
-    refuse_coincident_nodes(mesh, tags)?;
-    refuse_hanging_nodes(mesh, tags)
+    let names = SurfaceNames::of(mesh);
+    refuse_coincident_nodes(mesh, &names, tags)?;
+    refuse_hanging_nodes(mesh, &names, tags)
+}
+
+/// The named boundaries of each node and of each facet. Two bodies, or the sides of a crack, may touch where their boundaries have names of
+/// their own.
+pub(super) struct SurfaceNames {
+    of_nodes: Vec<BTreeSet<usize>>,
+    of_facets: Vec<BTreeSet<usize>>,
+}
+
+impl SurfaceNames {
+    fn of<const D: usize>(mesh: &GlobalMesh<D>) -> Self {
+        let mut of_nodes = vec![BTreeSet::new(); mesh.nodes.len()];
+        let mut of_facets = vec![BTreeSet::new(); mesh.facets.len()];
+        for (name, boundary) in mesh.boundaries.iter().enumerate() {
+            for &facet in &boundary.facets {
+                of_facets[facet as usize].insert(name);
+                mesh.facets[facet as usize].iter().for_each(|&node| {
+                    of_nodes[node as usize].insert(name);
+                });
+            }
+        }
+        Self { of_nodes, of_facets }
+    }
+
+    /// Whether nodes at the same place are those of two surfaces: each is on a boundary that the other is not on.
+    fn are_of_two_surfaces(&self, a: u32, b: u32) -> bool {
+        let [a, b] = [a, b].map(|node| &self.of_nodes[node as usize]);
+        !a.is_subset(b) && !b.is_subset(a)
+    }
+
+    /// Whether a node on a facet is one of another surface: both are on boundaries, and on none together.
+    pub(super) fn is_of_another_surface(&self, node: u32, facet: usize) -> bool {
+        let (node, facet) = (&self.of_nodes[node as usize], &self.of_facets[facet]);
+        !node.is_empty() && !facet.is_empty() && node.is_disjoint(facet)
+    }
 }
 
 /// Sweeps the nodes along a direction in which no two nodes of a grid have the same position.
-fn refuse_coincident_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
+fn refuse_coincident_nodes<const D: usize>(
+    mesh: &GlobalMesh<D>,
+    names: &SurfaceNames,
+    tags: &Tags,
+) -> Result<()> {
     const SWEEP: [f64; 3] = [0.567_143_290_4, 0.660_161_815_8, 0.492_408_923_6];
     let direction: Vector<D> = std::array::from_fn(|i| SWEEP[i]);
     let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
@@ -132,10 +173,10 @@ fn refuse_coincident_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) ->
         let reach = along + tolerance + f64::EPSILON * along.abs();
         for &(_, b) in order[i + 1..].iter().take_while(|other| other.0 <= reach) {
             let (p, q) = (&mesh.nodes[a as usize], &mesh.nodes[b as usize]);
-            if norm(&add_scaled(p, -1.0, q)) <= tolerance {
+            if norm(&add_scaled(p, -1.0, q)) <= tolerance && !names.are_of_two_surfaces(a, b) {
                 return Err(Error::Refused(format!(
                     "{} and {} have the same position {}: the cells around them are not connected. Merge them (Gmsh: \
-                     Coherence, or Mesh.RemoveDuplicateNodes)",
+                     Coherence, or Mesh.RemoveDuplicateNodes); if two bodies touch there, give the boundary of each a name of its own",
                     tags.node(a.min(b) as usize),
                     tags.node(a.max(b) as usize),
                     place(p)

@@ -1,6 +1,7 @@
 //! Hanging nodes: nodes on the surface of one cell that belong to another.
 
 use super::GlobalMesh;
+use super::check::SurfaceNames;
 use super::shape::longest_edge;
 use super::tags::{Tags, place};
 use super::tree::BoxTree;
@@ -13,7 +14,11 @@ const TOUCHING: f64 = 1e-8;
 /// Refuses a node in the interior of a boundary edge or face to which it does not belong.
 ///
 /// If cells do not share complete facets, both sides are boundary facets, so that only these need to be searched.
-pub(super) fn refuse_hanging_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
+pub(super) fn refuse_hanging_nodes<const D: usize>(
+    mesh: &GlobalMesh<D>,
+    names: &SurfaceNames,
+    tags: &Tags,
+) -> Result<()> {
     let boxes = (0..mesh.facets.len()).map(|facet| {
         let corners = mesh.facet_corners(facet);
         let margin = TOUCHING * longest_edge(&corners);
@@ -34,7 +39,9 @@ pub(super) fn refuse_hanging_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &
         let mut carrier = 0;
         let hangs = tree.around(point, |facet| {
             carrier = facet as usize;
-            !mesh.facets[carrier].contains(&node) && touches(point, &mesh.facet_corners(carrier))
+            !mesh.facets[carrier].contains(&node)
+                && touches(point, &mesh.facet_corners(carrier))
+                && !names.is_of_another_surface(node, carrier)
         });
         if hangs {
             return Err(Error::Refused(format!(

@@ -5,6 +5,7 @@ pub mod check;
 mod digest;
 mod distributed;
 pub mod generate;
+mod further_ghosts;
 mod global;
 pub mod gmsh;
 mod hanging;

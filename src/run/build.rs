@@ -1,6 +1,6 @@
 //! Builds a body from the tables of a job. A table that is absent creates nothing.
 
-use super::materials::Materials;
+use super::{materials::Materials, pairs};
 use crate::{
     error::{Error, Result},
     fem::{
@@ -10,6 +10,7 @@ use crate::{
             Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
             surface_effects,
         },
+        pairs::PairedNode,
         space::{
             Geometry, Held, SurfacePoint, cell_rule, facets, place_in_cell, surface_means, surface_points,
         },
@@ -32,6 +33,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
     mesh: Mesh<D>,
+    paired: Vec<Option<Vec<PairedNode<D>>>>,
 ) -> Result<(Body<D, S>, State)> {
     let materials = Materials::new(session, job, &mesh)?;
     let geometry = Geometry::by_cells(&mesh, |cell| materials.of_cell(&mesh, cell));
@@ -41,10 +43,11 @@ pub(super) fn body<const D: usize, const S: usize>(
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
     let load = load(job, &mesh, &materials.all);
     let elastic_support = elastic_support::<D, S>(session, job, &mesh, &held, &materials)?;
+    let coupling = pairs::coupling(session, &mesh, &paired, &held)?;
     let mut contacts = Vec::new();
     let mut taken = BTreeSet::new();
     let mut parts = Vec::new();
-    for contact in &job.contact {
+    for (contact, paired) in job.contact.iter().zip(&paired) {
         let facets = part_of(session, &mesh, ("contact", &contact.on), contact.part.as_ref())?;
         session.agree(take_facets(contact, &mesh, &facets, &mut taken))?;
         parts.push(facets.clone());
@@ -57,7 +60,7 @@ pub(super) fn body<const D: usize, const S: usize>(
             session,
             &mesh,
             &facets,
-            ContactConditions { quadrature: contact.quadrature, law, gap },
+            ContactConditions { quadrature: contact.quadrature, law, gap, paired: paired.clone() },
             &held,
         )?;
         laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
@@ -67,7 +70,8 @@ pub(super) fn body<const D: usize, const S: usize>(
         }
         contacts.push(laws);
     }
-    let surface_effects = surface_effects(session, &job.contact, &mesh, &parts, &held)?;
+    pairs::refuse_conflicts(session, job, &mesh, &contacts)?;
+    let surface_effects = surface_effects(session, &job.contact, &mesh, (&parts, &paired), &held)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
@@ -87,7 +91,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut body = Body::new(mesh, geometry, effects, held, evaluation(job.time.scheme));
     body.material_tables = materials.tables;
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
-    (body.support_motion, body.elastic_support) = (motion, elastic_support);
+    (body.support_motion, body.elastic_support, body.coupling) = (motion, elastic_support, coupling);
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
         let facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();

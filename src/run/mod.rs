@@ -13,6 +13,7 @@ mod materials;
 mod memory;
 mod obstacles;
 mod outputs;
+mod pairs;
 mod phases;
 mod reactions;
 mod restored;

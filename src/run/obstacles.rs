@@ -30,6 +30,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     state: &State,
 ) -> Result<Vec<String>> {
     let displacement = session.agree(state.displacement.local())?;
+    let displacement = body.seen_by_contacts(&displacement);
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
@@ -43,6 +44,9 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject the body; correct the gap, the obstacle or [initial] displacement",
                 100.0 * deepest / size
             ));
+        }
+        if contact.is_paired() {
+            continue;
         }
         let [least, most] = depths(session, &contact.gap, &body.mesh.nodes);
         if deepest > ROUNDING * size || most <= TOO_DEEP * size {
@@ -105,6 +109,7 @@ pub(super) fn gaps<const D: usize, const S: usize>(
     state: &State,
 ) -> Result<Vec<ContactGaps>> {
     let displacement = session.agree(state.displacement.local())?;
+    let displacement = body.seen_by_contacts(&displacement);
     let contacts = body.contacts.iter().zip(&job.contact);
     let gaps =
         contacts.filter(|(contact, _)| contact.law.depends_on_displacement()).map(|(contact, table)| {
@@ -142,6 +147,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     has_ended: bool,
 ) -> Result<Vec<String>> {
     let displacement = session.agree(state.displacement.local())?;
+    let displacement = body.seen_by_contacts(&displacement);
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {

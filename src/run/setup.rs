@@ -4,7 +4,7 @@ use super::{
     Inventory, bonds, build,
     estimate::MemoryEstimate,
     memory::require_for_run,
-    obstacles,
+    obstacles, pairs,
     restored::{StartState, transfer},
     steps,
     validate::refuse_free_bodies,
@@ -41,14 +41,15 @@ pub(super) struct Setup<const D: usize, const S: usize> {
 pub(super) fn setup<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
-    mesh: Mesh<D>,
+    mut mesh: Mesh<D>,
 ) -> Result<Setup<D, S>> {
     let job = &loaded.job;
     for (name, value) in &job.solver.petsc {
         session.agree(set_option(name, value))?;
     }
+    let paired = pairs::find(session, job, &mut mesh)?;
     let probes = session.agree(Probes::locate(session, &mesh, &job.output.probe))?;
-    let (mut body, mut state) = build::body::<D, S>(session, job, mesh)?;
+    let (mut body, mut state) = build::body::<D, S>(session, job, mesh, paired)?;
     let began_from = transfer(session, loaded, &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;

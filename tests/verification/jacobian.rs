@@ -102,7 +102,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                     session,
                     &body.mesh,
                     facets,
-                    ContactConditions { quadrature, law, gap },
+                    ContactConditions { quadrature, law, gap, paired: None },
                     &body.held,
                 )
                 .expect("contact")
@@ -229,7 +229,7 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
         axis: (D == 3).then(|| vec![0.3, 1.0, 0.0]),
     });
     let law = laws()[6].clone();
-    let conditions = ContactConditions { quadrature: Quadrature::Nodal, law, gap };
+    let conditions = ContactConditions { quadrature: Quadrature::Nodal, law, gap, paired: None };
     let mut contact = Contact::new(session, &body.mesh, &facets, conditions, &body.held).expect("contact");
     let friction = FRICTION[1].expect("a law");
     contact.add_friction(friction, &body.mesh, &body.held).expect("friction");
@@ -292,8 +292,12 @@ fn follows_belt(session: &Session) {
     let (body, state) =
         body::<2, 4>(session, &crossed([4, 3]), &[("left", Fix::Keyword(FixedDirections::All))], vec![]);
     let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
-    let conditions =
-        ContactConditions { quadrature: Quadrature::Nodal, law: laws()[6].clone(), gap: belt::<2>() };
+    let conditions = ContactConditions {
+        quadrature: Quadrature::Nodal,
+        law: laws()[6].clone(),
+        gap: belt::<2>(),
+        paired: None,
+    };
     let mut contact = Contact::new(session, &body.mesh, &facets, conditions, &body.held).expect("contact");
     contact.add_friction(FRICTION[2].expect("a law"), &body.mesh, &body.held).expect("friction");
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");

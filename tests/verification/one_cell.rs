@@ -57,8 +57,14 @@ fn forces<const D: usize>(
     let facets = mesh.boundary("bottom").expect("a boundary").facets.clone();
     let (law, gap, fixed) =
         (NormalResponse::Graph(law.clone()), Gap::default(), Held::from(vec![false; (D + 1) * D]));
-    let contact = Contact::new(session, &mesh, &facets, ContactConditions { quadrature, law, gap }, &fixed)
-        .expect("contact");
+    let contact = Contact::new(
+        session,
+        &mesh,
+        &facets,
+        ContactConditions { quadrature, law, gap, paired: None },
+        &fixed,
+    )
+    .expect("contact");
     let mut contacts = [contact];
     choose_unknowns(&mut contacts, &mesh).expect("one normal");
     let [contact] = &mut contacts;
@@ -169,7 +175,7 @@ fn pushed_hard(session: &Session) {
         session,
         &mesh,
         &facets,
-        ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default() },
+        ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default(), paired: None },
         &Held::from(vec![false; 6]),
     );
     let mut contacts = [contact.expect("contact")];

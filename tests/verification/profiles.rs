@@ -131,7 +131,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
         session,
         &body.mesh,
         &facets,
-        ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default() },
+        ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default(), paired: None },
         &body.held,
     );
     body.contacts.push(contact.expect("a contact"));

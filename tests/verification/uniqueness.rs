@@ -228,7 +228,7 @@ fn compare<const D: usize, const S: usize>(
             session,
             &run.body.mesh,
             facets,
-            ContactConditions { quadrature: Quadrature::Gauss, law, gap: Gap::default() },
+            ContactConditions { quadrature: Quadrature::Gauss, law, gap: Gap::default(), paired: None },
             &run.body.held,
         )
         .expect("contact")

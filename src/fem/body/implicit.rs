@@ -1,8 +1,9 @@
 //! A body in steps that are implicit in every stress.
 
-use super::{Body, Called};
+use super::{Body, Called, with_seen};
 use crate::{
     fem::{
+        coupling::{Coupling, add_between, seen_by_contacts},
         effect::{
             Contact, ContactNode, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents,
             Term, contact_nodes,
@@ -23,7 +24,9 @@ pub struct Cells<'a, const D: usize, const S: usize> {
     effects: &'a mut [Box<dyn Effect<D, S>>],
     surface_effects: &'a mut [Box<dyn SurfaceEffect<D>>],
     /// What supports hold.
-    pub held: &'a Held<D>,
+    held: &'a Held<D>,
+    /// Contact between bodies, if there is any.
+    coupling: Option<&'a Coupling<D>>,
     evaluation: Evaluation,
     step: Step,
     evaluated: &'a mut Vec<f64>,
@@ -32,9 +35,12 @@ pub struct Cells<'a, const D: usize, const S: usize> {
 impl<const D: usize, const S: usize> Body<D, S> {
     /// Cells and contacts, borrowed at the same time.
     pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
-        let Self { mesh, geometry, effects, surface_effects, held, contacts, evaluated, .. } = self;
+        let Self { mesh, geometry, effects, surface_effects, held, coupling, contacts, evaluated, .. } = self;
+        let coupling = coupling.as_ref();
         let (evaluation, step) = (self.evaluation, self.step);
-        (Cells { mesh, geometry, effects, surface_effects, held, evaluation, step, evaluated }, contacts)
+        let cells =
+            Cells { mesh, geometry, effects, surface_effects, held, coupling, evaluation, step, evaluated };
+        (cells, contacts)
     }
 
     /// Whether implicit steps are nonlinear without contact: cells flow or are damaged, or there are effects at the surface.
@@ -74,9 +80,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
         let evaluation = self.evaluation;
         self.elastic_support.add_step_energy(step, nodal, energy);
-        for effect in &mut self.surface_effects {
-            effect.add_step_energy(evaluation, step, nodal, energy);
-        }
+        with_seen(self.coupling.as_ref(), &self.held, nodal, |nodal| {
+            for effect in &mut self.surface_effects {
+                effect.add_step_energy(evaluation, step, nodal, energy);
+            }
+        });
         let (mut cells, _) = self.cells_and_contacts();
         let (called, needs) = cells.flowing();
         // Energies of damage need the stresses of the evaluation as well.
@@ -99,7 +107,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 }
 
-impl<const D: usize, const S: usize> Cells<'_, D, S> {
+impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
+    /// What relates the unknowns of a step to velocities: what supports hold, and contact between bodies.
+    pub fn basis(&self) -> (&'a Held<D>, Option<&'a Coupling<D>>) {
+        (self.held, self.coupling)
+    }
+
     /// Whether the derivative of the flow is symmetric in all cells.
     pub fn has_symmetric_tangent(&self) -> bool {
         let is_skew = |term| matches!(term, Term::Flow(flow) if !flow.has_symmetric_tangent);
@@ -142,9 +155,12 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
             tangents.restart::<S>(self.geometry.point_count());
         }
         let mut outcome = Outcome { tangents, ..Outcome::default() };
-        for effect in self.surface_effects.iter_mut() {
-            effect.evaluate(self.evaluation, self.step, displacement, forces, &mut outcome);
-        }
+        let seen = seen_by_contacts(self.coupling, self.held, displacement);
+        add_between(self.coupling, self.held, forces, |forces| {
+            for effect in self.surface_effects.iter_mut() {
+                effect.evaluate(self.evaluation, self.step, &seen, forces, &mut outcome);
+            }
+        });
         let (called, needs) = self.flowing();
         if called.is_empty() {
             return;
@@ -162,7 +178,8 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
 
     /// Adds the change of the forces of flow with a velocity to `forces` (both with ghosts).
     pub fn add_tangents(&self, tangents: &Tangents, velocity: &[f64], forces: &mut [f64]) {
-        tangents.add_nodal::<D>(velocity, forces);
+        let seen = seen_by_contacts(self.coupling, self.held, velocity);
+        add_between(self.coupling, self.held, forces, |forces| tangents.add_nodal::<D>(&seen, forces));
         for (number, tangent) in tangents.iter::<S>() {
             let (number, point, cell) = self.geometry.point(number);
             let place = (self.geometry.points() > 1).then(|| &cell_rule::<D>()[point].0);

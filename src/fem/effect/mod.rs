@@ -36,7 +36,10 @@ mod viscous_stress;
 
 use crate::{
     error::{Error, Result},
-    fem::space::{CellRun, Geometry, Held, surface_points},
+    fem::{
+        pairs::PairedNode,
+        space::{CellRun, Geometry, Held, surface_points},
+    },
     job::{self, Material},
     laws::material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
     linear_algebra::{simd::Pack, tensor::Mandel},
@@ -143,14 +146,17 @@ pub fn surface_effects<const D: usize>(
     session: &Session,
     contacts: &[job::Contact],
     mesh: &Mesh<D>,
-    facets: &[Vec<u32>],
+    (facets, paired): (&[Vec<u32>], &[Option<Vec<PairedNode<D>>>]),
     held: &Held<D>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
-    for (at, (contact, facets)) in contacts.iter().zip(facets).enumerate() {
+    for (at, (contact, (facets, paired))) in contacts.iter().zip(facets.iter().zip(paired)).enumerate() {
         let points = || {
-            let points = surface_points(session, mesh, facets)?;
+            let points = match paired {
+                Some(paired) => paired.iter().map(PairedNode::point).collect(),
+                None => surface_points(session, mesh, facets)?,
+            };
             Ok::<Vec<_>, Agreed>(points.into_iter().map(|point| held.whole(point)).collect())
         };
         if let Some(law) = contact.memory {

@@ -6,6 +6,7 @@ mod geometry;
 mod held;
 mod kernels;
 mod linear_subspace;
+pub mod mortar;
 mod quadratic;
 mod quadrature;
 #[cfg(test)]

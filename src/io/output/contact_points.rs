@@ -27,6 +27,8 @@ pub(super) fn contact_points<const D: usize, const S: usize>(
     let mut points: Vec<(usize, PointState<D>)> = Vec::new();
     let mut visit_all = || {
         let (displacement, velocity) = (at.state.displacement.local()?, at.state.velocity.local()?);
+        let [displacement, velocity] =
+            [&displacement, &velocity].map(|values| at.body.seen_by_contacts(values));
         let nodal = [&*displacement, &*velocity, &*traction.owned()?];
         contacts().try_for_each(|contact| {
             contact.states(at.state.time, nodal, |node, state| points.push((node, state)))

@@ -7,6 +7,7 @@ use crate::laws::schemes::Scheme;
 
 pub(in crate::job) fn check_contact(contact: &Contact, table: &mut Table<'_>, scheme: Scheme) {
     table.refuse_repeats("on", "boundary");
+    table.refuse_repeats("against", "boundary");
     if !table.is_unread("normal") && !table.is_unread("obstacle") {
         table.refuse(contact.faults());
     }
@@ -23,6 +24,9 @@ pub(in crate::job) fn check_contact(contact: &Contact, table: &mut Table<'_>, sc
 
 pub(in crate::job) fn check_names(contact: &Contact, table: &mut Table<'_>, mesh: MeshNames<'_>) {
     check_on(table, &contact.on, None, mesh);
+    for (index, name) in contact.against.iter().enumerate() {
+        table.check_place(&format!("against.{index}"), name, mesh, &[]);
+    }
     table.check_flat("where", contact.part.as_ref(), mesh.dimension);
     table.check_flat(&format!("{}.gap", contact.normal.table()), contact.normal.gap(), mesh.dimension);
     if let Some(load) = &contact.obstacle_load {

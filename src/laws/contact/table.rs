@@ -32,6 +32,14 @@ pub struct Contact {
     /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["bottom"])]
     pub on: Vec<String>,
+    /// The names of the boundaries of other bodies that the boundaries `on` may touch, instead of a rigid obstacle. The law acts at nodes
+    /// of `on`, the slave side, on their velocity and displacement relative to the surface that they face along their normals in the
+    /// undeformed bodies; friction, adhesion, memory and wear as against an obstacle. Choose as `on` the side with the finer mesh and
+    /// without supports. The distance of the undeformed surfaces is that of the mesh; `gap` of the normal law adds to it, so that a
+    /// negative one is an interference. Valid while slip stays small beside a facet. Absent: an obstacle or `gap`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(example = ["top"])]
+    pub against: Vec<String>,
     /// The part of these boundaries to which the contact applies: the facets at whose centre this expression in x, y, z is not 0. A
     /// boundary may be in several contact tables if each has a `where`, and no facet belongs to two; a node between them belongs to the
     /// one with the larger part of its area. A product of conditions holds where all hold, their `max` where one holds. Absent: the
@@ -114,6 +122,7 @@ impl Contact {
         faults.extend(self.memory.iter().flat_map(|_| Memory::faults(interface)));
         let has_histories = self.adhesion.is_some() || self.memory.is_some();
         faults.extend(self.wear.iter().flat_map(|_| Wear::faults(interface, has_histories)));
+        faults.extend(self.faults_of_pair());
         if self.quadrature == Quadrature::Gauss {
             let not_there = [
                 (self.friction.is_some(), "friction is not available at Gauss points"),
@@ -124,6 +133,38 @@ impl Contact {
             let help = "use \"nodal\", or delete the key";
             let not_there = not_there.into_iter().filter(|(is_there, _)| *is_there);
             faults.extend(not_there.map(|(_, message)| LawFault::at_value("quadrature", message, help)));
+        }
+        faults
+    }
+
+    /// Another body takes the place of an obstacle.
+    fn faults_of_pair(&self) -> Vec<LawFault> {
+        if self.against.is_empty() {
+            return Vec::new();
+        }
+        let not_there = [
+            (
+                self.obstacle.is_some(),
+                "obstacle",
+                "the boundaries `on` touch another body or a rigid obstacle, not both",
+            ),
+            (
+                self.obstacle_load.is_some(),
+                "obstacle_load",
+                "a load moves a rigid obstacle, and this contact is against a body",
+            ),
+        ];
+        let not_there = not_there.into_iter().filter(|(is_there, ..)| *is_there);
+        let mut faults: Vec<LawFault> = not_there
+            .map(|(_, key, message)| LawFault::at_key(key, message, "delete it, or delete `against`"))
+            .collect();
+        if self.quadrature == Quadrature::Gauss {
+            let message = "contact between bodies acts at nodes";
+            faults.push(LawFault::at_value("quadrature", message, "use \"nodal\", or delete the key"));
+        }
+        if let Some(name) = self.on.iter().find(|name| self.against.contains(name)) {
+            let message = format!("the boundary \"{name}\" is on both sides of this contact");
+            faults.push(LawFault::at_value("against", message, "name another boundary"));
         }
         faults
     }

@@ -72,6 +72,21 @@ pub(super) fn apply<const D: usize, const S: usize>(
     clear_fixed_components(body, y)
 }
 
+/// The same for a form of the interior, which acts on the velocities of the body, given the unknowns of a step. Collective.
+pub(super) fn apply_in_body<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    x: &mut DistributedVector,
+    y: &mut DistributedVector,
+    add: impl FnOnce(&[f64], &mut [f64]),
+) -> Result<()> {
+    let Some(coupling) = &body.coupling else { return apply(body, x, y, add) };
+    let mut absolute = x.like()?;
+    absolute.copy_from(x)?;
+    coupling.make_absolute(&body.held, &mut absolute)?;
+    apply(body, &mut absolute, y, add)?;
+    coupling.reduce_forces(&body.held, y)
+}
+
 /// Sets the fixed components to zero.
 pub(super) fn clear_fixed_components<const D: usize, const S: usize>(
     body: &Body<D, S>,

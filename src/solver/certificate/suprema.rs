@@ -253,8 +253,10 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
         let part = self.parts()[form];
         match part {
             Part::Matrix => self.matrix.multiply(x, y),
-            Part::Interior(form) => forms::apply(body, x, y, |x, y| body.add_form(form, x, y)),
-            Part::OfMatrix(form) => forms::apply(body, x, y, |x, y| body.add_form_of_matrix(form, x, y)),
+            Part::Interior(form) => forms::apply_in_body(body, x, y, |x, y| body.add_form(form, x, y)),
+            Part::OfMatrix(form) => {
+                forms::apply_in_body(body, x, y, |x, y| body.add_form_of_matrix(form, x, y))
+            }
             _ => forms::apply(body, x, y, |x, y| {
                 for contact in &body.contacts {
                     let coefficients = self.coefficients(part, contact);

@@ -20,6 +20,7 @@ pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     powers: &mut Energy,
 ) -> Result<()> {
     let velocity = state.velocity.local()?;
+    let velocity = body.seen_by_contacts(&velocity);
     for contact in &body.contacts {
         let own = contact.energy_of_step(&velocity, step.length);
         energy[CONTACT] += own.dissipated + step.length * own.dissipated_power;
@@ -43,6 +44,7 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         return Ok(());
     }
     let (converged, start) = (state.displacement.local()?, start.local()?);
+    let (converged, start) = (body.seen_by_contacts(&converged), body.seen_by_contacts(&start));
     for contact in &mut body.contacts {
         contact.prepare(step, blend, [&converged, &start])?;
     }
@@ -57,6 +59,7 @@ pub(super) fn refuse_passage<const D: usize, const S: usize>(
     solved: &DistributedVector,
 ) -> Result<()> {
     let (displacement, velocity) = (state.displacement.local()?, solved.local()?);
+    let (displacement, velocity) = (body.seen_by_contacts(&displacement), body.seen_by_contacts(&velocity));
     for (number, contact) in body.contacts.iter().enumerate() {
         let passage = contact.refuse_passage(step, &displacement, &velocity);
         passage.map_err(|error| Error::Failed(format!("contact.{number}: {error}")))?;
@@ -70,6 +73,7 @@ pub(super) fn keep_closeness<const D: usize, const S: usize>(
     state: &State,
 ) -> Result<()> {
     let velocity = state.velocity.local()?;
+    let velocity = body.seen_by_contacts(&velocity);
     body.contacts.iter_mut().for_each(|contact| contact.keep_closeness(&velocity));
     Ok(())
 }
@@ -94,6 +98,7 @@ pub(super) fn commit_tractions<const D: usize, const S: usize>(
 ) -> Result<()> {
     let Some(traction) = &mut state.contact_traction else { return Ok(()) };
     let velocity = state.velocity.local()?;
+    let velocity = body.seen_by_contacts(&velocity);
     body.contacts.iter_mut().for_each(|contact| contact.advance_histories(&velocity));
     traction.owned_mut()?.fill(0.0);
     for contact in &body.contacts {

@@ -4,7 +4,7 @@
 use super::equations::CellForces;
 use crate::{
     error::Result,
-    fem::{body::Cells, effect::Tangents, space::Held},
+    fem::{body::Cells, coupling::Coupling, effect::Tangents, space::Held},
     linear_algebra::petsc::DistributedVector,
 };
 
@@ -93,6 +93,7 @@ impl Flow {
         to: &mut DistributedVector,
     ) -> Result<()> {
         self.extend::<D>(to)?;
+        self.values.update_ghosts()?;
         self.forces.copy_from(velocity)?;
         self.forces.add_scaled(-1.0, &self.values)?;
         self.add_free_parts(held, to)
@@ -110,11 +111,27 @@ impl Flow {
     /// Adds the sum over all ranks to `out`, without prescribed components.
     fn add_to_free_components<const D: usize>(
         &mut self,
-        held: &Held<D>,
+        (held, coupling): (&Held<D>, Option<&Coupling<D>>),
         out: &mut DistributedVector,
     ) -> Result<()> {
         self.forces.add_ghosts_to_owners()?;
+        if let Some(coupling) = coupling {
+            coupling.reduce_forces(held, &mut self.forces)?;
+        }
         self.add_free_parts(held, out)
+    }
+
+    /// Copies unknowns or their change, and makes the velocities of all nodes of them, with ghosts.
+    fn write_velocity<const D: usize>(
+        &mut self,
+        (held, coupling): (&Held<D>, Option<&Coupling<D>>),
+        values: &DistributedVector,
+    ) -> Result<()> {
+        self.extend::<D>(values)?;
+        match coupling {
+            Some(coupling) => coupling.make_absolute(held, &mut self.values),
+            None => self.values.update_ghosts(),
+        }
     }
 
     /// The same for forces that are sums over all ranks already.
@@ -133,7 +150,7 @@ impl Flow {
         Ok(())
     }
 
-    /// Copies a velocity or its change to the vector of all nodes, with ghosts.
+    /// Copies a velocity or its change to the vector of all nodes.
     fn extend<const D: usize>(&mut self, values: &DistributedVector) -> Result<()> {
         match &self.part {
             None => self.values.copy_from(values)?,
@@ -143,14 +160,14 @@ impl Flow {
                 pairs.for_each(|(from, &node)| to[node * D..][..D].copy_from_slice(from));
             }
         }
-        self.values.update_ghosts()
+        Ok(())
     }
 }
 
 impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
     /// The displacement at the end of the step, with ghosts.
     fn displace(&mut self, velocity: &DistributedVector) -> Result<()> {
-        self.flow.extend::<D>(velocity)?;
+        self.flow.write_velocity(self.cells.basis(), velocity)?;
         let (start, mut values) = (self.start.displacement.local()?, self.flow.values.local_mut()?);
         values.iter_mut().zip(start.iter()).for_each(|(v, u)| *v = u + self.start.length * *v);
         Ok(())
@@ -169,7 +186,7 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
             self.cells.add_flow(&values, None, &mut forces);
         }
         out.fill(0.0)?;
-        self.flow.add_to_free_components(self.cells.held, out)
+        self.flow.add_to_free_components(self.cells.basis(), out)
     }
 
     /// Evaluates the forces at a velocity with their derivatives.
@@ -188,7 +205,7 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
 impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
     fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
         self.evaluate(velocity)?;
-        self.flow.add_to_free_components(self.cells.held, forces)
+        self.flow.add_to_free_components(self.cells.basis(), forces)
     }
 
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()> {
@@ -211,12 +228,12 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
 
     fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
         let flow = &mut *self.flow;
-        flow.extend::<D>(change)?;
+        flow.write_velocity(self.cells.basis(), change)?;
         {
             let (values, mut forces) = (flow.values.local()?, flow.forces.local_mut()?);
             forces.fill(0.0);
             self.cells.add_tangents(&flow.tangents, &values, &mut forces);
         }
-        self.flow.add_to_free_components(self.cells.held, forces)
+        self.flow.add_to_free_components(self.cells.basis(), forces)
     }
 }

@@ -436,7 +436,8 @@ impl Newton {
         trial: &DistributedVector,
         start: &mut DistributedVector,
     ) -> Result<bool> {
-        let Some(flow) = self.flow.as_mut().filter(|_| problem.state.step > 1) else { return Ok(false) };
+        let has_earlier = problem.state.step > 1 && problem.body.coupling.is_none();
+        let Some(flow) = self.flow.as_mut().filter(|_| has_earlier) else { return Ok(false) };
         start.copy_from(trial)?;
         flow.copy_free_parts(&problem.body.held, &problem.state.previous_velocity, start)?;
         let mut unknowns = start.owned_mut()?;

@@ -19,6 +19,8 @@ pub(super) struct StepProblem<'a, const D: usize, const S: usize> {
     pub body: &'a mut Body<D, S>,
     /// The converged state from which the step starts.
     pub state: &'a State,
+    /// Its velocity in the unknowns of the step.
+    pub converged: &'a DistributedVector,
     pub step: Step,
     /// The right-hand side in N.
     pub forces: &'a DistributedVector,

@@ -7,10 +7,11 @@
 use crate::{
     error::{Error, Result},
     fem::body::Body,
-    linear_algebra::petsc::BlockRows,
+    linear_algebra::petsc::{BlockRows, DistributedVector},
     mesh::free_motions,
     parallel::{agreement::Agreed, session::Session},
 };
+use std::collections::BTreeMap;
 
 /// Ratio of the stiffness of a spring to that of the matrix at its node.
 const STIFFNESS_RATIO: f64 = 1e-4;
@@ -59,15 +60,15 @@ impl Springs {
         length: f64,
     ) -> Result<RowsWithSprings> {
         let rows = body.matrix(session, length)?;
-        self.add(session, body, rows)
+        self.add(session, body, (rows, length))
     }
 
-    /// Adds the springs to the rows of a matrix. Collective.
+    /// Adds the springs to the rows of the matrix for steps of this length in s. Collective.
     pub(super) fn add<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
-        mut rows: BlockRows,
+        (mut rows, length): (BlockRows, f64),
     ) -> Result<RowsWithSprings> {
         // Points of Gauss quadrature may touch nodes of other ranks.
         let nodes = body.contact_nodes();
@@ -82,6 +83,7 @@ impl Springs {
         } else {
             vec![0.0; D * D]
         };
+        let weakest = weakest_side(session, body, length)?;
         let stiffness = |&(node, motion): &(usize, [f64; D])| {
             let range = rows.offsets[node]..rows.offsets[node + 1];
             let (mut own, mut together) = (0.0, 0.0);
@@ -91,6 +93,9 @@ impl Springs {
                 if rows.columns[at] as usize == first + node {
                     own = power;
                 }
+            }
+            if let Some(&resistance) = weakest.get(&node) {
+                together = resistance;
             }
             let whole = (total * together).max(quadratic_form(&inertia, &motion));
             if whole < NEGLIGIBLE * own { STIFFNESS_RATIO * own } else { 0.0 }
@@ -118,6 +123,36 @@ impl Springs {
         }
         Ok(RowsWithSprings { rows, springs: Some(springs) })
     }
+}
+
+/// For the nodes of this rank that face another body, the resistance in N s/m of the one of both surfaces there that resists the translation
+/// of its body less, in steps of this length in s. Collective.
+fn weakest_side<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    length: f64,
+) -> Result<BTreeMap<usize, f64>, Agreed> {
+    let Some(coupling) = &body.coupling else { return Ok(BTreeMap::new()) };
+    let rows = body.matrix_of_bodies(session, length)?;
+    let resistances = || -> Result<BTreeMap<usize, f64>> {
+        let mut all = DistributedVector::ghosted(D, body.mesh.owned, &body.mesh.ghosts)?;
+        {
+            let mut values = all.owned_mut()?;
+            for (node, range) in rows.offsets.windows(2).enumerate() {
+                let blocks = rows.values[range[0] * D * D..range[1] * D * D].chunks_exact(D * D);
+                blocks.for_each(|block| (0..D).for_each(|i| values[node * D + i] += block[i * D + i]));
+            }
+        }
+        all.update_ghosts()?;
+        let of_node = |values: &[f64], node: u32| values[node as usize * D..][..D].iter().sum::<f64>();
+        let values = all.local()?;
+        let weaker = |(slave, masters): (u32, &[(u32, f64)])| {
+            let facing: f64 = masters.iter().map(|(master, share)| share * of_node(&values, *master)).sum();
+            (slave as usize, facing.min(of_node(&values, slave)))
+        };
+        Ok(coupling.slaves().map(weaker).collect())
+    };
+    session.agree(resistances())
 }
 
 /// The sum of all blocks over all ranks: the resistance to translations of everything together. Collective.

@@ -136,6 +136,8 @@ fn contact_deviations<const D: usize, const S: usize>(
     if body.contacts.is_empty() {
         return all;
     }
+    let (end, velocity) = (body.seen_by_contacts(motion.0), body.seen_by_contacts(motion.1));
+    let motion = (&*end, &*velocity);
     let mut squares = [[0.0; 3]; CONTACT_QUANTITIES];
     for contact in &body.contacts {
         for (sum, found) in squares.iter_mut().zip(contact.deviations(curvature, motion)) {

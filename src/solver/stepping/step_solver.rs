@@ -211,7 +211,7 @@ impl StepSolver {
     ) -> Result<Prepared> {
         let rows = matrix_rows(session, body, length)?;
         let matrix = session.agree(Matrix::symmetric(D, &rows))?;
-        let rows = self.springs.add(session, body, rows)?;
+        let rows = self.springs.add(session, body, (rows, length))?;
         let mut prepared = Prepared { length, matrix, solver: self.kind.another(like)?, scales: Vec::new() };
         if !self.complete(session, body, &mut prepared, rows, like)? {
             self.kind = Box::new(Whole::new(session, body, like, &self.settings)?);
@@ -296,7 +296,7 @@ impl StepSolver {
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        let (session, state, forces) = (problem.session, problem.state, problem.forces);
+        let (session, converged, forces) = (problem.session, problem.converged, problem.forces);
         let Accuracy { mut tolerance, size, reference } = self.accuracy(problem, trial)?;
         let floor = Floor { slope: f64::EPSILON * self.matrix_norm, largest: LARGEST_FLOOR * size };
         let (mut is_relaxed, mut is_pressed_on) = (false, false);
@@ -309,7 +309,7 @@ impl StepSolver {
                 keep(trial, start)?;
             }
             let matrix = &CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products };
-            let (right_hand_side, converged) = (forces, &state.velocity);
+            let right_hand_side = forces;
             let system = System { matrix, right_hand_side, tolerance, floor, converged, scales };
             let solved = match (newton, flowing) {
                 (None, _) => solve_linear(solver.krylov().linear_solver(), problem, system, trial),

@@ -56,6 +56,8 @@ pub struct Stepper {
     moving_supports: Option<MovingSupports>,
     force_scale: ForceScale,
     trial: DistributedVector,
+    /// The velocity of the converged state in the unknowns of a step, with contact between bodies.
+    converged: Option<DistributedVector>,
     /// Whether the scheme has completed the last attempted step, so that trial histories belong to its solution.
     is_finished: bool,
     /// Work space for the error of a step.
@@ -120,6 +122,7 @@ impl Stepper {
             moving_supports: MovingSupports::new(body, state)?,
             force_scale: ForceScale::new(body, &state.velocity)?,
             trial: state.velocity.like()?,
+            converged: if body.coupling.is_some() { Some(state.velocity.like()?) } else { None },
             is_finished: false,
             workspace: ErrorWorkspace::default(),
             base_length: 1.0,
@@ -260,6 +263,9 @@ impl Stepper {
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
         let outcome = self.solve(session, body, state, step);
+        if let Some(coupling) = &body.coupling {
+            coupling.make_absolute(&body.held, &mut self.trial)?;
+        }
         if let Some(supports) = &self.moving_supports {
             supports.set(body, &mut self.trial)?;
         }
@@ -268,7 +274,7 @@ impl Stepper {
         self.traffic.add_solve(self.solver.traffic(session.ranks())?);
         let outcome = outcome?;
         if body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
-            if body.contacts.iter().any(Contact::needs_ghosts) {
+            if body.coupling.is_some() || body.contacts.iter().any(Contact::needs_ghosts) {
                 self.trial.update_ghosts()?;
             }
             session.agree(refuse_passage(body, state, step, &self.trial))?;
@@ -284,11 +290,26 @@ impl Stepper {
         state: &State,
         step: Step,
     ) -> Result<StepOutcome> {
-        let scale = self.size_of_forces(session, body, state, step)?;
+        let mut scale = self.size_of_forces(session, body, state, step)?;
+        let mut converged = &state.velocity;
+        if let (Some(coupling), Some(unknowns)) = (&body.coupling, &mut self.converged) {
+            unknowns.copy_from(converged)?;
+            coupling.make_relative(&body.held, unknowns)?;
+            coupling.make_relative(&body.held, &mut self.trial)?;
+            coupling.reduce_forces(&body.held, &mut self.right_hand_side)?;
+            converged = unknowns;
+        }
+        if let Some(supports) = &mut self.moving_supports {
+            let residual = &mut supports.held;
+            self.solver.multiply(&self.trial, residual)?;
+            residual.add_scaled(-1.0, &self.right_hand_side)?;
+            scale = scale.max(residual.norm()?);
+        }
         let mut problem = StepProblem {
             session,
             body,
             state,
+            converged,
             step,
             forces: &self.right_hand_side,
             scale,
@@ -304,27 +325,15 @@ impl Stepper {
 
     /// The size in N of the forces of the started step, without what only carries the body along. Collective.
     fn size_of_forces<const D: usize, const S: usize>(
-        &mut self,
+        &self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,
         step: Step,
     ) -> Result<f64> {
+        let known = self.moving_supports.as_ref().map_or(&self.right_hand_side, |supports| &supports.known);
         let length = self.integrator.matrix_length(step);
-        let Some(supports) = &mut self.moving_supports else {
-            return self.force_scale.without_translation(
-                session,
-                body,
-                state,
-                (&self.right_hand_side, length),
-            );
-        };
-        let residual = &mut supports.held;
-        self.solver.multiply(&self.trial, residual)?;
-        residual.add_scaled(-1.0, &self.right_hand_side)?;
-        let residual = residual.norm()?;
-        let known = (&supports.known, length);
-        Ok(residual.max(self.force_scale.without_translation(session, body, state, known)?))
+        self.force_scale.without_translation(session, body, state, (known, length))
     }
 
     /// The error of the last attempted step: of the velocity, of the strain that it causes, and of the resulting histories of

@@ -15,8 +15,10 @@ use crate::{
 
 /// Work vectors.
 pub(super) struct MovingSupports {
-    /// `g`, with ghosts.
+    /// `g`.
     pub velocity: DistributedVector,
+    /// The same with the velocities of the nodes that move along with held ones in contact between bodies, with ghosts.
+    carried: DistributedVector,
     /// `K g`.
     coupling: DistributedVector,
     /// `b`.
@@ -40,6 +42,7 @@ impl MovingSupports {
         let like = || state.velocity.like();
         Ok(Some(Self {
             velocity: like()?,
+            carried: like()?,
             coupling: like()?,
             known: like()?,
             held: like()?,
@@ -63,9 +66,13 @@ impl MovingSupports {
             motion.write_velocity(step.time, &start, length, &mut velocity)
         };
         session.agree(written)?;
-        self.velocity.update_ghosts()?;
+        self.carried.copy_from(&self.velocity)?;
+        match &body.coupling {
+            Some(coupling) => coupling.make_absolute(&body.held, &mut self.carried)?,
+            None => self.carried.update_ghosts()?,
+        }
         {
-            let (velocity, mut coupling) = (self.velocity.local()?, self.coupling.local_mut()?);
+            let (velocity, mut coupling) = (self.carried.local()?, self.coupling.local_mut()?);
             coupling.fill(0.0);
             body.add_matrix_product(length, &velocity, &mut self.values, &mut coupling);
         }
@@ -96,7 +103,7 @@ impl MovingSupports {
         let mut flow = 0.0;
         if let Some(FlowStart { displacement, length }) = start.filter(|_| body.flows()) {
             let (start, velocity) = (displacement.local()?, velocity.local()?);
-            let Self { velocity: motion, values: end, forces, .. } = &mut *self;
+            let Self { carried: motion, values: end, forces, .. } = &mut *self;
             end.clear();
             end.extend(start.iter().zip(velocity.iter()).map(|(u, v)| u + length * v));
             forces.clear();
@@ -106,6 +113,6 @@ impl MovingSupports {
         }
         let [flow] = session.sum([flow]);
         let constant = velocity.dot(&self.coupling)?;
-        Ok(step.length * (constant + flow - self.velocity.dot(&self.known)?))
+        Ok(step.length * (constant + flow - self.carried.dot(&self.known)?))
     }
 }

@@ -1,6 +1,10 @@
 //! The motions of nodes on which contact laws act.
 
-use super::{Contact, point::Unknown, tangential_point::span_without};
+use super::{
+    Contact,
+    point::{Point, Unknown},
+    tangential_point::span_without,
+};
 use crate::{fem::space::Held, linear_algebra::tensor::Vector};
 use std::collections::BTreeMap;
 
@@ -64,6 +68,16 @@ impl<const D: usize> Contact<D> {
         let rubs = self.friction.as_ref().is_some_and(|friction| presses || !friction.law.follows_pressure());
         let normals = presses.then(|| self.normal_directions()).into_iter().flatten();
         normals.chain(rubs.then(|| self.tangential_directions()).into_iter().flatten()).collect()
+    }
+
+    /// The nodes of this rank that its points have.
+    pub fn nodes(&self) -> impl Iterator<Item = usize> {
+        self.points.iter().flat_map(|point| point.nodes().map(|(node, _)| node).collect::<Vec<_>>())
+    }
+
+    /// A node of this rank that supports hold along the normal.
+    pub fn first_held_node(&self) -> Option<usize> {
+        self.points.iter().find(|point| point.unknown == Unknown::Held).map(Point::node)
     }
 
     /// The nodes of this rank, each with the normals of its points.

@@ -48,6 +48,7 @@ use crate::{
     error::Result,
     fem::{
         effect::Blend,
+        pairs::PairedNode,
         space::{Held, surface_points},
     },
     laws::contact::{Gap, NormalResponse, Rate, Wear},
@@ -75,13 +76,15 @@ pub use unknowns::{choose_unknowns, set_walls};
 
 /// The law along the normal of a contact boundary, and its points.
 #[derive(Debug)]
-pub struct ContactConditions {
+pub struct ContactConditions<const D: usize> {
     /// The points.
     pub quadrature: Quadrature,
     /// The law.
     pub law: NormalResponse,
     /// Distance to the obstacle along the normal.
     pub gap: Gap,
+    /// The nodes owned here that face another body, if there is one instead of an obstacle.
+    pub paired: Option<Vec<PairedNode<D>>>,
 }
 
 /// A law on a contact boundary.
@@ -113,6 +116,8 @@ pub struct Contact<const D: usize> {
     /// The longest side of the box around the body in m.
     size: f64,
     facets: Vec<u32>,
+    /// Whether it is against another body.
+    is_paired: bool,
     points: Vec<Point<D>>,
     /// Nodes that this rank owns.
     owned: usize,
@@ -144,11 +149,15 @@ impl<const D: usize> Contact<D> {
         session: &Session,
         mesh: &Mesh<D>,
         facets: &[u32],
-        conditions: ContactConditions,
+        conditions: ContactConditions<D>,
         held: &Held<D>,
     ) -> Result<Self> {
-        let ContactConditions { quadrature, law, gap } = conditions;
+        let ContactConditions { quadrature, law, gap, paired } = conditions;
+        let is_paired = paired.is_some();
         let mut points: Vec<Point<D>> = match quadrature {
+            _ if let Some(paired) = paired => {
+                paired.into_iter().map(|node| Point::paired(&node, held)).collect()
+            }
             Quadrature::Nodal => surface_points(session, mesh, facets)?
                 .into_iter()
                 .filter(|p| p.weight > 0.0)
@@ -182,6 +191,7 @@ impl<const D: usize> Contact<D> {
             reference,
             size: longest_side(session, &mesh.nodes),
             facets: facets.to_vec(),
+            is_paired,
             points,
             owned: mesh.owned,
             friction: None,
@@ -227,7 +237,17 @@ impl<const D: usize> Contact<D> {
         let (place, worn) = (&point.place, point.worn[0]);
         let along = point.normal_component(Body, displacement);
         let seen = self.obstacle.as_ref().map_or(*place, |obstacle| obstacle.seen_before(place));
-        Ok([along, self.gap.of_moved(time, &seen, &point.normal, along - worn)? + worn])
+        Ok([along, self.gap_of(point, time, &seen, along - worn)? + worn])
+    }
+
+    /// The gap in m of a point whose surface has `moved` along the normal and that an obstacle which forces move sees at `seen`.
+    fn gap_of(&self, point: &Point<D>, time: f64, seen: &Vector<D>, moved: f64) -> Result<f64> {
+        Ok(self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
+    }
+
+    /// Whether it is against another body.
+    pub fn is_paired(&self) -> bool {
+        self.is_paired
     }
 
     /// Whether the surface of the obstacle may move.

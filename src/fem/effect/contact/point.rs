@@ -3,7 +3,10 @@
 //! A point reads the values of its nodes from two kinds of vectors, [`Vectors`]. It stores the numbers of its nodes in both.
 
 use crate::{
-    fem::space::{Held, SurfacePoint, facet_points},
+    fem::{
+        pairs::PairedNode,
+        space::{Held, SurfacePoint, facet_points},
+    },
     laws::contact::{NodeContext, NormalResponse, Resolved},
     linear_algebra::tensor::{Vector, norm},
     mesh::Mesh,
@@ -77,6 +80,8 @@ pub(super) struct Point<const D: usize> {
     pub unknown: Unknown,
     /// Initial position, in m.
     pub place: Vector<D>,
+    /// The distance in m to the body that it faces along the normal, of the undeformed bodies; 0 if it faces none.
+    pub distance: f64,
     /// The gap in m at the end of the step of the undeformed surface without wear.
     pub reach: f64,
     /// Normal displacement in m of the surface without wear at the start of the step.
@@ -125,6 +130,7 @@ impl<const D: usize> Point<D> {
             free_length: 0.0,
             unknown: Unknown::Velocity,
             place: [0.0; D],
+            distance: 0.0,
             reach: 0.0,
             moved: 0.0,
             follows: 0.0,
@@ -174,6 +180,11 @@ impl<const D: usize> Point<D> {
             point.unknown = Unknown::Held;
         }
         point
+    }
+
+    /// A point at a node that faces another body, whose values are relative to that body.
+    pub(super) fn paired(node: &PairedNode<D>, held: &Held<D>) -> Self {
+        Self { distance: node.distance, ..Self::nodal(held.whole(node.point()), held) }
     }
 
     /// The local number of its first node; a nodal point has no other.

@@ -21,15 +21,17 @@ impl<const D: usize> Contact<D> {
         }
         let (time, time_before) = (step.time, step.time - step.length);
         let step_length = blend.way();
-        for point in &mut self.points {
+        for at in 0..self.points.len() {
+            let point = &self.points[at];
             let [after, before] = match &self.obstacle {
                 None => [point.place; 2],
                 Some(obstacle) => [obstacle.seen_after(&point.place), obstacle.seen_before(&point.place)],
             };
             let along = point.normal_component(Body, converged);
             let [worn, worn_before] = point.worn;
-            let gap = self.gap.of_moved(time, &after, &point.normal, along - worn)?;
-            let before = self.gap.of_moved(time_before, &before, &point.normal, along - worn)?;
+            let gap = self.gap_of(point, time, &after, along - worn)?;
+            let before = self.gap_of(point, time_before, &before, along - worn)?;
+            let point = &mut self.points[at];
             point.reach = gap;
             point.moved = along - worn;
             point.penetration_before = along - before - worn;

@@ -1,0 +1,329 @@
+//! Contact between two bodies as a change of basis: the unknown of a node that carries a contact law is its velocity relative to the
+//! surface that it faces.
+//!
+//! On one side of a pair, the slave side, nodes carry the law. With biorthogonal multipliers there, the velocity of the other side that
+//! the node `a` faces is `sum_b P_ab v_b` over its master nodes `b`, and its velocity relative to it `z_a = v_a - sum_b P_ab v_b`. With
+//! `z = v` at all other nodes, `v = T z`, and the equations `K v + C = b` of a step become `T^T K T z + C(z) = T^T b`: each law acts on
+//! the components of its own node alone, as against a rigid obstacle. Rows of `P` sum to 1, so that action equals reaction.
+//!
+//! Where supports hold components of a slave node, these are not relative; held components of master nodes move as the supports do.
+//! No slave node is a master node. Source: Wohlmuth and Krause (2003), Hueeber and Wohlmuth (2005).
+
+use super::space::Held;
+use crate::{
+    error::Result,
+    linear_algebra::{
+        petsc::{BlockRows, DistributedVector},
+        tensor::{Vector, add_scaled},
+    },
+    mesh::Mesh,
+    parallel::{
+        agreement::Agreed,
+        exchange::{exchange_lists, gather},
+        session::Session,
+    },
+};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+    ops::Range,
+};
+
+/// Adds the forces that act on bodies at their surface; where they act between bodies, with the opposite ones.
+pub fn add_between<const D: usize>(
+    coupling: Option<&Coupling<D>>,
+    held: &Held<D>,
+    forces: &mut [f64],
+    add: impl FnOnce(&mut [f64]),
+) {
+    match coupling {
+        Some(coupling) => coupling.add_between(held, forces, add),
+        None => add(forces),
+    }
+}
+
+/// Local nodal values with ghosts as contacts see them: at slave nodes relative to the surface that they face.
+pub fn seen_by_contacts<'a, const D: usize>(
+    coupling: Option<&Coupling<D>>,
+    held: &Held<D>,
+    values: &'a [f64],
+) -> Cow<'a, [f64]> {
+    coupling.map_or(Cow::Borrowed(values), |coupling| coupling.relative(held, values))
+}
+
+/// The share of a master node in the surface that a slave node faces, by global numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MasterShare {
+    /// The slave node.
+    pub slave: u32,
+    /// The master node.
+    pub master: u32,
+    /// Its share, without unit.
+    pub share: f64,
+}
+
+/// The change of basis `T` of this rank.
+#[derive(Debug, Default)]
+pub struct Coupling<const D: usize> {
+    /// Nodes owned here.
+    owned: usize,
+    /// The slave nodes owned here, by local numbers, with the range of their masters.
+    slaves: Vec<(u32, Range<usize>)>,
+    /// Local numbers of masters, and their shares.
+    masters: Vec<(u32, f64)>,
+    /// The blocks of `T` of all ranks: for each slave node, by global numbers, its masters and how they move its free components.
+    blocks: BTreeMap<u32, Vec<(u32, Vec<f64>)>>,
+}
+
+impl<const D: usize> Coupling<D> {
+    /// For the pairs whose slave nodes this rank owns, on a mesh with the ghosts that [`needed_ghosts`] lists. Collective.
+    pub fn new(
+        session: &Session,
+        mesh: &Mesh<D>,
+        pairs: &[MasterShare],
+        held: &Held<D>,
+    ) -> Result<Self, Agreed> {
+        let local = |global: u32| match mesh.ghosts.binary_search(&global) {
+            Ok(ghost) => mesh.owned + ghost,
+            Err(_) => mesh.owned_node(global),
+        };
+        let (mut slaves, mut masters) = (Vec::new(), Vec::new());
+        let (mut numbers, mut values) = (Vec::new(), Vec::new());
+        for of_slave in pairs.chunk_by(|a, b| a.slave == b.slave) {
+            let slave = local(of_slave[0].slave);
+            let first = masters.len();
+            for pair in of_slave {
+                let master = local(pair.master);
+                masters.push((master as u32, pair.share));
+                numbers.extend([pair.slave, pair.master]);
+                let columns = (0..D).map(|j| {
+                    let unit = std::array::from_fn(|i| if i == j { pair.share } else { 0.0 });
+                    held.free_part(slave, &held.free_part(master, &unit))
+                });
+                let columns: Vec<Vector<D>> = columns.collect();
+                values.extend((0..D * D).map(|k| columns[k % D][k / D]));
+            }
+            slaves.push((slave as u32, first..masters.len()));
+        }
+        let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);
+        let mut blocks: BTreeMap<u32, Vec<(u32, Vec<f64>)>> = BTreeMap::new();
+        for (pair, block) in numbers.chunks_exact(2).zip(values.chunks_exact(D * D)) {
+            blocks.entry(pair[0]).or_default().push((pair[1], block.to_vec()));
+        }
+        Ok(Self { owned: mesh.owned, slaves, masters, blocks })
+    }
+
+    /// The slave nodes owned here with their masters and the shares of these, by local numbers.
+    pub fn slaves(&self) -> impl Iterator<Item = (u32, &[(u32, f64)])> {
+        self.slaves.iter().map(|(slave, range)| (*slave, &self.masters[range.clone()]))
+    }
+
+    /// Whether a node of any rank, by its global number, is a slave.
+    pub fn is_slave(&self, global: u32) -> bool {
+        self.blocks.contains_key(&global)
+    }
+
+    /// Adds `factor` times the values of the surface that they face to those of slave nodes, given local values with ghosts.
+    fn add_masters(&self, factor: f64, held: &Held<D>, values: &mut [f64]) {
+        for (slave, masters) in self.slaves() {
+            let mut sum: Vector<D> = [0.0; D];
+            for (master, share) in masters {
+                (0..D).for_each(|i| sum[i] += share * values[*master as usize * D + i]);
+            }
+            let sum = held.free_part(slave as usize, &sum);
+            (0..D).for_each(|i| values[slave as usize * D + i] += factor * sum[i]);
+        }
+    }
+
+    /// Local values, with ghosts, whose values at slave nodes owned here are relative to the surface that they face.
+    pub fn relative<'a>(&self, held: &Held<D>, values: &'a [f64]) -> Cow<'a, [f64]> {
+        if self.slaves.is_empty() {
+            return Cow::Borrowed(values);
+        }
+        let mut relative = values.to_vec();
+        self.add_masters(-1.0, held, &mut relative);
+        Cow::Owned(relative)
+    }
+
+    /// Lets `add` add the forces that act between the bodies at slave nodes owned here, and adds the opposite ones at their masters, whose
+    /// ghosts count. All values are local.
+    pub fn add_between(&self, held: &Held<D>, forces: &mut [f64], add: impl FnOnce(&mut [f64])) {
+        let at = |slave: u32, forces: &[f64]| -> Vector<D> {
+            std::array::from_fn(|i| forces[slave as usize * D + i])
+        };
+        let before: Vec<Vector<D>> = self.slaves().map(|(slave, _)| at(slave, forces)).collect();
+        add(forces);
+        for ((slave, masters), before) in self.slaves().zip(before) {
+            let force = add_scaled(&at(slave, forces), -1.0, &before);
+            self.react(held, (slave, masters), &force, forces);
+        }
+    }
+
+    /// Adds at the masters of a slave node the opposite of a force there.
+    fn react(
+        &self,
+        held: &Held<D>,
+        (slave, masters): (u32, &[(u32, f64)]),
+        force: &Vector<D>,
+        forces: &mut [f64],
+    ) {
+        let force = held.free_part(slave as usize, force);
+        for (master, share) in masters {
+            (0..D).for_each(|i| forces[*master as usize * D + i] -= share * force[i]);
+        }
+    }
+
+    /// `z = T^-1 v`. Collective.
+    pub fn make_relative(&self, held: &Held<D>, velocity: &mut DistributedVector) -> Result<()> {
+        velocity.update_ghosts()?;
+        self.add_masters(-1.0, held, &mut velocity.local_mut()?);
+        Ok(())
+    }
+
+    /// `v = T z`. Collective.
+    pub fn make_absolute(&self, held: &Held<D>, velocity: &mut DistributedVector) -> Result<()> {
+        velocity.update_ghosts()?;
+        self.add_masters(1.0, held, &mut velocity.local_mut()?);
+        velocity.update_ghosts()
+    }
+
+    /// `T^T f` at free components, for forces that are sums over all ranks. Collective.
+    pub fn reduce_forces(&self, held: &Held<D>, forces: &mut DistributedVector) -> Result<()> {
+        self.add_to_masters(held, &mut forces.local_mut()?);
+        forces.add_ghosts_to_owners()
+    }
+
+    /// Adds the forces at slave nodes owned here to those at the masters, of which ghosts have nothing else.
+    fn add_to_masters(&self, held: &Held<D>, forces: &mut [f64]) {
+        forces[self.owned * D..].fill(0.0);
+        for (slave, masters) in self.slaves() {
+            let force = std::array::from_fn(|i| forces[slave as usize * D + i]);
+            let force = held.free_part(slave as usize, &force);
+            for (master, share) in masters {
+                let part = held.free_part(*master as usize, &force);
+                (0..D).for_each(|i| forces[*master as usize * D + i] += share * part[i]);
+            }
+        }
+    }
+}
+
+impl<const D: usize> Coupling<D> {
+    /// `T^T K T` at free components, given the rows of `K` on this rank. Collective.
+    pub fn transform(&self, session: &Session, mesh: &Mesh<D>, rows: BlockRows) -> Result<BlockRows, Agreed> {
+        let first = mesh.first_node as u32;
+        let mut sums: Vec<Option<BTreeMap<u32, Vec<f64>>>> = vec![None; mesh.owned];
+        for (row, sums) in sums.iter_mut().enumerate() {
+            let range = rows.offsets[row]..rows.offsets[row + 1];
+            let has_slaves = rows.columns[range.clone()].iter().any(|&column| self.is_slave(column));
+            if has_slaves {
+                *sums = Some(self.times_basis(&rows, range));
+            }
+        }
+        let mut outgoing = vec![Vec::new(); session.ranks()];
+        for (slave, _) in self.slaves() {
+            let Some(row) = sums[slave as usize].clone() else { continue };
+            let Some(masters) = self.blocks.get(&(first + slave)) else { continue };
+            for (master, block) in masters {
+                let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*master)];
+                for (&column, entry) in &row {
+                    list.extend([f64::from(*master), f64::from(column)]);
+                    list.extend(product::<D>(block, entry, true));
+                }
+            }
+        }
+        let incoming = exchange_lists(session.world(), &outgoing)?;
+        for record in incoming.chunks_exact(2 + D * D) {
+            let (row, column) = (mesh.owned_node(record[0] as u32), record[1] as u32);
+            let sums = sums[row].get_or_insert_with(|| entries::<D>(&rows, row));
+            add_block(sums, column, &record[2..]);
+        }
+        let mut out = BlockRows { offsets: vec![0], ..BlockRows::default() };
+        out.columns.reserve(rows.columns.len());
+        out.values.reserve(rows.values.len());
+        for (row, sums) in sums.iter().enumerate() {
+            match sums {
+                None => {
+                    let range = rows.offsets[row]..rows.offsets[row + 1];
+                    out.columns.extend_from_slice(&rows.columns[range.clone()]);
+                    out.values.extend_from_slice(&rows.values[range.start * D * D..range.end * D * D]);
+                }
+                Some(sums) => {
+                    out.columns.extend(sums.keys());
+                    sums.values().for_each(|block| out.values.extend_from_slice(block));
+                }
+            }
+            out.offsets.push(out.columns.len());
+        }
+        Ok(out)
+    }
+
+    /// A row of `K T`, given the range of its entries in `K`.
+    fn times_basis(&self, rows: &BlockRows, range: Range<usize>) -> BTreeMap<u32, Vec<f64>> {
+        let mut sums = BTreeMap::new();
+        for at in range {
+            let (column, entry) = (rows.columns[at], &rows.values[at * D * D..(at + 1) * D * D]);
+            add_block(&mut sums, column, entry);
+            for (master, block) in self.blocks.get(&column).into_iter().flatten() {
+                add_block(&mut sums, *master, &product::<D>(entry, block, false));
+            }
+        }
+        sums
+    }
+}
+
+/// The entries of a row.
+fn entries<const D: usize>(rows: &BlockRows, row: usize) -> BTreeMap<u32, Vec<f64>> {
+    let range = rows.offsets[row]..rows.offsets[row + 1];
+    range.map(|at| (rows.columns[at], rows.values[at * D * D..(at + 1) * D * D].to_vec())).collect()
+}
+
+fn add_block(sums: &mut BTreeMap<u32, Vec<f64>>, column: u32, block: &[f64]) {
+    let sum = sums.entry(column).or_insert_with(|| vec![0.0; block.len()]);
+    sum.iter_mut().zip(block).for_each(|(sum, value)| *sum += value);
+}
+
+/// The product of two blocks, with the transpose of the first if `transposed`.
+fn product<const D: usize>(a: &[f64], b: &[f64], transposed: bool) -> Vec<f64> {
+    let first = |i: usize, k: usize| if transposed { a[k * D + i] } else { a[i * D + k] };
+    (0..D * D).map(|at| (0..D).map(|k| first(at / D, k) * b[k * D + at % D]).sum()).collect()
+}
+
+/// The nodes, by global numbers, that this rank needs as ghosts for the equations of these pairs, of which it owns the slave nodes:
+/// besides those of its cells, the masters of its slave nodes and all nodes to which `T^T K T` couples its own. Collective.
+pub fn needed_ghosts<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    pairs: &[MasterShare],
+) -> Result<Vec<u32>, Agreed> {
+    let numbers: Vec<u32> = pairs.iter().flat_map(|pair| [pair.slave, pair.master]).collect();
+    let numbers = gather(session.world(), &numbers)?;
+    let mut masters: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    numbers.chunks_exact(2).for_each(|pair| masters.entry(pair[0]).or_default().push(pair[1]));
+    // The nodes around each slave, at its owner.
+    let mut outgoing = vec![Vec::new(); session.ranks()];
+    let mut needed = BTreeSet::new();
+    for cell in 0..mesh.cell_count() {
+        for slave in mesh.cell_nodes(cell).map(|node| mesh.global_node(node)) {
+            let Some(masters) = masters.get(&slave) else { continue };
+            needed.extend(masters);
+            let list = &mut outgoing[mesh.owner(slave)];
+            mesh.cell_nodes(cell).for_each(|node| list.extend([slave, mesh.global_node(node)]));
+        }
+    }
+    let mut coupled: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    for pair in exchange_lists(session.world(), &outgoing)?.chunks_exact(2) {
+        let around = coupled.entry(pair[0]).or_default();
+        around.insert(pair[1]);
+        around.extend(masters.get(&pair[1]).into_iter().flatten());
+    }
+    // Those of their masters, at the owners of these.
+    let mut outgoing = vec![Vec::<u32>::new(); session.ranks()];
+    for (slave, around) in &coupled {
+        needed.extend(around);
+        for master in masters.get(slave).into_iter().flatten() {
+            outgoing[mesh.owner(*master)].extend(around);
+        }
+    }
+    needed.extend(exchange_lists(session.world(), &outgoing)?);
+    Ok(needed.into_iter().collect())
+}

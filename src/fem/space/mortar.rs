@@ -1,0 +1,539 @@
+//! Integrals that couple two meshed surfaces in contact, with dual Lagrange multipliers on the slave surface.
+//!
+//! Each slave facet is its own plane of projection. Master facets that face it are projected along its
+//! outward normal, clipped with it, and the products of multipliers and shape functions are integrated on the
+//! clipped polygons (Puso and Laursen 2004, Comput. Methods Appl. Mech. Eng. 193, 601-629). The multipliers
+//! are biorthogonal to the shape functions of the slave nodes that carry a law (Wohlmuth 2000, SIAM J. Numer.
+//! Anal. 38, 989-1012), on the covered part of each facet (Popp et al. 2013, Comput. Methods Appl. Mech. Eng.
+//! 264, 67-80).
+//!
+//! # Multipliers
+//!
+//! On a slave facet e let C be the part that master facets cover, phi_m the shape functions of the nodes that
+//! carry a law, and chi_a as many functions of the multiplier space, with sum_a chi_a = 1. Then
+//!
+//! - G_am = int_C chi_a phi_m, w_m = int_C phi_m, and psi = diag(w) G^-1 chi, so that
+//! - int_C psi_a phi_m = w_a (G^-1 G)_am = w_a delta_am, and
+//! - sum_a psi_a = 1: because sum_a chi_a = 1, the column sums of G are 1' G = w', thus w' G^-1 = 1', and
+//!   sum_a psi_a = w' G^-1 chi = 1' chi = 1.
+//!
+//! The psi depend on the space of the chi only: with any other basis q = T chi of it and N = T G, diag(w)
+//! N^-1 q is the same. Here q is orthonormal on C, which keeps N regular where C is small or thin.
+//!
+//! | facet        | nodes with a law   | multiplier space     |
+//! |--------------|--------------------|----------------------|
+//! | 2D linear    | 2 corners          | linear               |
+//! | 2D quadratic | 2 corners, middle  | quadratic            |
+//! | 3D linear    | 3 corners          | linear               |
+//! | 3D quadratic | 3 middles of sides | linear (chi_m = 1 - 2 lambda of the opposite corner) |
+//!
+//! For the first three the multiplier space has the phi_m as its basis, and N^-1 is known: the functions q_j
+//! at the nodes, because q_j = sum_m q_j(x_m) phi_m.
+
+use geometry::{
+    Plane, Point, Shape, clip, dot, inverse, measure_and_centroid, oriented, quadrature, sides, subtract,
+};
+use parry3d_f64::{
+    bounding_volume::Aabb,
+    math::Vector as BoxVector,
+    partitioning::{Bvh, BvhBuildStrategy, BvhNode},
+};
+
+mod geometry;
+#[cfg(test)]
+mod tests;
+
+/// Components along the axes.
+pub type Vector<const D: usize> = [f64; D];
+
+/// A master facet faces a slave facet if its normal has a component along the slave normal below this.
+const FACING: f64 = -0.2;
+/// The deepest mean penetration of a pair, as a share of the diameter of the slave facet.
+const DEEPEST: f64 = 0.5;
+/// The smallest clipped part that counts, as a share of the slave facet.
+const SMALLEST_PART: f64 = 1e-12;
+/// The largest overlap of two clipped parts that both count, as a share of the slave facet.
+const LARGEST_OVERLAP: f64 = 1e-6;
+/// The smallest covered share of a slave facet that contributes.
+const SMALLEST_SHARE: f64 = 1e-9;
+/// The smallest pivot of the scaled matrix N of a slave facet that contributes.
+const SMALLEST_PIVOT: f64 = 1e-10;
+/// The width by which the space above a slave facet is searched in excess, as a share of its diameter.
+const SEARCH_MARGIN: f64 = 1e-6;
+
+/// A straight facet of a surface: a segment in two dimensions, a triangle in three.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facet<const D: usize> {
+    /// Global numbers of the nodes: the D corners, and for quadratic fields then the nodes in the middle of
+    /// the sides: 1 in two dimensions; in three dimensions 3, of the sides between corners 0 and 1, 1 and 2,
+    /// 2 and 0.
+    pub nodes: Vec<u32>,
+    /// Places of the corners in m, in the order of `nodes` and of any orientation.
+    pub corners: [Vector<D>; D],
+    /// The outward unit normal.
+    pub normal: Vector<D>,
+}
+
+impl<const D: usize> Facet<D> {
+    fn is_quadratic(&self) -> bool {
+        self.nodes.len() > D
+    }
+
+    /// The index in `nodes` of the first node that carries a law; the corners of quadratic triangles carry
+    /// none, because the integrals of their shape functions are 0.
+    fn first_law(&self) -> usize {
+        if D == 3 && self.is_quadratic() { D } else { 0 }
+    }
+
+    /// The integral of the shape function of a node over the whole facet, as a share of its length or area.
+    fn share(&self, node: usize) -> f64 {
+        match (D, self.is_quadratic()) {
+            (2, true) => [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0][node],
+            (_, true) => [0.0, 0.0, 0.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0][node],
+            _ => 1.0 / D as f64,
+        }
+    }
+
+    fn shares_node(&self, other: &Self) -> bool {
+        self.nodes.iter().any(|node| other.nodes.contains(node))
+    }
+
+    /// The smallest and largest coordinates in m.
+    fn bounds(&self) -> [Vector<D>; 2] {
+        [f64::min, f64::max].map(|choose| {
+            let [first, rest @ ..] = self.corners.as_slice() else { return [f64::NAN; D] };
+            rest.iter().fold(*first, |bound, corner| std::array::from_fn(|i| choose(bound[i], corner[i])))
+        })
+    }
+}
+
+/// What one slave facet gives to one of its nodes that carries a law: integrals over the part of the facet
+/// that master facets cover. Those of a node are summed over the facets around it; all are 0 where nothing is
+/// covered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contribution<const D: usize> {
+    /// The global number of the slave node a.
+    pub node: u32,
+    /// The outward unit normal of the facet.
+    pub normal: Vector<D>,
+    /// int phi_a in m^(D-1). Where a quadratic facet is covered in part it may be small beside the covered
+    /// part, and in two dimensions zero or negative for corners.
+    pub weight: f64,
+    /// int phi_a in m^(D-1) over the whole facet, covered or not.
+    pub whole: f64,
+    /// int psi_a g in m^D, with the signed distance g in m from the facet along its normal to the master
+    /// surface, positive where open. With the outward unit normal n of the facet it is the sum over `masters`
+    /// of the entry times n.x_b, less the weight times n.x_a, at the places x of the nodes.
+    pub gap: f64,
+    /// For each master node b, in ascending order, int psi_a phi_b in m^(D-1), with phi_b at the place on the
+    /// master facet that is projected. The corners c of quadratic triangles, which carry no law, are included
+    /// with -int psi_a phi_c. All sum to `weight`.
+    pub masters: Vec<(u32, f64)>,
+}
+
+/// The contributions of all slave facets to their nodes that carry a law, in the order of the facets and of
+/// their nodes.
+///
+/// A slave facet e and a master facet form a pair if they share no node, their normals are opposed (component
+/// of one along the other below -0.2), and the mean of the gap g over the clipped part is between -0.5 of the
+/// longest side of e and `reach` in m, which is positive and may be infinite. Where several master facets are
+/// projected on the same part of e, the one with the smallest mean |g| counts. To that end the pairs are
+/// visited in ascending order of the magnitude of their mean gap, and one whose part overlaps a part already
+/// taken by more than 1e-6 of e is skipped as a whole. Thus where the projections of two master facets
+/// overlap in part, because the master surface is folded or strongly curved over e, the rest of the second
+/// one is left uncovered; overlaps up to the limit count twice.
+///
+/// Facets with a covered share below 1e-9 contribute 0 (with their `whole`), and so do quadratic triangles
+/// whose matrix N is singular: a pivot below 1e-10 after its rows and columns are scaled. Facets that are not
+/// finite cover nothing and are not covered.
+///
+/// The integrals are exact up to rounding for straight facets: all integrands are polynomials of degree 4 at
+/// most on the clipped polygons.
+///
+/// # Panics
+///
+/// Where a facet has a number of nodes other than D or 3 (D - 1), or `reach` is not positive.
+pub fn contributions<const D: usize>(
+    slaves: &[Facet<D>],
+    masters: &[Facet<D>],
+    reach: f64,
+) -> Vec<Contribution<D>> {
+    const { assert!(D == 2 || D == 3, "there are segments and triangles only") };
+    assert!(reach > 0.0, "the reach {reach} m is not positive");
+    for facet in slaves.iter().chain(masters) {
+        let count = facet.nodes.len();
+        assert!(count == D || count == 3 * (D - 1), "a facet has {count} nodes");
+    }
+    let search = Search::new(masters, reach);
+    let mut result = Vec::with_capacity(slaves.len() * D);
+    for facet in slaves {
+        let slave = Slave::new(facet);
+        let parts = search.covered(&slave);
+        slave.integrate(&parts, &mut result);
+    }
+    result
+}
+
+/// A slave facet in its plane.
+#[derive(Debug)]
+struct Slave<'a, const D: usize> {
+    facet: &'a Facet<D>,
+    plane: Plane<D>,
+    corners: [Point; D],
+    /// The length in m or area in m^2.
+    measure: f64,
+    /// The longest side in m.
+    diameter: f64,
+}
+
+/// The part of a slave facet that one master facet covers, in the plane of the slave facet.
+#[derive(Debug)]
+struct Part<'a, const D: usize> {
+    master: &'a Facet<D>,
+    polygon: Vec<Point>,
+    /// The length in m or area in m^2 of the polygon.
+    measure: f64,
+    centroid: Point,
+    /// The shape functions of the master facet about the centroid.
+    shape: Shape<D>,
+    /// The gap in m at the centroid, which is its mean, and its gradient.
+    gap: (f64, Point),
+}
+
+/// Master facets in a tree of bounding boxes.
+struct Search<'a, const D: usize> {
+    /// Those with finite coordinates.
+    masters: Vec<&'a Facet<D>>,
+    tree: Bvh,
+    reach: f64,
+}
+
+impl<'a, const D: usize> Search<'a, D> {
+    fn new(masters: &'a [Facet<D>], reach: f64) -> Self {
+        let finite = |master: &&Facet<D>| master.corners.as_flattened().iter().all(|x| x.is_finite());
+        let masters: Vec<_> = masters.iter().filter(finite).collect();
+        let boxes = masters.iter().map(|master| {
+            let [low, high] = master.bounds().map(|corner| BoxVector::from(embed(&corner)));
+            Aabb::new(low, high)
+        });
+        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes.enumerate());
+        Self { masters, tree, reach }
+    }
+
+    /// The parts of a slave facet that master facets cover.
+    fn covered(&self, slave: &Slave<D>) -> Vec<Part<'a, D>> {
+        let prism = Prism::new(slave, self.reach);
+        let near = self.tree.leaves(|node| prism.meets(node));
+        let mut parts: Vec<_> = near.filter_map(|i| self.part(slave, self.masters[i as usize])).collect();
+        parts.sort_by(|a, b| a.gap.0.abs().total_cmp(&b.gap.0.abs()));
+        let mut taken: Vec<Part<D>> = Vec::with_capacity(parts.len());
+        for part in parts {
+            let overlaps = |other: &Part<D>| {
+                let both = clip::<D>(&part.polygon, &other.polygon);
+                measure_and_centroid::<D>(&both).0 > LARGEST_OVERLAP * slave.measure
+            };
+            if !taken.iter().any(overlaps) {
+                taken.push(part);
+            }
+        }
+        taken
+    }
+
+    /// The part of a slave facet that a master facet covers; none if they do not form a pair.
+    fn part(&self, slave: &Slave<D>, master: &'a Facet<D>) -> Option<Part<'a, D>> {
+        let facing = dot(&slave.plane.normal, &master.normal) < FACING;
+        if !facing || slave.facet.shares_node(master) {
+            return None;
+        }
+        let projected = master.corners.map(|corner| slave.plane.project(&corner));
+        let corners = projected.map(|(place, _)| place);
+        let polygon = clip::<D>(&oriented(corners), &slave.corners);
+        let (measure, centroid) = measure_and_centroid::<D>(&polygon);
+        // Also false for facets without area and for NaN.
+        let counts = measure > SMALLEST_PART * slave.measure;
+        if !counts {
+            return None;
+        }
+        let shape = Shape::new(master.is_quadratic(), &corners, centroid);
+        let gap = shape.linear(&projected.map(|(_, height)| height));
+        let accepted = (-DEEPEST * slave.diameter..=self.reach).contains(&gap.0);
+        accepted.then_some(Part { master, polygon, measure, centroid, shape, gap })
+    }
+}
+
+/// The space above and below a slave facet where facets may form a pair with it: the box along its tangents
+/// and normal.
+#[derive(Debug)]
+struct Prism {
+    origin: [f64; 3],
+    directions: [[f64; 3]; 3],
+    /// The smallest and largest component in m along each direction.
+    bounds: [(f64, f64); 3],
+}
+
+impl Prism {
+    fn new<const D: usize>(slave: &Slave<D>, reach: f64) -> Self {
+        let margin = SEARCH_MARGIN * slave.diameter;
+        let bound = |k: usize| {
+            let along = slave.corners.map(|corner| corner[k]);
+            let low = along.iter().copied().fold(f64::INFINITY, f64::min);
+            (low - margin, along.iter().copied().fold(f64::NEG_INFINITY, f64::max) + margin)
+        };
+        let [first, second] = slave.plane.tangents;
+        Self {
+            origin: embed(&slave.plane.origin),
+            directions: [embed(&slave.plane.normal), embed(&first), embed(&second)],
+            bounds: [(-DEEPEST * slave.diameter - margin, reach + margin), bound(0), bound(1)],
+        }
+    }
+
+    /// Whether a box may meet the prism, by the directions of the prism alone.
+    fn meets(&self, node: &BvhNode) -> bool {
+        let (low, high) = (node.mins().to_array(), node.maxs().to_array());
+        self.directions.iter().zip(&self.bounds).all(|(direction, &(least, most))| {
+            let (mut middle, mut half) = (0.0, 0.0);
+            for i in 0..3 {
+                middle += direction[i] * (0.5 * (low[i] + high[i]) - self.origin[i]);
+                half += direction[i].abs() * 0.5 * (high[i] - low[i]);
+            }
+            middle + half >= least && middle - half <= most
+        })
+    }
+}
+
+/// A vector with zeros for missing components.
+fn embed<const D: usize>(vector: &Vector<D>) -> [f64; 3] {
+    std::array::from_fn(|i| if i < D { vector[i] } else { 0.0 })
+}
+
+/// A point of the quadrature on the covered part of a slave facet.
+#[derive(Debug)]
+struct Sample {
+    /// The index of the part.
+    part: usize,
+    place: Point,
+    /// The weight in m^(D-1).
+    weight: f64,
+    /// The functions of the orthonormal basis there.
+    basis: [f64; 3],
+}
+
+/// Polynomials that are orthonormal on the covered part of a slave facet: 1 and the linear functions, or for
+/// quadratic segments the quadratic functions.
+#[derive(Debug)]
+struct Basis<const D: usize> {
+    centroid: Point,
+    /// The distance in m of the farthest corner of the covered part from its centroid.
+    size: f64,
+    /// Coefficients of 1 and the two other monomials; a function that is not used is 0.
+    coefficients: [[f64; 3]; 3],
+}
+
+impl<const D: usize> Basis<D> {
+    /// `count` orthonormal functions by the modified Gram-Schmidt process on the points of the quadrature,
+    /// where their values are entered.
+    fn new(parts: &[Part<D>], samples: &mut [Sample], count: usize) -> Self {
+        let covered: f64 = parts.iter().map(|part| part.measure).sum();
+        let centroid: Point = std::array::from_fn(|i| {
+            parts.iter().map(|part| part.measure * part.centroid[i]).sum::<f64>() / covered
+        });
+        let size = parts.iter().flat_map(|part| &part.polygon).fold(0.0, |most: f64, corner| {
+            let offset = subtract(corner, &centroid);
+            most.max(dot(&offset, &offset).sqrt())
+        });
+        let mut basis = Self { centroid, size, coefficients: [[0.0; 3]; 3] };
+        basis.coefficients[0][0] = 1.0 / covered.sqrt();
+        for sample in samples.iter_mut() {
+            sample.basis[0] = basis.coefficients[0][0];
+        }
+        for k in 1..count {
+            let mut function = [0.0; 3];
+            function[k] = 1.0;
+            // The second pass restores the orthogonality that cancellation in the first takes.
+            for _ in 0..2 {
+                for j in 0..k {
+                    let products = samples.iter().map(|sample| {
+                        sample.weight * sample.basis[j] * dot(&function, &basis.monomials(sample.place))
+                    });
+                    let component: f64 = products.sum();
+                    let other = basis.coefficients[j];
+                    function = std::array::from_fn(|i| function[i] - component * other[i]);
+                }
+                let squares = samples
+                    .iter()
+                    .map(|sample| sample.weight * dot(&function, &basis.monomials(sample.place)).powi(2));
+                let norm = squares.sum::<f64>().sqrt();
+                function = function.map(|x| x / norm);
+            }
+            basis.coefficients[k] = function;
+            for sample in samples.iter_mut() {
+                sample.basis[k] = dot(&function, &basis.monomials(sample.place));
+            }
+        }
+        basis
+    }
+
+    fn monomials(&self, place: Point) -> [f64; 3] {
+        let [u, v] = subtract(&place, &self.centroid).map(|x| x / self.size);
+        [1.0, u, if D == 2 { u * u } else { v }]
+    }
+
+    fn values(&self, place: Point) -> [f64; 3] {
+        let monomials = self.monomials(place);
+        self.coefficients.map(|function| dot(&function, &monomials))
+    }
+}
+
+/// The integrals of the functions of the basis times the shape functions of one facet, \[basis\]\[node\].
+type Products = [[f64; 6]; 3];
+
+impl<'a, const D: usize> Slave<'a, D> {
+    fn new(facet: &'a Facet<D>) -> Self {
+        let plane = Plane::new(facet);
+        let corners = facet.corners.map(|corner| plane.project(&corner).0);
+        let measure = measure_and_centroid::<D>(&corners).0;
+        let diameter = sides::<D>().iter().fold(0.0, |most: f64, &(i, j)| {
+            let side = subtract(&facet.corners[j], &facet.corners[i]);
+            most.max(dot(&side, &side).sqrt())
+        });
+        Self { facet, plane, corners, measure, diameter }
+    }
+
+    /// Appends the contributions to the nodes that carry a law.
+    fn integrate(&self, parts: &[Part<D>], result: &mut Vec<Contribution<D>>) {
+        let (facet, first) = (self.facet, result.len());
+        let law = facet.first_law()..facet.nodes.len();
+        result.extend(law.clone().map(|i| Contribution {
+            node: facet.nodes[i],
+            normal: facet.normal,
+            weight: 0.0,
+            whole: self.measure * facet.share(i),
+            gap: 0.0,
+            masters: Vec::new(),
+        }));
+        let covered: f64 = parts.iter().map(|part| part.measure).sum();
+        if parts.is_empty() || covered < SMALLEST_SHARE * self.measure {
+            return;
+        }
+        let mut samples = Vec::new();
+        for (part, Part { polygon, .. }) in parts.iter().enumerate() {
+            let points = quadrature::<D>(polygon).into_iter();
+            samples.extend(points.map(|(place, weight)| Sample { part, place, weight, basis: [0.0; 3] }));
+        }
+        let basis = Basis::new(parts, &mut samples, law.len());
+        let own = self.own_products(&basis, &samples, covered);
+        let Some(duals) = self.duals(&basis, &own, covered) else { return };
+        let result = &mut result[first..];
+        for (contribution, (dual, m)) in result.iter_mut().zip(duals.iter().zip(law.clone())) {
+            contribution.weight = own[0][m] * covered.sqrt();
+            contribution.masters.extend((0..law.start).map(|c| (facet.nodes[c], -integral(dual, &own, c))));
+        }
+        let totals = totals(parts, &samples, covered);
+        let by_part = samples.chunk_by(|one, next| one.part == next.part);
+        for (part, (samples, totals)) in parts.iter().zip(by_part.zip(&totals)) {
+            let (products, gaps) = part.products(samples, totals);
+            for (contribution, dual) in result.iter_mut().zip(&duals) {
+                contribution.gap += dot(dual, &gaps);
+                let nodes = part.master.nodes.iter().enumerate();
+                contribution.masters.extend(nodes.map(|(b, &node)| (node, integral(dual, &products, b))));
+            }
+        }
+        for contribution in result {
+            sum_by_node(&mut contribution.masters);
+        }
+    }
+
+    /// The integrals over the covered part with the shape functions of the facet itself. All functions of the
+    /// basis but the first have the mean 0, so that the values at the centroid count for the first alone.
+    fn own_products(&self, basis: &Basis<D>, samples: &[Sample], covered: f64) -> Products {
+        let shape = Shape::new(self.facet.is_quadratic(), &self.corners, basis.centroid);
+        let mut products = [shape.values().map(|value| value * covered.sqrt()), [0.0; 6], [0.0; 6]];
+        for sample in samples {
+            let differences = shape.differences(subtract(&sample.place, &basis.centroid));
+            add_products(&mut products, sample, &differences);
+        }
+        products
+    }
+
+    /// The coefficients of the multipliers psi_a of the nodes that carry a law in the basis: diag(w) N^-1.
+    fn duals(&self, basis: &Basis<D>, own: &Products, covered: f64) -> Option<Vec<[f64; 3]>> {
+        let first = self.facet.first_law();
+        let weight = |m: usize| own[0][m] * covered.sqrt();
+        if first == 0 {
+            let nodes = (0..self.facet.nodes.len()).map(|m| {
+                // Only segments have a law at both their corners and their middle.
+                let place = if m < D {
+                    self.corners[m]
+                } else {
+                    std::array::from_fn(|i| 0.5 * (self.corners[0][i] + self.corners[1][i]))
+                };
+                basis.values(place).map(|value| weight(m) * value)
+            });
+            return Some(nodes.collect());
+        }
+        // The shape functions of the middles are not negative. With N of these functions scaled to the integral 1,
+        // its inverse is diag(w) N^-1.
+        let scaled: [[f64; 3]; 3] =
+            std::array::from_fn(|j| std::array::from_fn(|m| own[j][first + m] / weight(first + m)));
+        Some(inverse(scaled, SMALLEST_PIVOT)?.to_vec())
+    }
+}
+
+impl<const D: usize> Part<'_, D> {
+    /// The integrals over the part with the shape functions of the master facet, and with the gap (in m^D per
+    /// unit of the functions). `totals` are the integrals of the functions of the basis alone.
+    fn products(&self, samples: &[Sample], totals: &[f64; 3]) -> (Products, [f64; 3]) {
+        let values = self.shape.values();
+        let mut products = totals.map(|total| values.map(|value| total * value));
+        let (gap, gradient) = self.gap;
+        let mut gaps = totals.map(|total| total * gap);
+        for sample in samples {
+            let offset = subtract(&sample.place, &self.centroid);
+            add_products(&mut products, sample, &self.shape.differences(offset));
+            let difference = dot(&gradient, &offset);
+            gaps = std::array::from_fn(|j| gaps[j] + sample.weight * sample.basis[j] * difference);
+        }
+        (products, gaps)
+    }
+}
+
+/// The integrals of the functions of the basis over each part. Those over the largest part are what the
+/// others leave of the integrals over the covered part, which are known: the multipliers are large where the
+/// covered part is small, and would multiply the rounding of the sum.
+fn totals<const D: usize>(parts: &[Part<D>], samples: &[Sample], covered: f64) -> Vec<[f64; 3]> {
+    let mut totals = vec![[0.0; 3]; parts.len()];
+    for sample in samples {
+        let total = &mut totals[sample.part];
+        *total = std::array::from_fn(|j| total[j] + sample.weight * sample.basis[j]);
+    }
+    let largest = (0..parts.len()).max_by(|&i, &j| parts[i].measure.total_cmp(&parts[j].measure));
+    if let Some(largest) = largest {
+        let others = totals.iter().enumerate().filter(|&(i, _)| i != largest);
+        totals[largest] = others.fold([covered.sqrt(), 0.0, 0.0], |rest, (_, total)| subtract(&rest, total));
+    }
+    totals
+}
+
+/// Adds the integrals at one point of the quadrature, where the shape functions have these values.
+fn add_products(products: &mut Products, sample: &Sample, values: &[f64; 6]) {
+    for (row, value) in products.iter_mut().zip(&sample.basis) {
+        *row = std::array::from_fn(|m| row[m] + sample.weight * value * values[m]);
+    }
+}
+
+/// The integral of the multiplier with these coefficients times the shape function of a node.
+fn integral(dual: &[f64; 3], products: &Products, node: usize) -> f64 {
+    (0..3).map(|j| dual[j] * products[j][node]).sum()
+}
+
+/// Sorts entries by their node and adds those of the same node.
+fn sum_by_node(entries: &mut Vec<(u32, f64)>) {
+    entries.sort_by_key(|&(node, _)| node);
+    entries.dedup_by(|next, kept| {
+        let same = next.0 == kept.0;
+        if same {
+            kept.1 += next.1;
+        }
+        same
+    });
+}
