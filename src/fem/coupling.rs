@@ -67,7 +67,7 @@ pub struct MasterShare {
 pub struct Coupling<const D: usize> {
     /// Nodes owned here.
     owned: usize,
-    /// The slave nodes owned here, by local numbers, with the range of their masters.
+    /// The slave nodes owned here, by local numbers, ascending, with the range of their masters.
     slaves: Vec<(u32, Range<usize>)>,
     /// Local numbers of masters, and their shares.
     masters: Vec<(u32, f64)>,
@@ -76,7 +76,7 @@ pub struct Coupling<const D: usize> {
 }
 
 impl<const D: usize> Coupling<D> {
-    /// For the pairs whose slave nodes this rank owns, on a mesh with the ghosts that [`needed_ghosts`] lists. Collective.
+    /// For the pairs whose slave nodes this rank owns, in their order, on a mesh with the ghosts that [`needed_ghosts`] lists. Collective.
     pub fn new(
         session: &Session,
         mesh: &Mesh<D>,
@@ -153,23 +153,26 @@ impl<const D: usize> Coupling<D> {
         };
         let before: Vec<Vector<D>> = self.slaves().map(|(slave, _)| at(slave, forces)).collect();
         add(forces);
-        for ((slave, masters), before) in self.slaves().zip(before) {
+        for ((slave, _), before) in self.slaves().zip(before) {
             let force = add_scaled(&at(slave, forces), -1.0, &before);
-            self.react(held, (slave, masters), &force, forces);
+            self.opposites(held, slave, &force, |master, force| {
+                (0..D).for_each(|i| forces[master as usize * D + i] += force[i]);
+            });
         }
     }
 
-    /// Adds at the masters of a slave node the opposite of a force there.
-    fn react(
+    /// Visits the masters of a slave node, by local numbers, with the opposite of a force in N there.
+    pub fn opposites(
         &self,
         held: &Held<D>,
-        (slave, masters): (u32, &[(u32, f64)]),
+        slave: u32,
         force: &Vector<D>,
-        forces: &mut [f64],
+        mut visit: impl FnMut(u32, Vector<D>),
     ) {
+        let Ok(at) = self.slaves.binary_search_by_key(&slave, |(slave, _)| *slave) else { return };
         let force = held.free_part(slave as usize, force);
-        for (master, share) in masters {
-            (0..D).for_each(|i| forces[*master as usize * D + i] -= share * force[i]);
+        for (master, share) in &self.masters[self.slaves[at].1.clone()] {
+            visit(*master, force.map(|force| -share * force));
         }
     }
 

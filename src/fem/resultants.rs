@@ -40,6 +40,8 @@ pub enum Source {
     Support(usize),
     /// A contact with its adhesion and memory, by its position in the job.
     Contact(usize),
+    /// What a contact between bodies does to the other body, by its position in the job.
+    Against(usize),
     /// A traction, by its position in the job.
     Traction(usize),
     /// All body forces and the weight.
@@ -124,6 +126,7 @@ impl<const D: usize> Resultants<D> {
         );
         let mut sources: Vec<Source> = (0..supports.len()).map(Source::Support).collect();
         sources.extend((0..body.contacts.len()).map(Source::Contact));
+        sources.extend((0..body.contacts.len()).filter(|at| body.contacts[*at].is_paired()).map(Source::Against));
         sources.extend((0..body.load.tractions.len()).map(Source::Traction));
         if body.load.has_body_forces() {
             sources.push(Source::BodyForce);
@@ -231,7 +234,7 @@ impl<const D: usize> Resultants<D> {
         }
         let seen = body.seen_by_contacts(&velocity);
         for (at, contact) in body.contacts.iter().enumerate() {
-            contact.forces(&seen, |node, force| sums.add_and_react(Source::Contact(at), node, &force));
+            contact.forces(&seen, |node, force| sums.add_both(body, at, (node, &force)));
             let found = contact.areas(&seen);
             areas[at * AREAS..][..AREAS].copy_from_slice(&[
                 found.touching,
@@ -245,7 +248,7 @@ impl<const D: usize> Resultants<D> {
         surface.clear();
         body.write_surface_forces(state, surface)?;
         for SurfaceForce { contact, node, force } in surface {
-            sums.add_and_react(Source::Contact(*contact), *node, force);
+            sums.add_both(body, *contact, (*node, force));
         }
         if !masses.is_empty() {
             let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
@@ -302,6 +305,21 @@ impl<const D: usize> Sums<'_, D> {
         }
         if let Ok(at) = self.slanted.binary_search_by_key(&node, |slanted| slanted.0) {
             self.react_along_held(self.slanted[at], force);
+        }
+    }
+
+    /// Adds the force of a contact at a node, with the opposite ones on the body that it may face there.
+    fn add_both<const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        contact: usize,
+        (node, force): (u32, &Vector<D>),
+    ) {
+        self.add_and_react(Source::Contact(contact), node, force);
+        if let Some(coupling) = body.coupling.as_ref().filter(|_| body.contacts[contact].is_paired()) {
+            coupling.opposites(&body.held, node, force, |master, force| {
+                self.add_and_react(Source::Against(contact), master, &force);
+            });
         }
     }
 

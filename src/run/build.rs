@@ -12,7 +12,7 @@ use crate::{
         },
         pairs::PairedNode,
         space::{
-            Geometry, Held, SurfacePoint, cell_rule, facets, place_in_cell, surface_means, surface_points,
+            Geometry, Held, SurfacePoint, cell_rule, facets as facets_of, place_in_cell, surface_means, surface_points,
         },
         state::State,
     },
@@ -94,7 +94,12 @@ pub(super) fn body<const D: usize, const S: usize>(
     (body.support_motion, body.elastic_support, body.coupling) = (motion, elastic_support, coupling);
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
-        let facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
+        let mut facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
+        let contacts = job.contact.iter().filter(|contact| contact.redistribute_mass);
+        let against: Vec<_> = contacts.flat_map(|contact| &contact.against).collect();
+        facets.extend(facets_of(&body.mesh, against));
+        facets.sort_unstable();
+        facets.dedup();
         session.agree(body.redistribute_mass(session, &facets, &state.velocity))?;
         session.agree(refuse_remaining_mass(job, &body))?;
     }
@@ -260,7 +265,7 @@ pub(super) fn part_of<const D: usize>(
     (table, on): (&str, &[String]),
     part: Option<&Scalar>,
 ) -> Result<Vec<u32>, Agreed> {
-    let mut facets = facets(mesh, on);
+    let mut facets = facets_of(mesh, on);
     let Some(part) = part else { return Ok(facets) };
     let refused = |words: String| {
         let on = on.join(", ");
@@ -333,7 +338,7 @@ fn refuse_moving_contact<const D: usize>(
 
 fn load<const D: usize>(job: &Job, mesh: &Mesh<D>, materials: &[Material<f64>]) -> Load {
     let traction = |t: &job::Traction| Traction {
-        facets: facets(mesh, &t.on),
+        facets: facets_of(mesh, &t.on),
         value: t.value.clone(),
         pressure: t.pressure.clone(),
     };

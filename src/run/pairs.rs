@@ -61,7 +61,8 @@ pub(super) fn coupling<const D: usize>(
     if paired.iter().all(Option::is_none) {
         return Ok(None);
     }
-    let pairs: Vec<_> = paired.iter().flatten().flat_map(|nodes| shares(mesh, nodes)).collect();
+    let mut pairs: Vec<_> = paired.iter().flatten().flat_map(|nodes| shares(mesh, nodes)).collect();
+    pairs.sort_by_key(|pair| pair.slave);
     Coupling::new(session, mesh, &pairs, held).map(Some)
 }
 

@@ -119,6 +119,7 @@ fn name(job: &Job, source: Source) -> String {
     let (kind, on) = match source {
         Source::Support(at) => ("support", &job.support[at].on),
         Source::Contact(at) => ("contact", &job.contact[at].on),
+        Source::Against(at) => ("against", &job.contact[at].against),
         Source::Traction(at) => ("traction", &job.traction[at].on),
         Source::BodyForce => return "body_force".into(),
         Source::Momentum => return "momentum".into(),
@@ -130,9 +131,10 @@ fn name(job: &Job, source: Source) -> String {
 pub(crate) fn source_names(job: &Job) -> Vec<String> {
     let supports = (0..job.support.len()).map(Source::Support);
     let contacts = (0..job.contact.len()).map(Source::Contact);
+    let against = (0..job.contact.len()).filter(|at| !job.contact[*at].against.is_empty()).map(Source::Against);
     let tractions = (0..job.traction.len()).map(Source::Traction);
     let others = [Source::BodyForce, Source::Momentum];
-    supports.chain(contacts).chain(tractions).chain(others).map(|source| name(job, source)).collect()
+    supports.chain(contacts).chain(against).chain(tractions).chain(others).map(|source| name(job, source)).collect()
 }
 
 /// The cells of a group of columns, if it is there, each after a comma; empty for a source without these values.

@@ -54,7 +54,8 @@ pub struct Contact {
     pub normal: NormalLaw,
     /// Whether the mass of the cells at these boundaries is moved to nodes behind them (mass redistribution), so that the boundary
     /// loses no kinetic energy in impacts and the contact pressure does not oscillate. Total mass, centre of mass and moments of
-    /// inertia stay the same; gravity and body forces move with the mass. Requires an implicit scheme.
+    /// inertia stay the same; gravity and body forces move with the mass. Between bodies, the boundaries `against` take part. Requires an
+    /// implicit scheme.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub redistribute_mass: bool,
     /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;
