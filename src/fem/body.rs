@@ -16,6 +16,7 @@ use crate::{
             RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect,
             SurfaceForce, Term,
         },
+        pairs::{Pair, shares},
         space::{Batch, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, facet_points},
         state::State,
     },
@@ -51,6 +52,8 @@ pub struct Body<const D: usize, const S: usize> {
     pub held: Held<D>,
     /// The change of basis by contact between bodies, if there is any, on all ranks alike.
     pub coupling: Option<Coupling<D>>,
+    /// The contacts between bodies.
+    pub pairs: Vec<Pair<D>>,
     /// Springs and dashpots of supports.
     pub elastic_support: ElasticSupport<D>,
     /// The mass that contact boundaries have passed on, if some have, on all ranks alike.
@@ -89,6 +92,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             load: Load::default(),
             held,
             coupling: None,
+            pairs: Vec::new(),
             elastic_support: ElasticSupport::default(),
             redistributed_mass: None,
             support_motion: None,
@@ -165,6 +169,25 @@ impl<const D: usize, const S: usize> Body<D, S> {
         seen_by_contacts(self.coupling.as_ref(), &self.held, values)
     }
 
+    /// Finds anew what the nodes of pairs face that slide along each other, at this displacement with ghosts. Collective.
+    pub fn form_pairs(&mut self, session: &Session, displacement: &DistributedVector) -> Result<(), Agreed> {
+        let displacement = session.agree(displacement.local())?;
+        let moved = self.mesh.nodes.iter().zip(displacement.chunks_exact(D));
+        let places: Vec<Vector<D>> =
+            moved.map(|(place, moved)| std::array::from_fn(|i| place[i] + moved[i])).collect();
+        let mut pairs = std::mem::take(&mut self.pairs);
+        for pair in pairs.iter_mut().filter(|pair| pair.slides) {
+            pair.form(session, &self.mesh, &places)?;
+        }
+        self.coupling = Some(Coupling::new(session, &self.mesh, &shares(&self.mesh, &pairs), &self.held)?);
+        let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, &displacement);
+        for pair in pairs.iter().filter(|pair| pair.slides) {
+            self.contacts[pair.contact].face(&pair.nodes, &seen);
+        }
+        self.pairs = pairs;
+        Ok(())
+    }
+
     /// Replaces velocities by those that are the unknowns of a step: at slave nodes relative to the surface that they face. Collective.
     pub fn make_relative(&self, velocity: &mut DistributedVector) -> Result<()> {
         self.coupling.as_ref().map_or(Ok(()), |coupling| coupling.make_relative(&self.held, velocity))
@@ -231,9 +254,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let SupportForces { runs, forces } = &mut *self.at_supports.borrow_mut();
         forces.fill(0.0);
         with_nodal(state, |nodal| {
-            let seen = self.seen_by_contacts(nodal.displacement);
-            let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &seen));
-            energy[STORED_IN_CONTACT] = stored.sum::<Result<f64>>()?;
+            energy[STORED_IN_CONTACT] = self.energy_of_contacts(state.time, &state.displacement)?;
             self.elastic_support.add_energy(self.evaluation, step, nodal, &mut energy);
             if let Some(mass) = &self.redistributed_mass {
                 let change = |at: usize| nodal.velocity[at] - nodal.previous_velocity[at];
@@ -266,6 +287,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
             });
             Ok((energy, squares.peaks()))
         })?
+    }
+
+    /// The energy in J that contacts store on this rank at this displacement with ghosts.
+    pub fn energy_of_contacts(&self, time: f64, displacement: &DistributedVector) -> Result<f64> {
+        let displacement = displacement.local()?;
+        let seen = self.seen_by_contacts(&displacement);
+        self.contacts.iter().map(|contact| contact.stored_energy(time, &seen)).sum()
     }
 
     /// The energies of [`Body::energy`], without the forces at supports, which remain those of the call before.

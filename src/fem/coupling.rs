@@ -291,6 +291,24 @@ fn product<const D: usize>(a: &[f64], b: &[f64], transposed: bool) -> Vec<f64> {
     (0..D * D).map(|at| (0..D).map(|k| first(at / D, k) * b[k * D + at % D]).sum()).collect()
 }
 
+/// The same for any pairs of these nodes of two surfaces, of which this rank owns the given ones: those that carry the law and the others.
+/// Collective.
+pub fn ghosts_of_surfaces<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    [slaves, masters]: [Vec<u32>; 2],
+) -> Result<Vec<u32>, Agreed> {
+    let slaves: BTreeSet<u32> = gather(session.world(), &slaves)?.into_iter().collect();
+    let masters: BTreeSet<u32> = gather(session.world(), &masters)?.into_iter().collect();
+    let nodes = |cell: usize| mesh.cell_nodes(cell).map(|node| mesh.global_node(node));
+    let has_slave = |cell: &usize| nodes(*cell).any(|node| slaves.contains(&node));
+    let around: BTreeSet<u32> = (0..mesh.cell_count()).filter(has_slave).flat_map(nodes).collect();
+    let own = mesh.first_node as u32..(mesh.first_node + mesh.owned) as u32;
+    let takes_part = !around.is_empty() || masters.iter().any(|node| own.contains(node));
+    let around = gather(session.world(), &around.into_iter().collect::<Vec<_>>())?;
+    Ok(if takes_part { around.into_iter().chain(masters).collect() } else { Vec::new() })
+}
+
 /// The nodes, by global numbers, that this rank needs as ghosts for the equations of these pairs, of which it owns the slave nodes:
 /// besides those of its cells, the masters of its slave nodes and all nodes to which `T^T K T` couples its own. Collective.
 pub fn needed_ghosts<const D: usize>(

@@ -2,10 +2,10 @@
 
 use super::coupling::MasterShare;
 use crate::{
-    error::{Error, Result},
     fem::space::{
         SurfacePoint,
         mortar::{Contribution, Facet, contributions},
+        surface_points,
     },
     linear_algebra::tensor::{Vector, norm},
     mesh::{Mesh, shape::facet_normal},
@@ -15,6 +15,7 @@ use crate::{
         session::Session,
     },
 };
+use std::collections::BTreeMap;
 
 /// A node of the slave side that faces the other side.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,18 +40,79 @@ impl<const D: usize> PairedNode<D> {
     }
 }
 
+/// A contact between bodies, with the facets of this rank on both sides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair<const D: usize> {
+    /// The position of the contact among those of the job.
+    pub contact: usize,
+    /// The slave side, whose nodes carry the law.
+    pub on: Vec<u32>,
+    /// The other side.
+    pub against: Vec<u32>,
+    /// Whether what nodes face is found anew as bodies slide. All nodes of the slave side carry the law then; those that face nothing are at
+    /// an infinite distance.
+    pub slides: bool,
+    /// The nodes owned here that carry the law, ascending.
+    pub nodes: Vec<PairedNode<D>>,
+}
+
+impl<const D: usize> Pair<D> {
+    /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
+    pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
+        let found = paired_nodes(session, mesh, places, [&self.on, &self.against])?;
+        if !self.slides {
+            self.nodes = found;
+            return Ok(());
+        }
+        let mut facing: BTreeMap<u32, PairedNode<D>> =
+            found.into_iter().map(|node| (node.node, node)).collect();
+        let mut all: BTreeMap<u32, SurfacePoint<D>> = BTreeMap::new();
+        for point in surface_points(session, mesh, &self.on)?.into_iter().filter(|point| point.weight > 0.0) {
+            let kept = all.entry(point.node).or_insert(point);
+            if point.weight > kept.weight {
+                *kept = point;
+            }
+        }
+        // The normal remains that of the undeformed body.
+        let node_at = |SurfacePoint { node, normal, weight }: SurfacePoint<D>| match facing.remove(&node) {
+            Some(found) => PairedNode { normal, ..found },
+            None => PairedNode { node, normal, weight, distance: f64::INFINITY, masters: Vec::new() },
+        };
+        self.nodes = all.into_values().map(node_at).collect();
+        Ok(())
+    }
+}
+
+/// The nodes that carry the law of a contact, if it is one of these pairs.
+pub fn nodes_of<const D: usize>(pairs: &[Pair<D>], contact: usize) -> Option<&[PairedNode<D>]> {
+    pairs.iter().find(|pair| pair.contact == contact).map(|pair| &pair.nodes[..])
+}
+
+/// The shares of the masters of the nodes of all these pairs, in the order of the nodes.
+pub fn shares<const D: usize>(mesh: &Mesh<D>, pairs: &[Pair<D>]) -> Vec<MasterShare> {
+    let of_node = |node: &PairedNode<D>| {
+        let slave = mesh.global_node(node.node);
+        let masters = node.masters.iter();
+        masters.map(move |&(master, share)| MasterShare { slave, master, share }).collect::<Vec<_>>()
+    };
+    let mut all: Vec<MasterShare> = pairs.iter().flat_map(|pair| &pair.nodes).flat_map(of_node).collect();
+    all.sort_by_key(|share| share.slave);
+    all
+}
+
 /// The least part of the surface around a node that must face the other side; nodes with less carry no law.
 const LEAST_SHARE: f64 = 1e-4;
 
-/// The nodes owned here of the slave facets `on` that face the facets `against` of all ranks, ascending. Collective.
-pub fn paired_nodes<const D: usize>(
+/// The nodes owned here of the slave facets `on` that face the facets `against` of all ranks, ascending, with the local nodes of the mesh
+/// at `places` in m. Collective.
+fn paired_nodes<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
-    on: &[u32],
-    against: &[u32],
+    places: &[Vector<D>],
+    [on, against]: [&[u32]; 2],
 ) -> Result<Vec<PairedNode<D>>, Agreed> {
-    let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, *facet)).collect();
-    let masters = gather_facets(session, mesh, against)?;
+    let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
+    let masters = gather_facets(session, mesh, places, against)?;
     let mut outgoing = vec![Vec::new(); session.ranks()];
     for contribution in contributions(&slaves, &masters, f64::INFINITY) {
         let Contribution { node, normal, weight, whole, gap, masters } = contribution;
@@ -61,20 +123,16 @@ pub fn paired_nodes<const D: usize>(
         list.extend(masters.iter().flat_map(|(master, value)| [f64::from(*master), *value]));
     }
     let records = exchange_lists(session.world(), &outgoing)?;
-    Ok(nodes_of(mesh, &records))
+    Ok(sum_of_contributions(mesh, &records))
 }
 
 /// A facet of this rank.
-fn facet_of<const D: usize>(mesh: &Mesh<D>, facet: u32) -> Facet<D> {
-    let corners = mesh.facet_corners(facet);
-    let mut nodes = mesh.facets[facet as usize].to_vec();
-    if mesh.order() == 2 {
-        nodes.extend(&mesh.facet_midsides(facet)[..D * (D - 1) / 2]);
-    }
+fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) -> Facet<D> {
+    let corners = mesh.facets[facet as usize].map(|node| places[node as usize]);
     let normal = facet_normal(&corners);
     let size = norm(&normal);
     Facet {
-        nodes: nodes.into_iter().map(|node| mesh.global_node(node)).collect(),
+        nodes: mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect(),
         corners,
         normal: normal.map(|n| n / size),
     }
@@ -84,9 +142,10 @@ fn facet_of<const D: usize>(mesh: &Mesh<D>, facet: u32) -> Facet<D> {
 fn gather_facets<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
+    places: &[Vector<D>],
     facets: &[u32],
 ) -> Result<Vec<Facet<D>>, Agreed> {
-    let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, *facet)).collect();
+    let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
     let nodes: Vec<u32> = own.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
     let places: Vec<f64> = own
         .iter()
@@ -107,16 +166,16 @@ fn gather_facets<const D: usize>(
 }
 
 /// The nodes of this rank, from the contributions of the facets around them.
-fn nodes_of<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<PairedNode<D>> {
+fn sum_of_contributions<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<PairedNode<D>> {
     #[derive(Default)]
     struct Sum {
         weight: f64,
         whole: f64,
         gap: f64,
         normal: [f64; 3],
-        masters: std::collections::BTreeMap<u32, f64>,
+        masters: BTreeMap<u32, f64>,
     }
-    let mut sums: std::collections::BTreeMap<u32, Sum> = std::collections::BTreeMap::new();
+    let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
     let mut rest = records;
     while let [node, weight, whole, gap, after @ ..] = rest {
         let sum = sums.entry(*node as u32).or_default();
@@ -149,39 +208,4 @@ fn nodes_of<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<PairedNode<D
             }
         })
         .collect()
-}
-
-/// The shares of the masters of nodes of this rank.
-pub fn shares<const D: usize>(mesh: &Mesh<D>, nodes: &[PairedNode<D>]) -> Vec<MasterShare> {
-    let of_node = |node: &PairedNode<D>| {
-        let slave = mesh.global_node(node.node);
-        node.masters
-            .iter()
-            .map(move |&(master, share)| MasterShare { slave, master, share })
-            .collect::<Vec<_>>()
-    };
-    nodes.iter().flat_map(of_node).collect()
-}
-
-/// Refuses nodes that belong to two pairs or are on both sides. Collective.
-pub fn refuse_chains<const D: usize>(
-    session: &Session,
-    mesh: &Mesh<D>,
-    pairs: &[MasterShare],
-) -> Result<(), Agreed> {
-    let numbers: Vec<u32> = pairs.iter().flat_map(|pair| [pair.slave, pair.master]).collect();
-    let numbers = gather(session.world(), &numbers)?;
-    let slaves: std::collections::BTreeSet<u32> = numbers.iter().step_by(2).copied().collect();
-    let both = numbers.iter().skip(1).step_by(2).find(|master| slaves.contains(master));
-    let place = both.and_then(|&node| {
-        let at = (node as usize).checked_sub(mesh.first_node).filter(|at| *at < mesh.owned)?;
-        Some(mesh.nodes[at])
-    });
-    session.agree(match place {
-        None => Ok(()),
-        Some(place) => Err(Error::Refused(format!(
-            "contact: the node at {place:?} m is on the side `on` of one pair of boundaries and on the side `against` of another; exchange \
-             `on` and `against` in one of the tables"
-        ))),
-    })
 }

@@ -126,7 +126,9 @@ impl<const D: usize> Resultants<D> {
         );
         let mut sources: Vec<Source> = (0..supports.len()).map(Source::Support).collect();
         sources.extend((0..body.contacts.len()).map(Source::Contact));
-        sources.extend((0..body.contacts.len()).filter(|at| body.contacts[*at].is_paired()).map(Source::Against));
+        sources.extend(
+            (0..body.contacts.len()).filter(|at| body.contacts[*at].is_paired()).map(Source::Against),
+        );
         sources.extend((0..body.load.tractions.len()).map(Source::Traction));
         if body.load.has_body_forces() {
             sources.push(Source::BodyForce);

@@ -146,6 +146,13 @@ impl<const D: usize> Mesh<D> {
         })
     }
 
+    /// Local numbers of the corners of a facet, and of the nodes on its edges in quadratic cells.
+    pub fn facet_nodes(&self, facet: u32) -> impl Iterator<Item = u32> {
+        let middles = if self.order() == 2 { self.facet_midsides(facet) } else { [0; D] };
+        let count = if self.order() == 2 { D * (D - 1) / 2 } else { 0 };
+        self.facets[facet as usize].into_iter().chain(middles.into_iter().take(count))
+    }
+
     /// The facets of linear cells with the same nodes, oriented like the facet: itself if cells are linear, else its 2 edges or 4
     /// triangles between corners and nodes on edges.
     pub fn sub_facets(&self, facet: u32) -> impl Iterator<Item = [u32; D]> {

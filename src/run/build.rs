@@ -1,6 +1,9 @@
 //! Builds a body from the tables of a job. A table that is absent creates nothing.
 
-use super::{materials::Materials, pairs};
+use super::{
+    materials::Materials,
+    pairs::{coupling, refuse_conflicts},
+};
 use crate::{
     error::{Error, Result},
     fem::{
@@ -10,9 +13,10 @@ use crate::{
             Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
             surface_effects,
         },
-        pairs::PairedNode,
+        pairs::{Pair, nodes_of},
         space::{
-            Geometry, Held, SurfacePoint, cell_rule, facets as facets_of, place_in_cell, surface_means, surface_points,
+            Geometry, Held, SurfacePoint, cell_rule, facets as facets_of, place_in_cell, surface_means,
+            surface_points,
         },
         state::State,
     },
@@ -33,7 +37,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
     mesh: Mesh<D>,
-    paired: Vec<Option<Vec<PairedNode<D>>>>,
+    pairs: Vec<Pair<D>>,
 ) -> Result<(Body<D, S>, State)> {
     let materials = Materials::new(session, job, &mesh)?;
     let geometry = Geometry::by_cells(&mesh, |cell| materials.of_cell(&mesh, cell));
@@ -43,11 +47,11 @@ pub(super) fn body<const D: usize, const S: usize>(
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
     let load = load(job, &mesh, &materials.all);
     let elastic_support = elastic_support::<D, S>(session, job, &mesh, &held, &materials)?;
-    let coupling = pairs::coupling(session, &mesh, &paired, &held)?;
+    let coupling = coupling(session, &mesh, &pairs, &held)?;
     let mut contacts = Vec::new();
     let mut taken = BTreeSet::new();
     let mut parts = Vec::new();
-    for (contact, paired) in job.contact.iter().zip(&paired) {
+    for (number, contact) in job.contact.iter().enumerate() {
         let facets = part_of(session, &mesh, ("contact", &contact.on), contact.part.as_ref())?;
         session.agree(take_facets(contact, &mesh, &facets, &mut taken))?;
         parts.push(facets.clone());
@@ -60,7 +64,12 @@ pub(super) fn body<const D: usize, const S: usize>(
             session,
             &mesh,
             &facets,
-            ContactConditions { quadrature: contact.quadrature, law, gap, paired: paired.clone() },
+            ContactConditions {
+                quadrature: contact.quadrature,
+                law,
+                gap,
+                paired: nodes_of(&pairs, number).map(<[_]>::to_vec),
+            },
             &held,
         )?;
         laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
@@ -70,14 +79,17 @@ pub(super) fn body<const D: usize, const S: usize>(
         }
         contacts.push(laws);
     }
-    pairs::refuse_conflicts(session, job, &mesh, &contacts)?;
-    let surface_effects = surface_effects(session, &job.contact, &mesh, (&parts, &paired), &held)?;
+    refuse_conflicts(session, job, &mesh, &contacts)?;
+    let surface_effects = surface_effects(session, &job.contact, &mesh, (&parts, &pairs), &held)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
     }
     if job.time.scheme.states() > 1 {
         state.previous_displacement = Some(state.displacement.like()?);
+    }
+    if pairs.iter().any(|pair| pair.slides) {
+        state.paired_displacement = Some(state.displacement.like()?);
     }
     session.agree(initial(job, &mesh, &held, &mut state))?;
     if let Some(motion) = &motion {
@@ -91,7 +103,8 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut body = Body::new(mesh, geometry, effects, held, evaluation(job.time.scheme));
     body.material_tables = materials.tables;
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
-    (body.support_motion, body.elastic_support, body.coupling) = (motion, elastic_support, coupling);
+    (body.support_motion, body.elastic_support) = (motion, elastic_support);
+    (body.coupling, body.pairs) = (coupling, pairs);
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
         let mut facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();

@@ -8,7 +8,7 @@ use crate::{
         effect::{Closeness, Contact, Gaps, OVERRUN, longest_side},
         state::State,
     },
-    job::Job,
+    job::{Job, Sliding},
     laws::contact::Gap,
     linear_algebra::tensor::{Vector, larger},
     parallel::session::Session,
@@ -18,6 +18,8 @@ use serde::Serialize;
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
 
+/// The slip between bodies, as a share of the size of a facet, beyond which they no longer act on the surface that they face.
+const LARGEST_SLIP: f64 = 0.5;
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -151,11 +153,18 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
+        let Closeness { penetration, held, slip } = contact.closeness_of_all(session);
+        let on = table.on.join(", ");
+        if slip > LARGEST_SLIP && table.sliding == Sliding::Small {
+            out.push(format!(
+                "contact.{number}: the boundary {on} slid up to {slip:.2} times the size of a facet along {} while it pressed on it: nodes \
+                 still act on the surface that they faced at the start; use sliding = \"finite\"",
+                table.against.join(", ")
+            ));
+        }
         if !contact.law.depends_on_displacement() {
             continue;
         }
-        let Closeness { penetration, held } = contact.closeness_of_all(session);
-        let on = table.on.join(", ");
         if held > OVERRUN * size {
             out.push(format!(
                 "contact.{number}: the obstacle moved up to {held:.3e} m beyond nodes of the boundary {on} that a support holds along \

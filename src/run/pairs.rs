@@ -4,34 +4,34 @@ use super::build::part_of;
 use crate::{
     error::{Error, Result},
     fem::{
-        coupling::{Coupling, needed_ghosts},
+        coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
         effect::Contact,
-        pairs::{PairedNode, paired_nodes, refuse_chains, shares},
+        pairs::{Pair, shares},
         space::{Held, facets},
     },
-    job::Job,
+    job::{Job, Sliding},
     mesh::Mesh,
-    parallel::{agreement::Agreed, session::Session},
+    parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// For each contact of a job the nodes owned here that face another body, if it is against one; the mesh gets the ghosts that their
-/// equations need. Collective.
+/// The contacts of a job between bodies; the mesh gets the ghosts that their equations need. Collective.
 pub(super) fn find<const D: usize>(
     session: &Session,
     job: &Job,
     mesh: &mut Mesh<D>,
-) -> Result<Vec<Option<Vec<PairedNode<D>>>>, Agreed> {
-    let mut all = Vec::new();
-    for (number, contact) in job.contact.iter().enumerate() {
-        if contact.against.is_empty() {
-            all.push(None);
-            continue;
-        }
+) -> Result<Vec<Pair<D>>, Agreed> {
+    let mut pairs = Vec::new();
+    for (number, contact) in job.contact.iter().enumerate().filter(|(_, contact)| !contact.against.is_empty())
+    {
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
-        let found = paired_nodes(session, mesh, &on, &facets(mesh, &contact.against))?;
+        let against = facets(mesh, &contact.against);
+        let slides = contact.sliding == Sliding::Finite;
+        let mut pair = Pair { contact: number, on, against, slides, nodes: Vec::new() };
+        pair.form(session, mesh, &mesh.nodes)?;
         let names = [&contact.on, &contact.against].map(|names| names.join(", "));
-        session.agree(if session.total(found.len()) == 0 {
+        let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
+        session.agree(if session.total(facing) == 0 && !slides {
             Err(Error::Refused(format!(
                 "contact.{number}: no part of the boundary {} faces the boundary {} along its outward normal; correct `on` or `against`, or \
                  the positions of the bodies",
@@ -40,30 +40,63 @@ pub(super) fn find<const D: usize>(
         } else {
             Ok(())
         })?;
-        all.push(Some(found));
+        pairs.push(pair);
     }
-    let pairs: Vec<_> = all.iter().flatten().flat_map(|nodes| shares(mesh, nodes)).collect();
-    if all.iter().any(Option::is_some) {
-        refuse_chains(session, mesh, &pairs)?;
-        let ghosts = needed_ghosts(session, mesh, &pairs)?;
-        mesh.add_ghosts(session, ghosts)?;
+    if pairs.is_empty() {
+        return Ok(pairs);
     }
-    Ok(all)
+    let shares = shares(mesh, &pairs);
+    let global =
+        |facet: &u32| mesh.facet_nodes(*facet).map(|node| mesh.global_node(node)).collect::<Vec<_>>();
+    let mut slaves: BTreeSet<u32> = shares.iter().map(|share| share.slave).collect();
+    let mut masters: BTreeSet<u32> = shares.iter().map(|share| share.master).collect();
+    let mut ghosts = needed_ghosts(session, mesh, &shares)?;
+    for pair in pairs.iter().filter(|pair| pair.slides) {
+        let on: BTreeSet<u32> = pair.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
+        let against: BTreeSet<u32> = pair.against.iter().flat_map(global).collect();
+        let without_law = pair.on.iter().flat_map(global).filter(|node| !on.contains(node));
+        let others = without_law.chain(against.iter().copied()).collect();
+        ghosts.extend(ghosts_of_surfaces(session, mesh, [on.iter().copied().collect(), others])?);
+        slaves.extend(on);
+        masters.extend(against);
+    }
+    refuse_chains(session, mesh, [&slaves, &masters])?;
+    mesh.add_ghosts(session, ghosts)?;
+    Ok(pairs)
+}
+
+/// Refuses nodes that carry the law of one pair and are on the other side of another. Collective.
+fn refuse_chains<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    [slaves, masters]: [&BTreeSet<u32>; 2],
+) -> Result<(), Agreed> {
+    let [slaves, masters] = [slaves, masters].map(|nodes| nodes.iter().copied().collect::<Vec<_>>());
+    let slaves: BTreeSet<u32> = gather(session.world(), &slaves)?.into_iter().collect();
+    let masters: BTreeSet<u32> = gather(session.world(), &masters)?.into_iter().collect();
+    let own = mesh.first_node as u32..(mesh.first_node + mesh.owned) as u32;
+    let both = slaves.intersection(&masters).find(|node| own.contains(node));
+    session.agree(match both {
+        None => Ok(()),
+        Some(&node) => Err(Error::Refused(format!(
+            "contact: the node at {:?} m is on the side `on` of one pair of boundaries and on the side `against` of another; exchange `on` \
+             and `against` in one of the tables, or exclude the facets around it by `where`",
+            mesh.nodes[mesh.owned_node(node)]
+        ))),
+    })
 }
 
 /// The change of basis by these pairs, if there are any. Collective.
 pub(super) fn coupling<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
-    paired: &[Option<Vec<PairedNode<D>>>],
+    pairs: &[Pair<D>],
     held: &Held<D>,
 ) -> Result<Option<Coupling<D>>, Agreed> {
-    if paired.iter().all(Option::is_none) {
+    if pairs.is_empty() {
         return Ok(None);
     }
-    let mut pairs: Vec<_> = paired.iter().flatten().flat_map(|nodes| shares(mesh, nodes)).collect();
-    pairs.sort_by_key(|pair| pair.slave);
-    Coupling::new(session, mesh, &pairs, held).map(Some)
+    Coupling::new(session, mesh, &shares(mesh, pairs), held).map(Some)
 }
 
 /// Refuses nodes on the side `on` of a pair that supports hold along the normal, or that belong to another contact. Collective.

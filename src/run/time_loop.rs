@@ -60,6 +60,10 @@ pub(super) fn run<const D: usize, const S: usize>(
     let identity = Identity { version: super::version().into(), physics, start_state };
     let candidates = candidates(session, start, folder)?;
     let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
+    if restored.is_some() && ready.state.paired_displacement.is_some() {
+        let Setup { scheme, body, state, .. } = &mut ready;
+        session.agree(scheme.renew(session, body, state))?;
+    }
     session.on_first(|| prepare_folder(folder, (!is_restart).then_some(&claimed[..]), &mut log))?;
     if let Some(restored) = &restored {
         restored.faults.iter().for_each(|fault| log.warning(fault));

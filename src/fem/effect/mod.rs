@@ -37,7 +37,7 @@ mod viscous_stress;
 use crate::{
     error::{Error, Result},
     fem::{
-        pairs::PairedNode,
+        pairs::{Pair, PairedNode, nodes_of},
         space::{CellRun, Geometry, Held, surface_points},
     },
     job::{self, Material},
@@ -146,14 +146,14 @@ pub fn surface_effects<const D: usize>(
     session: &Session,
     contacts: &[job::Contact],
     mesh: &Mesh<D>,
-    (facets, paired): (&[Vec<u32>], &[Option<Vec<PairedNode<D>>>]),
+    (facets, pairs): (&[Vec<u32>], &[Pair<D>]),
     held: &Held<D>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
-    for (at, (contact, (facets, paired))) in contacts.iter().zip(facets.iter().zip(paired)).enumerate() {
+    for (at, (contact, facets)) in contacts.iter().zip(facets).enumerate() {
         let points = || {
-            let points = match paired {
+            let points = match nodes_of(pairs, at) {
                 Some(paired) => paired.iter().map(PairedNode::point).collect(),
                 None => surface_points(session, mesh, facets)?,
             };

@@ -19,6 +19,8 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
 
+/// The displacement from which pairs of bodies that slide were formed.
+const PAIRED: &str = "paired_displacement";
 /// Version of the format; increased when older files can no longer be read.
 const FORMAT: u32 = 3;
 
@@ -58,7 +60,7 @@ pub struct Header {
     pub start_state: Option<String>,
     /// For each contact: the largest penetration in m so far of points that are free to move, and of points that supports hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub closeness: Vec<[Option<f64>; 2]>,
+    pub closeness: Vec<Vec<Option<f64>>>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -157,6 +159,9 @@ pub fn save<const D: usize, const S: usize>(
         width: D,
         values: p,
     }));
+    let paired = state.paired_displacement.as_ref().map(DistributedVector::owned).transpose()?;
+    let paired = paired.as_deref();
+    tables.extend(paired.map(|values| IdTable { name: PAIRED, set: "nodes", width: D, values }));
     let of_cells: Vec<History> = body.all_cell_histories().collect();
     let of_nodes: Vec<History> = body.all_node_histories().collect();
     for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
@@ -197,6 +202,11 @@ pub fn restore<const D: usize, const S: usize>(
         let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &wanted, &nodes)?;
         fill(previous, &values[0])?;
     }
+    if let Some(paired) = &mut state.paired_displacement {
+        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(PAIRED, D)], &nodes)?;
+        fill(paired, &values[0])?;
+        body.form_pairs(session, paired)?;
+    }
     let cells = cell_ids(body);
     let [of_cells, of_nodes] = kept_by(body);
     let [total_cells, total_nodes] = [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64);
@@ -221,7 +231,7 @@ pub fn restore<const D: usize, const S: usize>(
         }
     }
     for (contact, saved) in body.contacts.iter_mut().zip(&header.closeness) {
-        contact.closeness = Closeness::restored(*saved);
+        contact.closeness = Closeness::restored(saved);
     }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)
@@ -266,7 +276,11 @@ pub fn transfer<const D: usize, const S: usize>(
     if let Some(previous) = &mut state.previous_displacement {
         fill(previous, &values[0])?;
     }
-    let mut known: Vec<&str> = vec!["displacement", "velocity"];
+    if let Some(paired) = &mut state.paired_displacement {
+        fill(paired, &values[0])?;
+        body.form_pairs(session, paired)?;
+    }
+    let mut known: Vec<&str> = vec!["displacement", "velocity", PAIRED];
     if let Some(traction) = &mut state.contact_traction
         && of_nodes.iter().any(|name| name == TRACTION)
     {

@@ -131,10 +131,17 @@ fn name(job: &Job, source: Source) -> String {
 pub(crate) fn source_names(job: &Job) -> Vec<String> {
     let supports = (0..job.support.len()).map(Source::Support);
     let contacts = (0..job.contact.len()).map(Source::Contact);
-    let against = (0..job.contact.len()).filter(|at| !job.contact[*at].against.is_empty()).map(Source::Against);
+    let against =
+        (0..job.contact.len()).filter(|at| !job.contact[*at].against.is_empty()).map(Source::Against);
     let tractions = (0..job.traction.len()).map(Source::Traction);
     let others = [Source::BodyForce, Source::Momentum];
-    supports.chain(contacts).chain(against).chain(tractions).chain(others).map(|source| name(job, source)).collect()
+    supports
+        .chain(contacts)
+        .chain(against)
+        .chain(tractions)
+        .chain(others)
+        .map(|source| name(job, source))
+        .collect()
 }
 
 /// The cells of a group of columns, if it is there, each after a comma; empty for a source without these values.

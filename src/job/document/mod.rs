@@ -12,7 +12,7 @@ mod output;
 mod time;
 
 pub use crate::laws::{
-    contact::{Contact, Quadrature},
+    contact::{Contact, Quadrature, Sliding},
     material::Material,
     schemes::Scheme,
 };

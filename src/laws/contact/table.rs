@@ -25,7 +25,25 @@ pub enum Quadrature {
     Gauss,
 }
 
-/// Boundaries that may touch an obstacle, and their contact laws.
+/// How far bodies in contact may slide along each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sliding {
+    /// Less than half a facet: nodes act on the surface that they face in the undeformed bodies. More is warned of.
+    #[default]
+    Small,
+    /// Any distance: what nodes face is found anew from the displacements, whenever some node has slid by a quarter of a facet since the
+    /// last time; normals remain those of the undeformed body. Requires a normal law with a gap, without adhesion and memory.
+    Finite,
+}
+
+impl Sliding {
+    fn is_small(&self) -> bool {
+        *self == Self::Small
+    }
+}
+
+/// Boundaries that may touch an obstacle or another body, and their contact laws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
@@ -36,10 +54,13 @@ pub struct Contact {
     /// of `on`, the slave side, on their velocity and displacement relative to the surface that they face along their normals in the
     /// undeformed bodies; friction, adhesion, memory and wear as against an obstacle. Choose as `on` the side with the finer mesh and
     /// without supports. The distance of the undeformed surfaces is that of the mesh; `gap` of the normal law adds to it, so that a
-    /// negative one is an interference. Valid while slip stays small beside a facet. Absent: an obstacle or `gap`.
+    /// negative one is an interference. Absent: an obstacle or `gap`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(example = ["top"])]
     pub against: Vec<String>,
+    /// How far the boundaries may slide along those in `against`.
+    #[serde(default, skip_serializing_if = "Sliding::is_small")]
+    pub sliding: Sliding,
     /// The part of these boundaries to which the contact applies: the facets at whose centre this expression in x, y, z is not 0. A
     /// boundary may be in several contact tables if each has a `where`, and no facet belongs to two; a node between them belongs to the
     /// one with the larger part of its area. A product of conditions holds where all hold, their `max` where one holds. Absent: the
@@ -140,8 +161,21 @@ impl Contact {
 
     /// Another body takes the place of an obstacle.
     fn faults_of_pair(&self) -> Vec<LawFault> {
+        let help = "use \"small\", or delete the key";
         if self.against.is_empty() {
-            return Vec::new();
+            let message = "only contact `against` another body distinguishes small and finite sliding";
+            let fault =
+                (self.sliding == Sliding::Finite).then(|| LawFault::at_value("sliding", message, help));
+            return fault.into_iter().collect();
+        }
+        let has_histories = self.adhesion.is_some() || self.memory.is_some();
+        if self.sliding == Sliding::Finite && (has_histories || !self.normal.has_gap()) {
+            let message = if has_histories {
+                "adhesion and memory belong to the surface that nodes faced first"
+            } else {
+                "this normal law has no gap, so that it would act where nodes face nothing"
+            };
+            return vec![LawFault::at_value("sliding", message, help)];
         }
         let not_there = [
             (

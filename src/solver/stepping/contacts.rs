@@ -75,6 +75,11 @@ pub(super) fn keep_closeness<const D: usize, const S: usize>(
     let velocity = state.velocity.local()?;
     let velocity = body.seen_by_contacts(&velocity);
     body.contacts.iter_mut().for_each(|contact| contact.keep_closeness(&velocity));
+    if body.coupling.is_some() {
+        let displacement = state.displacement.local()?;
+        let displacement = body.seen_by_contacts(&displacement);
+        body.contacts.iter_mut().for_each(|contact| contact.keep_slip([&displacement, &velocity]));
+    }
     Ok(())
 }
 

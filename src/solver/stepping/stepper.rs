@@ -21,15 +21,24 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
-        effect::{CONTACT, Contact, Energy, Freedom, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
+        effect::{
+            CONTACT, Contact, Energy, Freedom, LoadedMotion, NUMERICAL, Role, STORED_IN_CONTACT, Step,
+            VISCOUS, WORK,
+        },
         resultants::BalancedMotion,
         state::State,
     },
     job::{Accept, Scheme},
-    linear_algebra::petsc::{DistributedVector, Precision},
+    linear_algebra::{
+        petsc::{DistributedVector, Precision},
+        tensor::larger,
+    },
     parallel::session::Session,
 };
 use std::time::Instant;
+
+/// The slip between bodies, as a share of the size of a facet, after which what they face is found anew.
+const SLIP_BETWEEN_PAIRINGS: f64 = 0.25;
 
 /// The choices of a job that determine a [`Stepper`].
 #[derive(Debug, Clone, Copy)]
@@ -72,6 +81,11 @@ pub struct Stepper {
     attempted: Option<StepRange>,
     /// Number of preconditioners built.
     pub set_ups: u64,
+    /// How often what sliding bodies face was found anew.
+    pub pairings: u64,
+    settings: SolverSettings,
+    /// Estimated number of steps that share a matrix.
+    steps: u64,
     /// Seconds by phase.
     pub clock: StepClock,
     /// Bytes by phase.
@@ -130,6 +144,9 @@ impl Stepper {
             accepts_fast_flow: settings.accept.contains(&Accept::ExplicitStability),
             attempted: None,
             set_ups: 0,
+            pairings: 0,
+            settings: settings.clone(),
+            steps,
             clock: StepClock::default(),
             traffic: StepTraffic::default(),
             passes: PassBytes::of(body),
@@ -420,6 +437,45 @@ impl Stepper {
         (self.powers, outcome.powers) = (powers, powers);
         outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
+        self.follow_sliding(session, body, state, &mut outcome.energy)
+    }
+
+    /// Finds anew what bodies face that have slid along each other. The energy that contacts store changes with it, by an error of the
+    /// scheme. Collective.
+    fn follow_sliding<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        energy: &mut Energy,
+    ) -> Result<()> {
+        let Some(paired) = &mut state.paired_displacement else { return Ok(()) };
+        let slip = {
+            let displacement = state.displacement.local()?;
+            let seen = body.seen_by_contacts(&displacement);
+            let slides = body.pairs.iter().filter(|pair| pair.slides);
+            slides.map(|pair| body.contacts[pair.contact].slip(&seen)).fold(0.0, larger)
+        };
+        if session.largest([slip])[0] <= SLIP_BETWEEN_PAIRINGS {
+            return Ok(());
+        }
+        body.form_pairs(session, &state.displacement)?;
+        let [stored] = session.sum([body.energy_of_contacts(state.time, &state.displacement)?]);
+        energy[NUMERICAL] += stored - energy[STORED_IN_CONTACT];
+        energy[STORED_IN_CONTACT] = stored;
+        paired.copy_from(&state.displacement)?;
+        self.pairings += 1;
+        self.renew(session, body, state)
+    }
+
+    /// Forgets all matrices, after what bodies face has changed. Collective.
+    pub fn renew<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+    ) -> Result<()> {
+        self.solver = StepSolver::new(session, body, state, &self.settings, self.steps)?;
         Ok(())
     }
 

@@ -7,24 +7,36 @@ pub struct Closeness {
     pub penetration: f64,
     /// Largest penetration in m of a point that supports hold along the normal, at which a constraint has no contact pressure.
     pub held: f64,
+    /// Largest distance by which a point with contact pressure had slid along another body, as a share of the size of the facets there.
+    pub slip: f64,
 }
 
 impl Default for Closeness {
     fn default() -> Self {
-        Self { penetration: f64::NEG_INFINITY, held: f64::NEG_INFINITY }
+        let [penetration, held, slip] = [f64::NEG_INFINITY; 3];
+        Self { penetration, held, slip }
     }
 }
 
 impl Closeness {
     /// As numbers of a checkpoint.
-    pub fn saved(self) -> [Option<f64>; 2] {
-        [self.penetration, self.held].map(|penetration| penetration.is_finite().then_some(penetration))
+    pub fn saved(self) -> Vec<Option<f64>> {
+        self.numbers().map(|number| number.is_finite().then_some(number)).to_vec()
+    }
+
+    /// All of them.
+    pub(super) fn numbers(self) -> [f64; 3] {
+        [self.penetration, self.held, self.slip]
+    }
+
+    /// The one with these numbers.
+    pub(super) fn of([penetration, held, slip]: [f64; 3]) -> Self {
+        Self { penetration, held, slip }
     }
 
     /// From the numbers of a checkpoint.
-    pub fn restored(saved: [Option<f64>; 2]) -> Self {
-        let [penetration, held] = saved.map(|penetration| penetration.unwrap_or(f64::NEG_INFINITY));
-        Self { penetration, held }
+    pub fn restored(saved: &[Option<f64>]) -> Self {
+        Self::of(std::array::from_fn(|at| saved.get(at).copied().flatten().unwrap_or(f64::NEG_INFINITY)))
     }
 }
 

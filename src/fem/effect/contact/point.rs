@@ -82,6 +82,8 @@ pub(super) struct Point<const D: usize> {
     pub place: Vector<D>,
     /// The distance in m to the body that it faces along the normal, of the undeformed bodies; 0 if it faces none.
     pub distance: f64,
+    /// Displacement in m relative to the body that it faces when it began to face it.
+    pub faced_at: Vector<D>,
     /// The gap in m at the end of the step of the undeformed surface without wear.
     pub reach: f64,
     /// Normal displacement in m of the surface without wear at the start of the step.
@@ -131,6 +133,7 @@ impl<const D: usize> Point<D> {
             unknown: Unknown::Velocity,
             place: [0.0; D],
             distance: 0.0,
+            faced_at: [0.0; D],
             reach: 0.0,
             moved: 0.0,
             follows: 0.0,
@@ -163,6 +166,12 @@ impl<const D: usize> Point<D> {
     pub(super) fn scale_weight(&mut self, factor: f64) {
         self.weight *= factor;
         self.force.as_flattened_mut().iter_mut().for_each(|force| *force *= factor);
+    }
+
+    /// Sets the weight of a nodal point.
+    pub(super) fn set_weight(&mut self, weight: f64) {
+        self.weight = weight;
+        self.force[0] = self.direction.map(|d| weight * self.free_length * d);
     }
 
     /// A point at a node, whose unknown is the parameter of the law.

@@ -11,14 +11,21 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::effect::Step,
+    fem::{effect::Step, pairs::PairedNode},
     laws::contact::{Gap, Sweep},
-    linear_algebra::tensor::{add_scaled, larger},
+    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     parallel::session::Session,
 };
 
 /// Penetration at nodes that supports hold, as a share of the body's size, from which on an obstacle counts as beyond them.
 pub const OVERRUN: f64 = 1e-6;
+
+/// How far a point has slid along another body since it began to face it, as a share of the size of the facets there.
+fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
+    let moved: Vector<D> = std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i]);
+    let along = norm(&add_scaled(&moved, -dot(&moved, &point.normal), &point.normal));
+    along / if D == 2 { point.weight } else { point.weight.sqrt() }
+}
 
 impl<const D: usize> Contact<D> {
     /// Fails where the obstacle has passed a point in the step just solved, from displacements at its start and velocities at its end
@@ -94,10 +101,42 @@ impl<const D: usize> Contact<D> {
         self.closeness = closeness;
     }
 
+    /// Keeps how far points with pressure have slid along another body in the step just committed, at displacements and velocities that
+    /// are relative to it.
+    pub fn keep_slip(&mut self, [displacement, velocity]: [&[f64]; 2]) {
+        if !self.is_paired {
+            return;
+        }
+        for point in &self.points {
+            if point.pressure_at(&self.law, Body, velocity) != 0.0 {
+                self.closeness.slip = larger(self.closeness.slip, slip(point, displacement));
+            }
+        }
+    }
+
+    /// The largest slip of points on this rank along another body since they began to face it, as a share of the size of the facets there,
+    /// at displacements that are relative to it.
+    pub fn slip(&self, displacement: &[f64]) -> f64 {
+        let facing = self.points.iter().filter(|point| point.distance.is_finite());
+        facing.map(|point| slip(point, displacement)).fold(0.0, larger)
+    }
+
+    /// Lets the points of a contact that slides along another body face it anew, at displacements that are relative to it.
+    pub fn face(&mut self, nodes: &[PairedNode<D>], displacement: &[f64]) {
+        for (at, node) in nodes.iter().enumerate() {
+            let point = &mut self.points[at];
+            point.set_weight(node.weight);
+            let moved = std::array::from_fn(|i| displacement[point.node() * D + i]);
+            (point.distance, point.faced_at) = (node.distance + dot(&moved, &point.normal), moved);
+        }
+        for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
+            point.weight = self.points[point.at].weight;
+        }
+    }
+
     /// How near body and obstacle have come in the steps so far, on any rank. Collective.
     pub fn closeness_of_all(&self, session: &Session) -> Closeness {
-        let [penetration, held] = session.largest([self.closeness.penetration, self.closeness.held]);
-        Closeness { penetration, held }
+        Closeness::of(session.largest(self.closeness.numbers()))
     }
 
     /// The gaps of points on this rank at `time`, from displacements with ghosts. A gap that is NaN is ignored: the first step refuses
