@@ -15,7 +15,7 @@ use crate::{
         session::Session,
     },
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A node of the slave side that faces the other side.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +57,35 @@ pub struct Pair<const D: usize> {
 }
 
 impl<const D: usize> Pair<D> {
+    /// Lets nodes face those at the same place on the other side, of a mesh that was split; nodes that both sides have carry no law.
+    /// Collective.
+    pub fn join(&mut self, session: &Session, mesh: &Mesh<D>) -> Result<(), Agreed> {
+        let bits = |place: &Vector<D>| place.map(f64::to_bits);
+        let nodes: BTreeSet<u32> = self.against.iter().flat_map(|facet| mesh.facet_nodes(*facet)).collect();
+        let numbers: Vec<u32> = nodes.iter().map(|node| mesh.global_node(*node)).collect();
+        let places: Vec<f64> = nodes.iter().flat_map(|node| mesh.nodes[*node as usize]).collect();
+        let (numbers, places) = (gather(session.world(), &numbers)?, gather(session.world(), &places)?);
+        let twins: BTreeMap<[u64; D], u32> = places
+            .chunks_exact(D)
+            .map(|place| std::array::from_fn(|i| place[i].to_bits()))
+            .zip(numbers)
+            .collect();
+        let points = surface_points(session, mesh, &self.on)?.into_iter().filter(|point| point.weight > 0.0);
+        let paired = points.filter_map(|SurfacePoint { node, normal, weight }| {
+            let twin = *twins.get(&bits(&mesh.nodes[node as usize]))?;
+            let masters = vec![(twin, 1.0)];
+            (twin != mesh.global_node(node)).then_some(PairedNode {
+                node,
+                normal,
+                weight,
+                distance: 0.0,
+                masters,
+            })
+        });
+        self.nodes = paired.collect();
+        Ok(())
+    }
+
     /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
     pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
         let found = paired_nodes(session, mesh, places, [&self.on, &self.against])?;

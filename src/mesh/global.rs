@@ -32,6 +32,8 @@ pub struct GlobalMesh<const D: usize> {
     pub point_sets: Vec<PointSet>,
     /// Names that are given to facets inside the body.
     pub inner_groups: Vec<InnerGroup>,
+    /// The sorted nodes of their facets inside the body; empty for meshes that are merged from parts.
+    pub inner_facets: Vec<Vec<[u32; D]>>,
 }
 
 impl<const D: usize> GlobalMesh<D> {

@@ -118,6 +118,7 @@ impl<const D: usize> Piece<D> {
             boundaries,
             point_sets: names.point_sets,
             inner_groups: names.inner_groups,
+            inner_facets: Vec::new(),
         })
     }
 }

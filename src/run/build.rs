@@ -15,8 +15,7 @@ use crate::{
         },
         pairs::{Pair, nodes_of},
         space::{
-            Geometry, Held, SurfacePoint, cell_rule, facets as facets_of, place_in_cell, surface_means,
-            surface_points,
+            Geometry, Held, SurfacePoint, cell_rule, facets, place_in_cell, surface_means, surface_points,
         },
         state::State,
     },
@@ -108,9 +107,8 @@ pub(super) fn body<const D: usize, const S: usize>(
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
         let mut facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
-        let contacts = job.contact.iter().filter(|contact| contact.redistribute_mass);
-        let against: Vec<_> = contacts.flat_map(|contact| &contact.against).collect();
-        facets.extend(facets_of(&body.mesh, against));
+        let pairs = body.pairs.iter().filter(|pair| job.contact[pair.contact].redistribute_mass);
+        facets.extend(pairs.flat_map(|pair| &pair.against));
         facets.sort_unstable();
         facets.dedup();
         session.agree(body.redistribute_mass(session, &facets, &state.velocity))?;
@@ -278,7 +276,7 @@ pub(super) fn part_of<const D: usize>(
     (table, on): (&str, &[String]),
     part: Option<&Scalar>,
 ) -> Result<Vec<u32>, Agreed> {
-    let mut facets = facets_of(mesh, on);
+    let mut facets = facets(mesh, on);
     let Some(part) = part else { return Ok(facets) };
     let refused = |words: String| {
         let on = on.join(", ");
@@ -351,7 +349,7 @@ fn refuse_moving_contact<const D: usize>(
 
 fn load<const D: usize>(job: &Job, mesh: &Mesh<D>, materials: &[Material<f64>]) -> Load {
     let traction = |t: &job::Traction| Traction {
-        facets: facets_of(mesh, &t.on),
+        facets: facets(mesh, &t.on),
         value: t.value.clone(),
         pressure: t.pressure.clone(),
     };

@@ -9,8 +9,8 @@ use crate::{
         pairs::{Pair, shares},
         space::{Held, facets},
     },
-    job::{Job, Sliding},
-    mesh::Mesh,
+    job::{self, Job, Sliding},
+    mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,8 +22,21 @@ pub(super) fn find<const D: usize>(
     mesh: &mut Mesh<D>,
 ) -> Result<Vec<Pair<D>>, Agreed> {
     let mut pairs = Vec::new();
-    for (number, contact) in job.contact.iter().enumerate().filter(|(_, contact)| !contact.against.is_empty())
-    {
+    let is_fault = |contact: &job::Contact| {
+        contact.against.is_empty() && contact.on.iter().any(|name| mesh.boundary(&other_side(name)).is_some())
+    };
+    for (number, contact) in job.contact.iter().enumerate() {
+        if is_fault(contact) {
+            let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
+            let other: Vec<String> = contact.on.iter().map(|name| other_side(name)).collect();
+            let against = facets(mesh, &other);
+            let mut pair = Pair { contact: number, on, against, slides: false, nodes: Vec::new() };
+            pair.join(session, mesh)?;
+            pairs.push(pair);
+        }
+        if contact.against.is_empty() {
+            continue;
+        }
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         let against = facets(mesh, &contact.against);
         let slides = contact.sliding == Sliding::Finite;

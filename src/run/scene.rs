@@ -39,7 +39,9 @@ impl Scene {
             MeshSource::Box(of) => generated(session, cuboid(of), of.partition, order).map(Self::Three)?,
             MeshSource::File(path) => {
                 session.on_first(|| refuse_missing(path, loaded))?;
-                let (scene, is_second_order) = from_file(session, path, order)?;
+                let faults = loaded.job.contact.iter().filter(|contact| contact.against.is_empty());
+                let faults: Vec<&str> = faults.flat_map(|contact| &contact.on).map(String::as_str).collect();
+                let (scene, is_second_order) = from_file(session, path, order, &faults)?;
                 if is_second_order && order == 1 {
                     loaded.warnings.push(
                         "the cells of the mesh file are of second order, but the run uses only their corners, joined by straight \
@@ -95,8 +97,8 @@ fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
     })
 }
 
-/// The mesh of a file, and whether the file has cells of second order.
-fn from_file(session: &Session, path: &Path, order: usize) -> Result<(Scene, bool), Agreed> {
+/// The mesh of a file, split along faults of these names if they are inside the body, and whether the file has cells of second order.
+fn from_file(session: &Session, path: &Path, order: usize, faults: &[&str]) -> Result<(Scene, bool), Agreed> {
     let mut in_parts = session.is_first() && partitioned::is_meant(path);
     session.world().process_at_rank(0).broadcast_into(&mut in_parts);
     if in_parts {
@@ -107,7 +109,13 @@ fn from_file(session: &Session, path: &Path, order: usize) -> Result<(Scene, boo
         };
         return Ok((scene, file.header.curved));
     }
-    let whole = session.on_first(|| gmsh::read(path))?;
+    let read = || -> Result<AnyMesh> {
+        let mut mesh = gmsh::read(path)?;
+        let named = |error| Error::Refused(format!("{}: {error}", path.display()));
+        faults.iter().try_for_each(|fault| mesh.split_along(fault)).map_err(named)?;
+        Ok(mesh)
+    };
+    let whole = session.on_first(read)?;
     let mut facts = match &whole {
         Some(AnyMesh::Two(mesh)) => [2, u8::from(mesh.is_second_order)],
         Some(AnyMesh::Three(mesh)) => [3, u8::from(mesh.is_second_order)],

@@ -14,6 +14,7 @@ use crate::{
     },
     job::Job,
     linear_algebra::petsc::DistributedVector,
+    mesh::other_side,
     parallel::{agreement::Agreed, session::Session},
 };
 use std::{
@@ -119,6 +120,10 @@ fn name(job: &Job, source: Source) -> String {
     let (kind, on) = match source {
         Source::Support(at) => ("support", &job.support[at].on),
         Source::Contact(at) => ("contact", &job.contact[at].on),
+        Source::Against(at) if job.contact[at].against.is_empty() => {
+            let sides: Vec<String> = job.contact[at].on.iter().map(|name| other_side(name)).collect();
+            return sides.join("+");
+        }
         Source::Against(at) => ("against", &job.contact[at].against),
         Source::Traction(at) => ("traction", &job.traction[at].on),
         Source::BodyForce => return "body_force".into(),
@@ -131,8 +136,9 @@ fn name(job: &Job, source: Source) -> String {
 pub(crate) fn source_names(job: &Job) -> Vec<String> {
     let supports = (0..job.support.len()).map(Source::Support);
     let contacts = (0..job.contact.len()).map(Source::Contact);
+    // A boundary without obstacle may be a fault inside the body.
     let against =
-        (0..job.contact.len()).filter(|at| !job.contact[*at].against.is_empty()).map(Source::Against);
+        (0..job.contact.len()).filter(|at| job.contact[*at].obstacle.is_none()).map(Source::Against);
     let tractions = (0..job.traction.len()).map(Source::Traction);
     let others = [Source::BodyForce, Source::Momentum];
     supports

@@ -374,6 +374,7 @@ fn name_boundaries<const D: usize>(
             let corners: Vec<Vector<D>> = facet.iter().map(|&node| mesh.nodes[node as usize]).collect();
             let at = place(&shape::centroid(&corners));
             mesh.inner_groups.push(InnerGroup { name, facets: inner.len(), place: at });
+            mesh.inner_facets.push(inner.iter().map(|(facet, _)| *facet).collect());
             continue;
         }
         facets.sort_unstable();

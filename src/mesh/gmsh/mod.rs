@@ -26,6 +26,16 @@ pub enum AnyMesh {
     Three(GlobalMesh<3>),
 }
 
+impl AnyMesh {
+    /// As [`GlobalMesh::split_along`].
+    pub fn split_along(&mut self, fault: &str) -> Result<()> {
+        match self {
+            Self::Two(mesh) => mesh.split_along(fault),
+            Self::Three(mesh) => mesh.split_along(fault),
+        }
+    }
+}
+
 /// Reads and validates a mesh; messages begin with the file's path.
 ///
 /// Tetrahedra give a mesh in space, otherwise triangles give a mesh in the plane. Entities whose cells are all negatively oriented

@@ -1,0 +1,186 @@
+//! Faults: meshes that are split along a named surface inside the body.
+
+use super::{
+    Boundary, GlobalMesh,
+    shape::{centroid, facet_of},
+    tags::place,
+};
+use crate::error::{Error, Result};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+/// The name of the boundary on the other side of a fault.
+pub fn other_side(fault: &str) -> String {
+    format!("other side of {fault}")
+}
+
+/// The sorted nodes of a facet.
+type Sorted<const D: usize> = [u32; D];
+
+/// Sets of elements that belong together.
+struct Groups(Vec<usize>);
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    fn of(&self, mut element: usize) -> usize {
+        while self.0[element] != element {
+            element = self.0[element];
+        }
+        element
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let [a, b] = [self.of(a), self.of(b)];
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+impl<const D: usize> GlobalMesh<D> {
+    /// Splits the mesh along the facets inside the body that have this name: their nodes become two, except on the edge of the surface
+    /// inside the body, where cells stay joined. The sides become two boundaries: one with this name, and [`other_side`]. Refused where
+    /// the surface branches, has one side only, or has no node that can become two.
+    pub fn split_along(&mut self, name: &str) -> Result<()> {
+        let Some(at) = self.inner_groups.iter().position(|group| group.name == name) else { return Ok(()) };
+        let facets = self.inner_facets[at].clone();
+        let refused = |words: &str, facet: &Sorted<D>| {
+            let corners = facet.map(|node| self.nodes[node as usize]);
+            Err(Error::Refused(format!("the fault \"{name}\" {words} around {}", place(&centroid(&corners)))))
+        };
+        let numbers: HashMap<Sorted<D>, usize> = facets.iter().copied().zip(0..).collect();
+        let on_fault: BTreeSet<u32> = facets.iter().flatten().copied().collect();
+        // The two cells of each facet, and the cells around each node.
+        let mut sides = vec![Vec::new(); facets.len()];
+        let mut around: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (cell, nodes) in self.cells.chunks_exact(D + 1).enumerate() {
+            nodes.iter().filter(|node| on_fault.contains(node)).for_each(|node| {
+                around.entry(*node).or_default().push(cell);
+            });
+            for opposite in 0..=D {
+                if let Some(&facet) = numbers.get(&sorted(facet_of::<D>(nodes, opposite))) {
+                    sides[facet].push((cell, opposite));
+                }
+            }
+        }
+        if let Some(facet) = sides.iter().position(|cells| cells.len() != 2) {
+            return refused("is on the surface of the body", &facets[facet]);
+        }
+        // The sides of facets at a common node that becomes two are in the same group.
+        let mut groups = Groups::new(2 * facets.len());
+        let mut split: BTreeMap<u32, Vec<Vec<usize>>> = BTreeMap::new();
+        for (&node, cells) in &around {
+            let parts = self.parts_around(node, cells, &numbers);
+            match parts.len() {
+                1 => continue,
+                2 => {}
+                _ => {
+                    let facet = facets.iter().find(|facet| facet.contains(&node)).unwrap_or(&facets[0]);
+                    return refused("branches, which a fault can't do,", facet);
+                }
+            }
+            for part in &parts {
+                let at_node = (0..facets.len()).filter(|number| facets[*number].contains(&node));
+                let both = at_node.flat_map(|number| [(number, 0), (number, 1)]);
+                let here = both.filter(|(number, side)| part.contains(&sides[*number][*side].0));
+                let mut of_part = here.map(|(number, side)| 2 * number + side);
+                if let Some(first) = of_part.next() {
+                    of_part.for_each(|other| groups.join(first, other));
+                }
+            }
+            split.insert(node, parts);
+        }
+        let opens = |facet: &Sorted<D>| facet.iter().any(|node| split.contains_key(node));
+        if split.is_empty() {
+            return refused(
+                "has no node away from its edge, so that it cannot open; refine the mesh",
+                &facets[0],
+            );
+        }
+        let one_sided = |number: usize| groups.of(2 * number) == groups.of(2 * number + 1);
+        if let Some(facet) = (0..facets.len()).find(|number| opens(&facets[*number]) && one_sided(*number)) {
+            return refused("has one side only", &facets[facet]);
+        }
+        // Of each connected part, the side of the first facet carries the law.
+        let mut carries: HashMap<usize, bool> = HashMap::new();
+        for number in 0..facets.len() {
+            let [first, second] = [0, 1].map(|side| groups.of(2 * number + side));
+            let known = carries.get(&first).copied().or_else(|| carries.get(&second).map(|carries| !carries));
+            let first_carries = known.unwrap_or(true);
+            carries.insert(first, first_carries);
+            carries.insert(second, !first_carries);
+        }
+        let carries = |number: usize, side: usize| carries[&groups.of(2 * number + side)];
+        let mut moved: HashMap<(usize, u32), u32> = HashMap::new();
+        for (&node, parts) in &split {
+            let at_node = (0..facets.len()).filter(|number| facets[*number].contains(&node));
+            let Some((number, side)) =
+                at_node.flat_map(|number| [(number, 0), (number, 1)]).find(|(n, side)| carries(*n, *side))
+            else {
+                continue;
+            };
+            let cell = sides[number][side].0;
+            let twin = self.nodes.len() as u32;
+            self.nodes.push(self.nodes[node as usize]);
+            let part = parts.iter().find(|part| part.contains(&cell)).into_iter().flatten();
+            part.for_each(|&cell| {
+                moved.insert((cell, node), twin);
+            });
+        }
+        for (cell, nodes) in self.cells.chunks_exact_mut(D + 1).enumerate() {
+            nodes.iter_mut().for_each(|node| *node = moved.get(&(cell, *node)).copied().unwrap_or(*node));
+        }
+        for (facet, &cell) in self.facets.iter_mut().zip(&self.facet_cells) {
+            let key = |node| (cell as usize, node);
+            facet.iter_mut().for_each(|node| *node = moved.get(&key(*node)).copied().unwrap_or(*node));
+        }
+        let mut named = [Vec::new(), Vec::new()];
+        for number in (0..facets.len()).filter(|number| opens(&facets[*number])) {
+            for (side, &(cell, opposite)) in sides[number].iter().enumerate() {
+                named[usize::from(!carries(number, side))].push(self.facets.len() as u32);
+                self.facets.push(facet_of::<D>(&self.cells[cell * (D + 1)..(cell + 1) * (D + 1)], opposite));
+                self.facet_cells.push(cell as u32);
+            }
+        }
+        let [own, other] = named;
+        self.boundaries.push(Boundary { name: name.into(), facets: own });
+        self.boundaries.push(Boundary { name: other_side(name), facets: other });
+        self.inner_groups.remove(at);
+        self.inner_facets.remove(at);
+        let crosses = |facets: &Vec<Sorted<D>>| facets.iter().flatten().any(|node| split.contains_key(node));
+        if let Some(other) = self.inner_facets.iter().position(crosses) {
+            // Their facets would have nodes of one side or the other.
+            self.inner_facets[other].clear();
+        }
+        Ok(())
+    }
+
+    /// The cells around a node, in parts that are connected through facets at the node that are not on the fault.
+    fn parts_around(&self, node: u32, cells: &[usize], fault: &HashMap<Sorted<D>, usize>) -> Vec<Vec<usize>> {
+        let mut groups = Groups::new(cells.len());
+        let mut known: HashMap<Sorted<D>, usize> = HashMap::new();
+        for (number, &cell) in cells.iter().enumerate() {
+            let nodes = &self.cells[cell * (D + 1)..(cell + 1) * (D + 1)];
+            for opposite in (0..=D).filter(|at| nodes[*at] != node) {
+                let facet = sorted(facet_of::<D>(nodes, opposite));
+                if fault.contains_key(&facet) {
+                    continue;
+                }
+                if let Some(other) = known.insert(facet, number) {
+                    groups.join(number, other);
+                }
+            }
+        }
+        let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        cells
+            .iter()
+            .enumerate()
+            .for_each(|(number, &cell)| parts.entry(groups.of(number)).or_default().push(cell));
+        parts.into_values().collect()
+    }
+}
+
+fn sorted<const D: usize>(mut facet: [u32; D]) -> Sorted<D> {
+    facet.sort_unstable();
+    facet
+}
