@@ -1,6 +1,9 @@
 //! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
-use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values};
+use super::{
+    document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values},
+    quantity::TableQuantity,
+};
 use crate::{
     io::output::{columns::RunTable, field_list::FIELDS, resultants::source_names},
     job::{Document, Job},
@@ -182,20 +185,29 @@ fn known_columns(parts: &[&str], base: &Job) -> Vec<String> {
 fn check_response(study: &Study, base: &Job, index: usize, document: &mut Document) {
     let name = &study.response[index].of;
     let path = format!("response.{index}.of");
-    let has_form = match name.split('.').collect::<Vec<_>>()[..] {
-        ["probe", probe, _] | ["probe", probe, "max" | "min", _] => {
-            check_probe_name(base, probe, &path, document);
-            true
+    let quantity = TableQuantity::parse(name);
+    let parts: Vec<&str> = name.split('.').collect();
+    let has_form = match &quantity {
+        Some(TableQuantity { table, of, side, .. }) => {
+            let sides = if table.word == "profile" {
+                [Some("max"), Some("min"), Some("first")]
+            } else {
+                [None, Some("max"), Some("min")]
+            };
+            sides.contains(side) && *of != Some("")
         }
-        ["profile", boundary, "max" | "min" | "first", _] => {
+        None => RunTable::of(parts[0]).is_none() && parts.iter().all(|part| !part.is_empty()),
+    };
+    match quantity.filter(|_| has_form).and_then(|quantity| Some((quantity.table.word, quantity.of?))) {
+        Some(("probe", probe)) => check_probe_name(base, probe, &path, document),
+        Some(("profile", boundary)) => {
             let names: Vec<&str> = base.output.profile.iter().map(|profile| profile.on.as_str()).collect();
             if !names.contains(&boundary) {
                 let message = format!("the base job has no profile along `{boundary}`");
                 document.fault(&path, message, listed(&names, "profiles: add [[output.profile]] to it"));
             }
-            true
         }
-        ["resultant", source, _] | ["resultant", source, "max" | "min", _] => {
+        Some(("resultant", source)) => {
             let names = source_names(base);
             if !names.iter().any(|name| name == source) {
                 let near = nearest(source, names.iter().map(String::as_str));
@@ -203,12 +215,9 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
                 let help = format!("{near}the base job has: {}", names.join(", "));
                 document.fault(&path, format!("no source of resultants is called `{source}`"), help);
             }
-            true
         }
-        ["history", _] | ["history", "max" | "min", _] => true,
-        ref parts => RunTable::of(parts[0]).is_none() && parts.iter().all(|part| !part.is_empty()),
-    };
-    let parts: Vec<&str> = name.split('.').collect();
+        _ => {}
+    }
     let known = known_columns(&parts, base);
     let column = parts.last().copied().unwrap_or_default();
     if has_form && !known.is_empty() && !known.iter().any(|known| known == column) {

@@ -1,5 +1,6 @@
 //! The study as plain structs: the single source of the name, meaning, unit, range and default of each key.
 
+use super::quantity::TableQuantity;
 use crate::{
     io::output::{
         field_list::{DISPLACEMENT, STRESS, VELOCITY},
@@ -194,7 +195,8 @@ pub struct Response {
 impl Response {
     /// Whether the quantity is of the profile along this boundary.
     pub fn is_on(&self, boundary: &str) -> bool {
-        self.of.strip_prefix("profile.").and_then(|rest| rest.split('.').next()) == Some(boundary)
+        TableQuantity::parse(&self.of)
+            .is_some_and(|quantity| quantity.table.word == "profile" && quantity.of == Some(boundary))
     }
 }
 
