@@ -27,9 +27,9 @@ pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Do
     check_cells(study, base, document);
     check_sweep(study, document);
     if study.compare.split
-        && (base.dimension().is_none() || !matches!(study.reference, Some(Reference::Run(_))))
+        && (base.mesh.source.cells().is_empty() || !matches!(study.reference, Some(Reference::Run(_))))
     {
-        let help = "`split` needs [reference.run] and a mesh that the base job generates";
+        let help = "`split` needs [reference.run] and a mesh of one block that the base job generates";
         document.fault("compare.split", "errors can't be split here", help);
     }
     for (index, run) in study.run.iter().enumerate() {
@@ -108,6 +108,11 @@ fn check_cells(study: &Study, base: &Job, document: &mut Document) {
                 &path,
                 "the base job's mesh is a file: its number of cells cannot be chosen here",
                 "name other files in the runs: set = [\"mesh.file=...\"]",
+            ),
+            Some(_) if base.mesh.source.cells().is_empty() => document.fault(
+                &path,
+                "the base job's mesh is a list of blocks: their numbers of cells cannot be chosen here",
+                "choose those of each block in the runs: set = [\"mesh.rectangle.0.cells=[8, 8]\", ...] (in 3D mesh.box)",
             ),
             Some(dimension) if dimension != count => {
                 let message = format!("{count} numbers of cells for a mesh of dimension {dimension}");
