@@ -75,7 +75,7 @@ pub(super) fn split<const D: usize>(
 
 fn generated<const D: usize, G: Grid<D>>(
     session: &Session,
-    blocks: Result<Blocks<G>>,
+    blocks: Result<Blocks<D, G>>,
     of: &job::Mesh,
 ) -> Result<Mesh<D>, Agreed> {
     let (blocks, order) = (session.agree(blocks)?, usize::from(of.order));
@@ -93,7 +93,7 @@ fn generated<const D: usize, G: Grid<D>>(
 fn blocks<const D: usize, T, G: Grid<D>>(
     of: &job::Blocks<T>,
     grid: impl Fn(&T) -> (Option<&String>, Result<G>),
-) -> Result<Blocks<G>> {
+) -> Result<Blocks<D, G>> {
     let named = |block: &T| {
         let (name, grid) = grid(block);
         let grid = grid.map_err(|error| match name {

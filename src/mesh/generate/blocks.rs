@@ -15,16 +15,13 @@ use crate::{
 /// The side `left` of the block `pad` is the boundary `pad.left`, and its cells are the region `pad`; a block without a name has the
 /// names of its grid.
 #[derive(Debug, Clone)]
-pub struct Blocks<G> {
+pub struct Blocks<const D: usize, G> {
     blocks: Vec<(Option<String>, G)>,
 }
 
-impl<G> Blocks<G> {
+impl<const D: usize, G: Grid<D>> Blocks<D, G> {
     /// Grids with their names; refused if ids can't count their nodes, cells or regions.
-    pub fn new<const D: usize>(blocks: Vec<(Option<String>, G)>) -> Result<Self>
-    where
-        G: Grid<D>,
-    {
+    pub fn new(blocks: Vec<(Option<String>, G)>) -> Result<Self> {
         let blocks = Self { blocks };
         countable(blocks.counts(), u32::MAX as usize, u32::MAX as usize)?;
         if blocks.blocks.len() > usize::from(u16::MAX) {
@@ -39,18 +36,12 @@ impl<G> Blocks<G> {
     }
 
     /// Numbers of nodes and cells of the whole mesh.
-    pub fn counts<const D: usize>(&self) -> [Option<usize>; 2]
-    where
-        G: Grid<D>,
-    {
+    pub fn counts(&self) -> [Option<usize>; 2] {
         [0, 1].map(|which| self.grids().try_fold(0_usize, |sum, grid| sum.checked_add(grid.counts()[which]?)))
     }
 
     /// Names of regions and boundaries.
-    pub fn names<const D: usize>(&self) -> Names
-    where
-        G: Grid<D>,
-    {
+    pub fn names(&self) -> Names {
         let mut names = Names::default();
         for (name, grid) in &self.blocks {
             let name = name.as_deref();
@@ -61,20 +52,14 @@ impl<G> Blocks<G> {
     }
 
     /// The whole mesh; refused if METIS could not partition it.
-    pub fn whole<const D: usize>(&self) -> Result<GlobalMesh<D>>
-    where
-        G: Grid<D>,
-    {
+    pub fn whole(&self) -> Result<GlobalMesh<D>> {
         refuse_large::<D>(self.counts())?;
         self.joined(|grid| grid.whole_piece().map(Some))?.into_whole(self.names())
     }
 
     /// The part of a rank: its part of each block. Blocks of fewer bricks than ranks are those of the first ranks; the largest block
     /// is refused then.
-    pub fn part<const D: usize>(&self, rank: usize, ranks: usize) -> Result<Piece<D>>
-    where
-        G: Grid<D>,
-    {
+    pub fn part(&self, rank: usize, ranks: usize) -> Result<Piece<D>> {
         let bricks = |grid: &G| grid.bricks().iter().product::<usize>();
         let most = self.grids().map(bricks).max();
         self.joined(|grid| {
@@ -84,10 +69,7 @@ impl<G> Blocks<G> {
     }
 
     /// The pieces of the blocks as one piece.
-    fn joined<const D: usize>(&self, piece_of: impl Fn(&G) -> Result<Option<Piece<D>>>) -> Result<Piece<D>>
-    where
-        G: Grid<D>,
-    {
+    fn joined(&self, piece_of: impl Fn(&G) -> Result<Option<Piece<D>>>) -> Result<Piece<D>> {
         let mut all = Piece::default();
         let mut before = Offsets::default();
         for grid in self.grids() {
@@ -118,7 +100,7 @@ mod tests {
     use std::collections::HashSet;
 
     /// Three rectangles: the second touches the first, the third is a single one apart.
-    fn flat() -> Blocks<Rectangle> {
+    fn flat() -> Blocks<2, Rectangle> {
         let block = |name: &str, corner: [f64; 2], cells: [usize; 2], diagonal: Diagonal| {
             let grid =
                 Rectangle::new([2.0, 1.0], cells, diagonal, [1.5, 1.0]).and_then(|grid| grid.at(corner));
@@ -132,7 +114,7 @@ mod tests {
         Blocks::new(blocks).expect("blocks")
     }
 
-    fn solid() -> Blocks<Cuboid> {
+    fn solid() -> Blocks<3, Cuboid> {
         let block = |name: &str, corner: [f64; 3], cells: [usize; 3]| {
             let grid = Cuboid::new([1.0; 3], cells, [1.0; 3]).and_then(|grid| grid.at(corner));
             (Some(name.to_owned()), grid.expect("a grid"))
@@ -182,7 +164,7 @@ mod tests {
     }
 
     /// Compares the parts with the whole.
-    fn parts_make_the_whole<const D: usize, G: Grid<D>>(blocks: &Blocks<G>, parts: usize) {
+    fn parts_make_the_whole<const D: usize, G: Grid<D>>(blocks: &Blocks<D, G>, parts: usize) {
         let whole = blocks.whole().expect("whole");
         let pieces: Vec<Piece<D>> =
             (0..parts).map(|rank| blocks.part(rank, parts).expect("a part")).collect();
