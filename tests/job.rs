@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clarke::job::{
-    Job, Loaded, MeshNames, MeshSource, Quadrature, Scheme, describe, describe_json, differing_keys,
+    Blocks, Job, Loaded, MeshNames, MeshSource, Quadrature, Scheme, describe, describe_json, differing_keys,
 };
 use clarke::laws::material::Metric;
 use proptest::prelude::*;
@@ -125,7 +125,7 @@ fn keys_that_are_absent_have_their_defaults() {
     assert_eq!(job.contact[0].quadrature, Quadrature::Nodal);
     assert_eq!(job.output_folder(), Path::new("/anywhere/jobs/out/case"));
     assert!(job.checkpoint.is_none() && job.initial.is_none() && job.material.elasticity.is_none());
-    let MeshSource::Rectangle(rectangle) = job.mesh.source else { panic!("not a rectangle") };
+    let MeshSource::Rectangle(Blocks::One(rectangle)) = job.mesh.source else { panic!("not a rectangle") };
     assert_eq!((rectangle.grading.x, rectangle.grading.y), (1.0, 1.0));
 }
 
@@ -232,6 +232,69 @@ fn only_what_changes_the_answer_counts_as_physics() {
     }
 }
 
+/// Two blocks above each other. The lengths of the first one add up to a corner of the second one and to a probe but for rounding.
+const BLOCKS: &str = r#"
+[[mesh.rectangle]]
+name = "low"
+corner = [0.7, 0.1]
+size = [0.1, 0.2]
+cells = [4, 2]
+[[mesh.rectangle]]
+name = "high"
+corner = [0.0, 0.3]
+size = [1.0, 1.0]
+cells = [4, 4]
+diagonal = "crossed"
+partition = "auto"
+[material]
+hypothesis = "plane_strain"
+density = 1
+[[region]]
+name = "high"
+material = { density = 2 }
+[[support]]
+on = ["low.bottom", "high.top"]
+fix = "all"
+[time]
+end = 1
+step = 0.1
+[output]
+probe = [{ name = "p", point = [0.8, 0.1] }]
+profile = [{ on = "high.left" }]
+"#;
+
+#[test]
+fn a_list_of_blocks_loads_and_is_written_as_one() {
+    let job = load(BLOCKS, &[]).job;
+    let MeshSource::Rectangle(Blocks::Several(blocks)) = &job.mesh.source else { panic!("not a list") };
+    assert_eq!(blocks[1].name.as_deref(), Some("high"));
+    assert_eq!((blocks[0].corner, blocks[1].corner), ([0.7, 0.1], [0.0, 0.3]));
+    assert_eq!(job.dimension(), Some(2));
+    let written = job.to_toml().expect("written");
+    let again = Job::from_text(&written, "job.toml", job.output_folder(), &[]);
+    assert_eq!(again.unwrap_or_else(|error| panic!("{written}\n{error}")).job, job);
+    let physics = |overrides: &[&str]| load(BLOCKS, overrides).job.physics().expect("physics");
+    let metis = physics(&["mesh.rectangle.0.partition=metis", "mesh.rectangle.1.partition=metis"]);
+    assert_eq!(differing_keys(&physics(&[]), &metis), Vec::<String>::new());
+    let moved = physics(&["mesh.rectangle.1.corner=[0.0, 0.5]", "mesh.rectangle.0.cells=[5, 2]"]);
+    assert_eq!(differing_keys(&physics(&[]), &moved), ["mesh.rectangle.0.cells", "mesh.rectangle.1.corner"]);
+}
+
+#[test]
+fn a_single_block_with_a_name_has_the_names_of_a_list() {
+    let one = BLOCKS.split("[[mesh.rectangle]]\nname = \"high\"").collect::<Vec<_>>();
+    let rest = one[1].split_once("[material]").expect("material").1;
+    let text = format!("{}[material]{rest}", one[0].replace("[[mesh.rectangle]]", "[mesh.rectangle]"))
+        .replace(", \"high.top\"", "")
+        .replace("[[region]]\nname = \"high\"", "[[region]]\nname = \"low\"")
+        .replace("high.left", "low.left");
+    let job = load(&text, &["output.probe=[]"]).job;
+    let MeshSource::Rectangle(Blocks::One(block)) = &job.mesh.source else { panic!("not a table") };
+    assert_eq!((block.name.as_deref(), block.corner), (Some("low"), [0.7, 0.1]));
+    let plain = load(SQUARE, &[]).job;
+    assert!(!plain.to_toml().expect("written").contains("corner ="), "as before where the keys are absent");
+}
+
 #[test]
 fn a_run_may_land_on_its_end() {
     assert_eq!(load(SQUARE, &["time.end=1", "time.land_on=[0.5, 1.0]"]).job.time.land_on, [0.5, 1.0]);
@@ -302,6 +365,15 @@ fn every_key_is_described() {
         "\"bdf2\": Second order in time.",
     ] {
         assert!(text.contains(part), "{part} is not in {text}");
+    }
+    let block = describe(Some("mesh.rectangle")).expect("described");
+    for part in [
+        "[mesh.rectangle]",
+        "A list of tables `[[mesh.rectangle]]`",
+        "corner: a list of 2 items",
+        "[mesh.rectangle.grading]",
+    ] {
+        assert!(block.contains(part), "{part} is not in {block}");
     }
     let one = describe(Some("[contact.friction]")).expect("described");
     assert!(one.contains("[contact.friction.tresca]") && !one.contains("breakpoints"), "{one}");

@@ -45,9 +45,13 @@ pub(super) fn check(job: &Job, table: &mut Table<'_>) {
     job.solver.check(&mut table.table("solver"));
     job.output.check(&mut table.table("output"), job.time.end);
     check_expected(job, table);
-    if let Some(names) = job.mesh.names() {
+    if let Some(dimension) = job.dimension() {
         job.mesh.check(&mut table.table("mesh"));
-        check_names(job, table, names);
+        let names = job.mesh.names();
+        let [boundaries, regions] =
+            names.each_ref().map(|names| names.iter().map(String::as_str).collect::<Vec<_>>());
+        let (boundaries, regions) = (&*boundaries, &*regions);
+        check_names(job, table, MeshNames { dimension, boundaries, regions, points: &[], inner: &[] });
     }
 }
 
@@ -74,7 +78,7 @@ pub(super) fn check_names(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>)
     if let Some(initial) = &job.initial {
         initial.check_in_body(&mut table.table("initial"), (mesh.dimension, job.material.hypothesis));
     }
-    job.output.check_names(&mut table.table("output"), mesh, job.mesh.size());
+    job.output.check_names(&mut table.table("output"), mesh, &job.mesh.blocks());
     warn_of_inner_facets(job, table, mesh);
 }
 

@@ -144,6 +144,7 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<DescribedTa
         properties.extend(choices);
     }
     for (key, inner, is_required) in properties {
+        let inner = inner.one();
         let branch = tagged.iter().find(|(name, _)| *name == key).map(|(_, branch)| *branch);
         if is_table(inner) && inner.get("additionalProperties").is_boolean()
             || is_tables(inner)

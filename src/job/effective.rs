@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Job, MeshSource};
+use super::{Blocks, Job, MeshSource};
 use crate::error::{Error, Result};
 
-/// Keys that, like all keys below them, do not affect the results. The files of a mesh and of a start state are among them, because
+/// Keys that, like all keys below them, do not affect the results, without positions in lists. The files of a mesh and of a start state are among them, because
 /// several files may have the same contents: the code that reads them compares these.
 const NO_PHYSICS: &[&str] = &[
     "about",
@@ -29,12 +29,12 @@ const NO_PHYSICS: &[&str] = &[
 ];
 
 impl MeshSource {
-    /// The numbers of cells along the axes; empty for a mesh file.
+    /// The numbers of cells along the axes of a single block; empty for a list of blocks and for a mesh file.
     pub fn cells(&self) -> Vec<u32> {
         match self {
-            Self::Rectangle(mesh) => mesh.cells.to_vec(),
-            Self::Box(mesh) => mesh.cells.to_vec(),
-            Self::File(_) => Vec::new(),
+            Self::Rectangle(Blocks::One(mesh)) => mesh.cells.to_vec(),
+            Self::Box(Blocks::One(mesh)) => mesh.cells.to_vec(),
+            _ => Vec::new(),
         }
     }
 }
@@ -102,7 +102,8 @@ impl Job {
 }
 
 fn flatten(path: &str, value: &toml::Value, keys: &mut BTreeMap<String, String>) {
-    if NO_PHYSICS.contains(&path) {
+    let names: Vec<&str> = path.split('.').filter(|part| part.parse::<usize>().is_err()).collect();
+    if NO_PHYSICS.contains(&&*names.join(".")) {
         return;
     }
     let inner = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };

@@ -114,6 +114,16 @@ impl Schema {
         all
     }
 
+    /// The schema of the table itself where a table or a list of such tables is allowed; else this one.
+    pub(crate) fn one(self) -> Self {
+        match self.alternatives()[..] {
+            [one, list] if one.tag().is_none() && one.accepts("object") && list.accepts("array") => {
+                Self { own: one.target, ..one }
+            }
+            _ => self,
+        }
+    }
+
     /// The allowed words.
     pub(crate) fn words(&self) -> Vec<&'static str> {
         self.alternatives().iter().filter_map(|branch| branch.text("const")).collect()

@@ -413,7 +413,7 @@ fn list(names: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Diagonal, Job, MeshSource, source::parse};
+    use crate::job::{Blocks, Diagonal, Job, MeshSource, source::parse};
     use serde::Deserialize;
 
     fn filled(text: &str) -> (Job, Vec<String>, usize) {
@@ -434,7 +434,7 @@ mod tests {
         assert_eq!(faults, 13);
         assert_eq!((job.time.end, job.time.step), (0.0, -0.5), "only the range of the step is wrong");
         assert!(job.material.density.is_some() && job.material.damage.is_some(), "keys stay present");
-        let MeshSource::Rectangle(mesh) = job.mesh.source else { panic!("not a rectangle") };
+        let MeshSource::Rectangle(Blocks::One(mesh)) = job.mesh.source else { panic!("not a rectangle") };
         assert_eq!((mesh.size, mesh.cells, mesh.diagonal), ([0.0; 2], [4, 1], Diagonal::Right));
         assert_eq!(job.solver.petsc["b"], "2");
         let on: Vec<_> = job.support.iter().map(|support| support.on.join(" ")).collect();

@@ -37,7 +37,35 @@ pub struct Piece<const D: usize> {
     pub named: Vec<[u32; 2]>,
 }
 
+/// Numbers of what other meshes have before.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Offsets {
+    pub nodes: u32,
+    pub cells: u32,
+    pub facets: u32,
+    pub regions: u16,
+    pub boundaries: u32,
+}
+
 impl<const D: usize> Piece<D> {
+    /// Appends a piece of another mesh with straight edges, whose ids, regions and boundaries follow those `before`.
+    pub(super) fn append(&mut self, other: Self, before: Offsets) {
+        let [nodes, cells, facets] =
+            [self.nodes.len(), self.cell_ids.len(), self.facets.len()].map(|count| count as u32);
+        self.node_ids.extend(other.node_ids.iter().map(|id| id + before.nodes));
+        self.owners.extend(other.owners);
+        self.nodes.extend(other.nodes);
+        self.cell_ids.extend(other.cell_ids.iter().map(|id| id + before.cells));
+        self.cells.extend(other.cells.iter().map(|node| node + nodes));
+        self.cell_regions.extend(other.cell_regions.iter().map(|region| region + before.regions));
+        self.facet_ids.extend(other.facet_ids.iter().map(|id| id + before.facets));
+        self.facets.extend(other.facets.iter().map(|facet| facet.map(|node| node + nodes)));
+        self.facet_cells.extend(other.facet_cells.iter().map(|cell| cell + cells));
+        let named =
+            other.named.iter().map(|[boundary, facet]| [boundary + before.boundaries, facet + facets]);
+        self.named.extend(named);
+    }
+
     /// Merges pieces; nodes, cells and facets that several of them have are kept once.
     pub fn merged(pieces: &[Self]) -> Self {
         let mut out = Self::default();

@@ -7,7 +7,7 @@ use crate::{
     job::{self, Loaded, MeshSource, Partition},
     mesh::{
         GlobalMesh, Mesh, distribute,
-        generate::{Cuboid, Grading, Grid, Rectangle, Toward},
+        generate::{Blocks, Cuboid, Grading, Grid, Rectangle, Toward},
         gmsh::{self, AnyMesh},
         partition::{Method, divide},
     },
@@ -34,9 +34,11 @@ impl Scene {
         let order = usize::from(loaded.job.mesh.order);
         let scene = match &loaded.job.mesh.source {
             MeshSource::Rectangle(of) => {
-                generated(session, rectangle(of), of.partition, order).map(Self::Two)?
+                generated(session, blocks(of, rectangle), &loaded.job.mesh).map(Self::Two)?
             }
-            MeshSource::Box(of) => generated(session, cuboid(of), of.partition, order).map(Self::Three)?,
+            MeshSource::Box(of) => {
+                generated(session, blocks(of, cuboid), &loaded.job.mesh).map(Self::Three)?
+            }
             MeshSource::File(path) => {
                 session.on_first(|| refuse_missing(path, loaded))?;
                 let faults = loaded.job.contact.iter().filter(|contact| contact.against.is_empty());
@@ -75,18 +77,34 @@ pub(super) fn split<const D: usize>(
 
 fn generated<const D: usize, G: Grid<D>>(
     session: &Session,
-    grid: Result<G>,
-    partition: Partition,
-    order: usize,
+    blocks: Result<Blocks<D, G>>,
+    of: &job::Mesh,
 ) -> Result<Mesh<D>, Agreed> {
-    let grid = session.agree(grid)?;
-    require_for_cells(session, D, grid.counts()[1].unwrap_or(usize::MAX))?;
-    let large = grid.counts()[1].is_none_or(|cells| cells > MOST_CELLS_ON_ONE_RANK);
-    if partition == Partition::Grid || (partition == Partition::Auto && large) {
-        let piece = session.agree(grid.part(session.rank(), session.ranks()))?;
-        return Mesh::assemble(session, piece, grid.names(), order);
+    let (blocks, order) = (session.agree(blocks)?, usize::from(of.order));
+    let cells = blocks.counts()[1].unwrap_or(usize::MAX);
+    require_for_cells(session, D, cells)?;
+    let is_large = cells > MOST_CELLS_ON_ONE_RANK;
+    if of.partition() == Partition::Grid || (of.partition() == Partition::Auto && is_large) {
+        let piece = session.agree(blocks.part(session.rank(), session.ranks()))?;
+        return Mesh::assemble(session, piece, blocks.names(), order);
     }
-    split(session, session.on_first(|| grid.whole())?, order)
+    split(session, session.on_first(|| blocks.whole())?, order)
+}
+
+/// The blocks of a job as grids; a refusal tells which of several it is.
+fn blocks<const D: usize, T, G: Grid<D>>(
+    of: &job::Blocks<T>,
+    grid: impl Fn(&T) -> (Option<&String>, Result<G>),
+) -> Result<Blocks<D, G>> {
+    let named = |block: &T| {
+        let (name, grid) = grid(block);
+        let grid = grid.map_err(|error| match name {
+            Some(name) => Error::Refused(format!("block \"{name}\": {error}")),
+            None => error,
+        });
+        Ok((name.cloned(), grid?))
+    };
+    Blocks::new(of.all().iter().map(named).collect::<Result<Vec<_>>>()?)
 }
 
 /// Refuses a mesh file that does not exist or is no file, at its key in the job.
@@ -132,20 +150,22 @@ fn from_file(session: &Session, path: &Path, order: usize, faults: &[&str]) -> R
     Ok((scene, is_second_order == 1))
 }
 
-fn rectangle(of: &job::Rectangle) -> Result<Rectangle> {
+fn rectangle(of: &job::Rectangle) -> (Option<&String>, Result<Rectangle>) {
     let grading = |power, low, high| grading(power, &of.grading.toward, low, high);
     let gradings = [grading(of.grading.x, "left", "right"), grading(of.grading.y, "bottom", "top")];
-    Rectangle::new(of.size, of.cells.map(|n| n as usize), of.diagonal, gradings)
+    let grid = Rectangle::new(of.size, of.cells.map(|n| n as usize), of.diagonal, gradings);
+    (of.name.as_ref(), grid.and_then(|grid| grid.at(of.corner)))
 }
 
-fn cuboid(of: &job::Cuboid) -> Result<Cuboid> {
+fn cuboid(of: &job::Cuboid) -> (Option<&String>, Result<Cuboid>) {
     let grading = |power, low, high| grading(power, &of.grading.toward, low, high);
     let gradings = [
         grading(of.grading.x, "left", "right"),
         grading(of.grading.y, "front", "back"),
         grading(of.grading.z, "bottom", "top"),
     ];
-    Cuboid::new(of.size, of.cells.map(|n| n as usize), gradings)
+    let grid = Cuboid::new(of.size, of.cells.map(|n| n as usize), gradings);
+    (of.name.as_ref(), grid.and_then(|grid| grid.at(of.corner)))
 }
 
 /// The grading along the axis between the sides `low` and `high`, if cells are refined toward these sides.

@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod batch;
+mod blocks;
 mod certificates;
 mod compression;
 mod check_values;

@@ -102,6 +102,28 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
 }
 
 #[test]
+fn numbers_of_cells_for_a_list_of_blocks_are_refused() {
+    let list = SQUARE
+        .replace("[mesh.rectangle]", "[[mesh.rectangle]]\nname = \"a\"")
+        .replace("\"left\", \"right\", \"bottom\", \"top\"", "\"a.left\", \"a.top\"");
+    let refused = |study: &str| {
+        let scene = Scene::new(&list, study);
+        scene.study(1, &[]).expect(2).stderr
+    };
+    let words = "the base job's mesh is a list of blocks: their numbers of cells cannot be chosen here";
+    for study in ["[[run]]\ncells = [4, 4]\n", "[product]\ncells = [[4, 4]]\n"] {
+        let text = refused(study);
+        assert!(text.contains(words) && text.contains("mesh.rectangle.0.cells=[8, 8]"), "{text}");
+    }
+    let text = refused("[[run]]\n[reference.run]\n[compare]\nsplit = true\n");
+    assert!(text.contains("errors can't be split here"), "{text}");
+    let text = refused("[[run]]\n[[response]]\nof = \"resultant.support a.lef.force_x\"\n");
+    assert!(text.contains("no source of resultants is called `support a.lef`"), "{text}");
+    let text = refused("[[run]]\n[[response]]\nof = \"profile.a.left.max.x\"\n");
+    assert!(text.contains("the base job has no profile along `a.left`"), "{text}");
+}
+
+#[test]
 fn steps_that_the_reference_does_not_have_are_refused() {
     let text = refused("[[run]]\nstep = 0.25\n[[run]]\nstep = 0.1\n[reference.run]\nstep = 0.125\n");
     assert!(text.contains("lagged_euler-4x4-0.1: it is compared every 0.1 s"), "{text}");

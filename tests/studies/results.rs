@@ -201,3 +201,34 @@ fn every_key_of_a_study_is_described() {
     let error = describe(Some("nrom")).expect_err("unknown").to_string();
     assert!(error.contains("no table of a study") && error.contains("did you mean `norm`?"), "{error}");
 }
+
+#[test]
+fn blocks_of_a_list_are_refined_by_their_positions_and_converge_together() {
+    let bars = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/two_bars.toml");
+    // u = w/(2E) (y^2 - 1) in each bar.
+    let scene = Scene::new("", "");
+    let run = |steel: [u32; 2], other: [u32; 2]| {
+        format!(
+            "[[run]]\nset = [\"mesh.rectangle.0.cells={steel:?}\", \"mesh.rectangle.1.cells={other:?}\"]\n"
+        )
+    };
+    let study = format!(
+        "[base]\njob = {bars:?}\nset = [\"mesh.order=1\"]\n{}{}\
+         [reference.exact]\ndisplacement = [0, \"if(x < 0.1, 2e-7, 5e-7)*(y^2 - 1)\"]\n\
+         [[norm]]\nof = \"displacement\"\nin = \"V\"\nover = \"end\"\n\
+         [[response]]\nof = \"resultant.support steel.top.force_y\"\n\
+         [[response]]\nof = \"profile.aluminium.left.min.tangential_displacement_y\"\n",
+        run([2, 16], [1, 20]),
+        run([4, 32], [2, 40]),
+    );
+    scene.write("study.toml", &study);
+    scene.study(2, &[]).expect(0);
+    let results = scene.results();
+    let [coarse, fine] = [0, 1].map(|run| number(&results, &format!("/runs/{run}/errors/0/relative")));
+    assert!(coarse < 0.1 && (coarse / fine - 2.0).abs() < 0.1, "{coarse} {fine}");
+    for run in 0..2 {
+        let of = |response: usize| number(&results, &format!("/runs/{run}/response/{response}"));
+        assert!((of(0) / 8000.0 - 1.0).abs() < 1e-9, "{}", of(0));
+        assert!((of(1) / -5e-7 - 1.0).abs() < 0.02, "{}", of(1));
+    }
+}

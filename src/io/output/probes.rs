@@ -34,20 +34,21 @@ pub(crate) struct Probes<const D: usize> {
 }
 
 impl<const D: usize> Probes<D> {
-    /// Finds the probes in the mesh; one outside the body is refused. Collective.
+    /// Finds the probes in the mesh; one outside the body is refused. Of several cells around a point, that of the lowest id counts,
+    /// so that where bodies touch the choice does not depend on the partition. Collective.
     pub(crate) fn locate(session: &Session, mesh: &Mesh<D>, probes: &[Probe]) -> Result<Self> {
         let mut places = Vec::new();
         for Probe { name, point } in probes {
             let point = std::array::from_fn(|i| point.get(i).copied().unwrap_or(0.0));
             let here = find(mesh, &point);
-            let mine = if here.is_some() { session.rank() as f64 } else { f64::MAX };
-            let owner = -session.largest([-mine])[0];
-            if owner == f64::MAX {
+            let mine = here.as_ref().map_or(f64::MAX, |(cell, _)| f64::from(mesh.cell_ids[*cell]));
+            let lowest = -session.largest([-mine])[0];
+            if lowest == f64::MAX {
                 return Err(Error::Refused(format!(
                     "probe \"{name}\" at {point:?} m lies outside the body; move its point inside"
                 )));
             }
-            places.push(here.filter(|_| owner == mine));
+            places.push(here.filter(|_| lowest == mine).map(|(_, shares)| shares));
         }
         Ok(Self {
             names: probes.iter().map(|probe| entry(&probe.name)).collect(),
@@ -113,8 +114,8 @@ impl<const D: usize> Probes<D> {
     }
 }
 
-/// The nodes of the cell around a point, with the values of their shape functions there.
-fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<Vec<(u32, f64)>> {
+/// The first cell around a point, and its nodes with the values of their shape functions there.
+fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<(usize, Vec<(u32, f64)>)> {
     (0..mesh.cell_count()).find_map(|number| {
         let nodes: Vec<Vector<D>> = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]).collect();
         let outside = (0..D).any(|i| {
@@ -132,7 +133,7 @@ fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<Vec<(u32, f
             1 => place.to_vec(),
             _ => quadratic_values::<D>(&place).to_vec(),
         };
-        Some(mesh.cell_nodes(number).zip(shares).collect())
+        Some((number, mesh.cell_nodes(number).zip(shares).collect()))
     })
 }
 

@@ -22,7 +22,10 @@ pub use boundary::{
 pub(super) use contact::{check_contact, check_names as check_contact_names};
 pub use material::Region;
 pub(super) use material::{check_in_body as check_material_in_body, check_material};
-pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, MeshSource, Partition, Rectangle, RectangleGrading};
+pub use mesh::{
+    Blocks, Cuboid, CuboidGrading, Diagonal, Mesh, MeshSource, Partition, Rectangle, RectangleGrading,
+    boundary_of_block, region_of_block,
+};
 pub use output::{Checkpoint, Every, FurtherField, Output, Probe, Profile};
 pub use time::{Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Solver, Time};
 
@@ -38,11 +41,11 @@ pub struct Job {
     /// Title, source and authors of the job. They do not affect the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about: Option<About>,
-    /// The mesh of the body.
+    /// The mesh of the body or bodies.
     pub mesh: Mesh,
     /// The material of all cells that belong to no `[[region]]`.
     pub material: Material,
-    /// Regions of the body with their own material, named by the physical groups of the mesh.
+    /// Regions of the body with their own material, named by the physical groups of the mesh file, or by the names of generated blocks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub region: Vec<Region>,
     /// Boundaries on which components of the displacement are held or moved, or which rest on springs and dashpots.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::time::check_times;
+use super::{mesh::Block, time::check_times};
 use crate::job::findings::{MeshNames, Table};
 
 /// The output folder and its contents.
@@ -166,15 +166,23 @@ impl Output {
         table.refuse_repeats("also", "field");
     }
 
-    /// Checks the keys with the names in the mesh. A generated body reaches from the origin to its size.
-    pub(in crate::job) fn check_names(&self, table: &mut Table<'_>, mesh: MeshNames<'_>, size: &[f64]) {
-        let is_known = size.iter().all(|length| *length > 0.0);
+    /// Checks the keys with the names in the mesh and the blocks of a generated one.
+    pub(in crate::job) fn check_names(
+        &self,
+        table: &mut Table<'_>,
+        mesh: MeshNames<'_>,
+        blocks: &[Block<'_>],
+    ) {
+        let is_known = !blocks.is_empty() && blocks.iter().all(Block::is_known);
         table.each("probe", &self.probe, |Probe { point, .. }, table| {
             if point.len() != mesh.dimension {
                 let message = format!("`{}` has {} coordinate(s)", table.path("point"), point.len());
                 table.fault("point", message, format!("a {0}D body needs {0}", mesh.dimension));
-            } else if is_known && point.iter().zip(size).any(|(x, length)| *x < 0.0 || *x > *length) {
-                let help = format!("the body reaches from the origin to {size:?}");
+            } else if is_known && !blocks.iter().any(|block| block.contains(point)) {
+                let reach = |block: &Block<'_>| format!("from {:?} to {:?}", block.corner, block.end());
+                let reaches: Vec<String> = blocks.iter().map(reach).collect();
+                let body = if blocks.len() == 1 { "the body reaches" } else { "the bodies reach" };
+                let help = format!("{body} {}", reaches.join(", "));
                 table.fault("point", "this probe lies outside the body", help);
             }
         });

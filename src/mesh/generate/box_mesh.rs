@@ -1,9 +1,9 @@
-//! Tetrahedra in a box whose corner with the smallest coordinates is the origin.
+//! Tetrahedra in a box.
 
 use super::limits::{countable, room};
 use super::{
     Grading, Grid,
-    grading::{axis, refuse_flat},
+    grading::{axis, moved, refuse_flat},
 };
 use crate::error::Result;
 use crate::mesh::{GlobalMesh, piece::Piece};
@@ -15,8 +15,8 @@ const WALKS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 
 /// The walks from this one on are odd permutations: their tetrahedra swap the middle nodes to be positive.
 const FIRST_ODD: usize = 3;
 
-/// A box `[0, size[0]] x [0, size[1]] x [0, size[2]]` (m) of bricks along x, y and z, each cut into the six Kuhn tetrahedra
-/// around its diagonal from the low corner to the high corner.
+/// A box of bricks along x, y and z, each cut into the six Kuhn tetrahedra around its diagonal from the low corner to the high
+/// corner; its corner with the smallest coordinates is the origin, or where [`Self::at`] moves it.
 ///
 /// Nodes are numbered lexicographically, x fastest, then y. The boundaries are `left`, `right` (x), `front`, `back`
 /// (y), `bottom` and `top` (z); the region is `body`.
@@ -94,6 +94,11 @@ impl Cuboid {
             axis("z", size[2], cells[2], z)?,
         ];
         Ok(Self { lines: refuse_flat(lines)? })
+    }
+
+    /// The box with its corner with the smallest coordinates here (m).
+    pub fn at(self, corner: [f64; 3]) -> Result<Self> {
+        Ok(Self { lines: moved(self.lines, corner)? })
     }
 
     fn add_facets(&self, piece: &mut Piece<3>, range: &[Range<usize>; 3], local: &Numbering) {

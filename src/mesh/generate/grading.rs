@@ -6,6 +6,8 @@ use crate::{
     mesh::check::DEGENERATE,
 };
 
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// The ends of an axis near which cells are smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Toward {
@@ -74,9 +76,26 @@ pub(super) fn axis(name: &str, length: f64, cells: usize, grading: Grading) -> R
     Ok(points)
 }
 
+/// Grid lines that start at `corner` in place of the origin; refused if rounding changes the length of a cell by more than a
+/// millionth.
+pub(super) fn moved<const D: usize>(mut lines: [Vec<f64>; D], corner: [f64; D]) -> Result<[Vec<f64>; D]> {
+    for (axis, (points, start)) in lines.iter_mut().zip(corner).enumerate() {
+        let lengths: Vec<f64> = points.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        points.iter_mut().for_each(|point| *point += start);
+        let fits = |(pair, length): (&[f64], &f64)| (pair[1] - pair[0] - length).abs() <= 1e-6 * length;
+        if !points.windows(2).zip(&lengths).all(fits) {
+            return Err(Error::Refused(format!(
+                "mesh cells along {0} are too small for a corner at {0} = {start} m: choose a corner nearer to the origin, or larger \
+                 cells",
+                AXES[axis]
+            )));
+        }
+    }
+    Ok(lines)
+}
+
 /// Refuses grid lines along the axes whose cells are degenerate.
 pub(super) fn refuse_flat<const D: usize>(lines: [Vec<f64>; D]) -> Result<[Vec<f64>; D]> {
-    const AXES: [&str; 3] = ["x", "y", "z"];
     let sides = lines.each_ref().map(|points| {
         let sides = points.windows(2).map(|pair| pair[1] - pair[0]);
         sides.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), side| (least.min(side), most.max(side)))
@@ -115,6 +134,19 @@ mod tests {
         );
         assert_eq!(lines(2.0, 1, 5.0, Toward::Both), [0.0, 2.0]);
         assert_eq!(lines(4.0, 2, 0.5, Toward::Low)[1], 8f64.sqrt());
+    }
+
+    #[test]
+    fn lines_move_to_their_corner_unless_rounding_spoils_the_cells() {
+        let from = |cells: usize, corner: f64| {
+            moved([lines(1.0, cells, 1.0, Toward::Low), lines(1.0, 1, 1.0, Toward::Low)], [corner, -2.0])
+        };
+        assert_eq!(from(4, 8.0).expect("moved"), [vec![8.0, 8.25, 8.5, 8.75, 9.0], vec![-2.0, -1.0]]);
+        assert_eq!(from(5, 0.0).expect("moved")[0], lines(1.0, 5, 1.0, Toward::Low));
+        for corner in [1e12, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
+            let words = from(5, corner).expect_err("spoilt").to_string();
+            assert!(words.contains("along x are too small for a corner at x ="), "{words}");
+        }
     }
 
     #[test]

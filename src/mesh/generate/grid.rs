@@ -26,16 +26,28 @@ pub trait Grid<const D: usize> {
         owner: &dyn Fn(Option<[usize; D]>, u32) -> u32,
     ) -> Result<Piece<D>>;
 
+    /// Number of facets on the surface: one (triangles) or two (tetrahedra) for each brick at a side.
+    fn facet_count(&self) -> usize {
+        let bricks = self.bricks();
+        let all: usize = bricks.iter().product();
+        bricks.iter().map(|along| 2 * (D - 1) * (all / along)).sum()
+    }
+
     /// Names of region and boundaries.
     fn names(&self) -> Names {
         let boundaries = self.sides().iter().map(|&side| side.to_owned()).collect();
         Names { regions: vec!["body".into()], boundaries, ..Names::default() }
     }
 
+    /// The whole mesh in a piece.
+    fn whole_piece(&self) -> Result<Piece<D>> {
+        self.piece(&self.bricks().map(|count| 0..count), &|_, _| 0)
+    }
+
     /// The whole mesh; refused if METIS could not partition it.
     fn whole(&self) -> Result<GlobalMesh<D>> {
-        countable(self.counts(), i32::MAX as usize, i32::MAX as usize / (D + 1))?;
-        self.piece(&self.bricks().map(|count| 0..count), &|_, _| 0)?.into_whole(self.names())
+        refuse_large::<D>(self.counts())?;
+        self.whole_piece()?.into_whole(self.names())
     }
 
     /// The part of a rank: a box of bricks, of nearly equal size for all ranks. Nodes shared by several parts are assigned
@@ -54,6 +66,11 @@ pub trait Grid<const D: usize> {
         };
         self.piece(&own, &owner)
     }
+}
+
+/// Refuses numbers of nodes and cells that METIS could not partition.
+pub(super) fn refuse_large<const D: usize>(counts: [Option<usize>; 2]) -> Result<()> {
+    countable(counts, i32::MAX as usize, i32::MAX as usize / (D + 1))
 }
 
 /// Distribution of bricks by recursive bisection of the longest side of boxes.

@@ -1,9 +1,9 @@
-//! Triangles on a rectangle whose lower left corner is the origin.
+//! Triangles on a rectangle.
 
 use super::limits::{countable, room};
 use super::{
     Grading, Grid,
-    grading::{axis, refuse_flat},
+    grading::{axis, moved, refuse_flat},
 };
 use crate::error::Result;
 use crate::mesh::{GlobalMesh, piece::Piece};
@@ -11,7 +11,8 @@ use std::ops::Range;
 
 pub use crate::job::Diagonal;
 
-/// A rectangle `[0, size[0]] x [0, size[1]]` (m) of quadrilaterals along x and y, each cut into triangles.
+/// A rectangle of quadrilaterals along x and y, each cut into triangles; its lower left corner is the origin, or where [`Self::at`]
+/// moves it.
 ///
 /// Nodes are numbered row by row, x fastest; the centre nodes of crossed diagonals follow the row of nodes below them. The
 /// boundaries are `left`, `right`, `bottom` and `top`; the region is `body`.
@@ -78,6 +79,11 @@ impl Rectangle {
         let [along_x, along_y] = grading.map(Into::into);
         let lines = [axis("x", size[0], cells[0], along_x)?, axis("y", size[1], cells[1], along_y)?];
         Ok(Self { lines: refuse_flat(lines)?, diagonal })
+    }
+
+    /// The rectangle with its lower left corner here (m).
+    pub fn at(self, corner: [f64; 2]) -> Result<Self> {
+        Ok(Self { lines: moved(self.lines, corner)?, ..self })
     }
 
     fn crossed(&self) -> bool {

@@ -1,6 +1,9 @@
 //! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
-use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values};
+use super::{
+    document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values},
+    quantity::TableQuantity,
+};
 use crate::{
     io::output::{columns::RunTable, field_list::FIELDS, resultants::source_names},
     job::{Document, Job},
@@ -24,9 +27,9 @@ pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Do
     check_cells(study, base, document);
     check_sweep(study, document);
     if study.compare.split
-        && (base.dimension().is_none() || !matches!(study.reference, Some(Reference::Run(_))))
+        && (base.mesh.source.cells().is_empty() || !matches!(study.reference, Some(Reference::Run(_))))
     {
-        let help = "`split` needs [reference.run] and a mesh that the base job generates";
+        let help = "`split` needs [reference.run] and a mesh of one block that the base job generates";
         document.fault("compare.split", "errors can't be split here", help);
     }
     for (index, run) in study.run.iter().enumerate() {
@@ -106,6 +109,11 @@ fn check_cells(study: &Study, base: &Job, document: &mut Document) {
                 "the base job's mesh is a file: its number of cells cannot be chosen here",
                 "name other files in the runs: set = [\"mesh.file=...\"]",
             ),
+            Some(_) if base.mesh.source.cells().is_empty() => document.fault(
+                &path,
+                "the base job's mesh is a list of blocks: their numbers of cells cannot be chosen here",
+                "choose those of each block in the runs: set = [\"mesh.rectangle.0.cells=[8, 8]\", ...] (in 3D mesh.box)",
+            ),
             Some(dimension) if dimension != count => {
                 let message = format!("{count} numbers of cells for a mesh of dimension {dimension}");
                 document.fault(&path, message, "one for each axis");
@@ -182,20 +190,29 @@ fn known_columns(parts: &[&str], base: &Job) -> Vec<String> {
 fn check_response(study: &Study, base: &Job, index: usize, document: &mut Document) {
     let name = &study.response[index].of;
     let path = format!("response.{index}.of");
-    let has_form = match name.split('.').collect::<Vec<_>>()[..] {
-        ["probe", probe, _] | ["probe", probe, "max" | "min", _] => {
-            check_probe_name(base, probe, &path, document);
-            true
+    let quantity = TableQuantity::parse(name);
+    let parts: Vec<&str> = name.split('.').collect();
+    let has_form = match &quantity {
+        Some(TableQuantity { table, of, side, .. }) => {
+            let sides = if table.word == "profile" {
+                [Some("max"), Some("min"), Some("first")]
+            } else {
+                [None, Some("max"), Some("min")]
+            };
+            sides.contains(side) && *of != Some("")
         }
-        ["profile", boundary, "max" | "min" | "first", _] => {
+        None => RunTable::of(parts[0]).is_none() && parts.iter().all(|part| !part.is_empty()),
+    };
+    match quantity.filter(|_| has_form).and_then(|quantity| Some((quantity.table.word, quantity.of?))) {
+        Some(("probe", probe)) => check_probe_name(base, probe, &path, document),
+        Some(("profile", boundary)) => {
             let names: Vec<&str> = base.output.profile.iter().map(|profile| profile.on.as_str()).collect();
             if !names.contains(&boundary) {
                 let message = format!("the base job has no profile along `{boundary}`");
                 document.fault(&path, message, listed(&names, "profiles: add [[output.profile]] to it"));
             }
-            true
         }
-        ["resultant", source, _] | ["resultant", source, "max" | "min", _] => {
+        Some(("resultant", source)) => {
             let names = source_names(base);
             if !names.iter().any(|name| name == source) {
                 let near = nearest(source, names.iter().map(String::as_str));
@@ -203,12 +220,9 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
                 let help = format!("{near}the base job has: {}", names.join(", "));
                 document.fault(&path, format!("no source of resultants is called `{source}`"), help);
             }
-            true
         }
-        ["history", _] | ["history", "max" | "min", _] => true,
-        ref parts => RunTable::of(parts[0]).is_none() && parts.iter().all(|part| !part.is_empty()),
-    };
-    let parts: Vec<&str> = name.split('.').collect();
+        _ => {}
+    }
     let known = known_columns(&parts, base);
     let column = parts.last().copied().unwrap_or_default();
     if has_form && !known.is_empty() && !known.iter().any(|known| known == column) {

@@ -1,5 +1,6 @@
 //! The study as plain structs: the single source of the name, meaning, unit, range and default of each key.
 
+use super::quantity::TableQuantity;
 use crate::{
     io::output::{
         field_list::{DISPLACEMENT, STRESS, VELOCITY},
@@ -92,7 +93,7 @@ pub struct Run {
     /// The name of the run and of its folder. Absent: derived from the keys in which the runs differ.
     #[schemars(extend("format" = "name"), example = &"coarse")]
     pub name: Option<String>,
-    /// Cells along each axis of a generated mesh.
+    /// Cells along each axis of a generated mesh of one block; in a list, `set` gives those of each block.
     #[schemars(length(min = 2, max = 3), inner(range(min = 1)), example = [8, 8])]
     pub cells: Option<Vec<u32>>,
     /// Length of a step.
@@ -117,7 +118,7 @@ pub struct Run {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Product {
-    /// Cells along each axis of a generated mesh, from coarse to fine.
+    /// Cells along each axis of a generated mesh of one block, from coarse to fine.
     #[schemars(example = [[8, 8], [16, 16]])]
     pub cells: Vec<Cells>,
     /// Lengths of a step, from long to short.
@@ -194,7 +195,8 @@ pub struct Response {
 impl Response {
     /// Whether the quantity is of the profile along this boundary.
     pub fn is_on(&self, boundary: &str) -> bool {
-        self.of.strip_prefix("profile.").and_then(|rest| rest.split('.').next()) == Some(boundary)
+        TableQuantity::parse(&self.of)
+            .is_some_and(|quantity| quantity.table.word == "profile" && quantity.of == Some(boundary))
     }
 }
 
@@ -240,7 +242,7 @@ pub struct Compare {
     /// Whether errors are split into those of the steps and those of the mesh. For this purpose, the steps of the reference are
     /// also computed on the mesh of each run: the difference between the run and this solution is the error of the steps, the
     /// difference between this solution and the reference is the error of the mesh. Requires a reference that is a run, and
-    /// generated meshes.
+    /// generated meshes of one block.
     pub split: bool,
 }
 

@@ -1,0 +1,140 @@
+//! Several generated bodies in one mesh.
+
+use crate::{
+    case::Case,
+    results::{Results, relative_difference},
+};
+
+/// Partition, rounding and the other body change the iterates, not the results.
+const SHARE: f64 = 1e-8;
+
+/// The list with these places and numbers of cells, each block of size 1 along all axes.
+fn blocks<const D: usize>(all: [(&str, [f64; D], [u32; D]); 2], way: &str) -> String {
+    let table = |(name, corner, cells): (&str, [f64; D], [u32; D])| {
+        let size = [1; D];
+        format!(
+            "{{ name = '{name}', corner = {corner:?}, size = {size:?}, cells = {cells:?}, partition = '{way}' }}"
+        )
+    };
+    format!("[{}]", all.map(table).join(", "))
+}
+
+/// Puts loads and contact on both blocks.
+fn on_both(case: Case) -> Case {
+    case.set("support.0.on", "['a.left', 'b.left']")
+        .set("traction.0.on", "['a.top', 'b.top']")
+        .set("contact.0.on", "['a.bottom', 'b.bottom']")
+}
+
+/// The paper's square twice; the second one is fixed on the side that the first one touches.
+fn squares(way: &str) -> Case {
+    let probes = "[{name = 'a', point = [1, 0]}, {name = 'b', point = [2, 0]}]";
+    on_both(Case::square(6))
+        .set("mesh.rectangle", &blocks([("a", [0.0, 0.0], [6, 6]), ("b", [1.0, 0.0], [4, 5])], way))
+        .set("output.probe", probes)
+        .set("output.profile", "[{ on = 'a.bottom' }, { on = 'b.bottom' }]")
+        .set("checkpoint.every", "4")
+}
+
+/// The cube twice, one behind the other.
+fn cubes(way: &str) -> Case {
+    let probes = "[{name = 'a', point = [1, 1, 0]}, {name = 'b', point = [1, 2, 0]}]";
+    on_both(Case::cube(2))
+        .set("mesh.box", &blocks([("a", [0.0; 3], [2, 2, 2]), ("b", [0.0, 1.0, 0.0], [3, 1, 2])], way))
+        .set("output.probe", probes)
+        .set("time.end", "0.25")
+}
+
+/// Compares the columns from `first` on in the rows of two words.
+#[track_caller]
+fn assert_same(file: &str, first: usize, (one, word): (&Results, &str), (other, name): (&Results, &str)) {
+    let key = file.trim_end_matches("s.csv");
+    let (one, other) = (one.table(file).only(key, word), other.table(file).only(key, name));
+    assert!(one.columns == other.columns && one.rows.len() > 3, "{file}: {word} and {name}");
+    for column in &one.columns[first..] {
+        let difference = relative_difference(&one.numbers(column), &other.numbers(column));
+        assert!(difference <= SHARE, "{file}: {column} of {name} differs by {difference:e}");
+    }
+}
+
+#[test]
+fn each_of_two_squares_moves_as_it_does_alone_on_any_number_of_ranks() {
+    let tip = "[{name = 'tip', point = [1, 0]}]";
+    let alone = [[6, 6], [4, 5]].map(|cells| {
+        Case::square(1)
+            .set("mesh.rectangle.cells", &format!("{cells:?}"))
+            .set("output.probe", tip)
+            .set("output.profile", "[{ on = 'bottom' }]")
+            .run_and_keep(1)
+    });
+    for (ranks, way) in [(1, "metis"), (2, "grid"), (3, "metis"), (3, "grid")] {
+        let both = squares(way).run_and_keep(ranks);
+        for (name, case) in ["a", "b"].into_iter().zip(&alone) {
+            let results = both.results();
+            assert_same("probes.csv", 3, (&case.results(), "tip"), (&results, name));
+            assert_same(
+                "profiles.csv",
+                4,
+                (&case.results(), "bottom"),
+                (&results, &format!("{name}.bottom")),
+            );
+        }
+        let other = if way == "grid" { "metis" } else { "grid" };
+        let ways = [0, 1].map(|block| format!("mesh.rectangle.{block}.partition={other}"));
+        let longer = ["--restart", "--set", &ways[0], "--set", &ways[1], "--set", "time.end=1.125"];
+        both.run_with(2, &longer).expect(0).says("continuing from");
+    }
+}
+
+#[test]
+fn each_of_two_cubes_moves_as_it_does_alone_also_with_quadratic_cells() {
+    for order in ["1", "2"] {
+        let alone = [[2, 2, 2], [3, 1, 2]].map(|cells| {
+            Case::cube(2)
+                .set("mesh.order", order)
+                .set("mesh.box.cells", &format!("{cells:?}"))
+                .set("output.probe", "[{name = 'tip', point = [1, 1, 0]}]")
+                .set("time.end", "0.25")
+                .run_and_keep(1)
+        });
+        for (ranks, way) in [(1, "auto"), (3, "grid")] {
+            let both = cubes(way).set("mesh.order", order).run_and_keep(ranks);
+            for (name, case) in ["a", "b"].into_iter().zip(&alone) {
+                assert_same("probes.csv", 3, (&case.results(), "tip"), (&both.results(), name));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_block_at_another_corner_is_the_same_body() {
+    let there = |x: f64, y: f64| {
+        let point = |[a, b]: [f64; 2]| format!("[{}, {}]", a + x, b + y);
+        let probes = [("tip", [1.0, 0.0]), ("inside", [0.375, 0.625])]
+            .map(|(name, at)| format!("{{ name = '{name}', point = {} }}", point(at)));
+        Case::square(6)
+            .set("mesh.rectangle.corner", &format!("[{x}, {y}]"))
+            .set("output.probe", &format!("[{}]", probes.join(", ")))
+            .run_and_keep(2)
+    };
+    let (here, elsewhere) = (there(0.0, 0.0), there(5.0, -3.0));
+    for name in ["tip", "inside"] {
+        assert_same("probes.csv", 3, (&here.results(), name), (&elsewhere.results(), name));
+    }
+}
+
+#[test]
+fn free_blocks_are_named_as_two_bodies_and_unsuitable_ones_by_their_names() {
+    for (ranks, way) in [(1, "metis"), (3, "grid")] {
+        let free = squares(way).without("support").without("material.density");
+        let words = free.run_with(ranks, &[]).expect(2);
+        words.says("body 1 (around (0.5, 0.5)): translation along x").says("body 2 (around (1.5, 0.5))");
+        let far = squares(way).set("mesh.rectangle.1.corner", "[1.0, 1e12]").without("output.probe");
+        let words = "block \"b\": mesh cells along y are too small for a corner at y = 1000000000000 m";
+        far.run_with(ranks, &[]).expect(2).says(words);
+    }
+    let moved = ["--set", "mesh.rectangle.1.corner=[1.5, 0.0]", "--set", "output.probe.1.point=[2, 0.5]"];
+    let case = squares("metis").set("time.end", "0.25").run_and_keep(2);
+    let outcome = case.run_with(2, &[&["--restart"][..], &moved].concat()).expect(2);
+    outcome.says("belongs to another problem").says("mesh.rectangle.1.corner");
+}
