@@ -54,6 +54,8 @@ pub struct Body<const D: usize, const S: usize> {
     pub coupling: Option<Coupling<D>>,
     /// The contacts between bodies.
     pub pairs: Vec<Pair<D>>,
+    /// Displacement in m from which pairs that slide were formed; present if there are such.
+    pub paired_displacement: Option<DistributedVector>,
     /// Springs and dashpots of supports.
     pub elastic_support: ElasticSupport<D>,
     /// The mass that contact boundaries have passed on, if some have, on all ranks alike.
@@ -93,6 +95,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             held,
             coupling: None,
             pairs: Vec::new(),
+            paired_displacement: None,
             elastic_support: ElasticSupport::default(),
             redistributed_mass: None,
             support_motion: None,
@@ -171,6 +174,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Finds anew what the nodes of pairs face that slide along each other, at this displacement with ghosts. Collective.
     pub fn form_pairs(&mut self, session: &Session, displacement: &DistributedVector) -> Result<(), Agreed> {
+        if let Some(paired) = &mut self.paired_displacement {
+            session.agree(paired.copy_from(displacement))?;
+        }
         let displacement = session.agree(displacement.local())?;
         let moved = self.mesh.nodes.iter().zip(displacement.chunks_exact(D));
         let places: Vec<Vector<D>> =

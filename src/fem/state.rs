@@ -14,8 +14,6 @@ pub struct State {
     pub displacement: DistributedVector,
     /// Displacement before the last step in m; present if the scheme needs it.
     pub previous_displacement: Option<DistributedVector>,
-    /// Displacement in m from which pairs of bodies that slide along each other were formed; present if there are such.
-    pub paired_displacement: Option<DistributedVector>,
     /// Velocity in m/s.
     pub velocity: DistributedVector,
     /// Velocity before the last step in m/s.
@@ -40,7 +38,6 @@ impl State {
         Ok(Self {
             displacement,
             previous_displacement: None,
-            paired_displacement: None,
             velocity,
             previous_velocity,
             contact_traction: None,

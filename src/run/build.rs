@@ -87,9 +87,6 @@ pub(super) fn body<const D: usize, const S: usize>(
     if job.time.scheme.states() > 1 {
         state.previous_displacement = Some(state.displacement.like()?);
     }
-    if pairs.iter().any(|pair| pair.slides) {
-        state.paired_displacement = Some(state.displacement.like()?);
-    }
     session.agree(initial(job, &mesh, &held, &mut state))?;
     if let Some(motion) = &motion {
         let State { displacement, velocity, .. } = &mut state;
@@ -103,6 +100,9 @@ pub(super) fn body<const D: usize, const S: usize>(
     body.material_tables = materials.tables;
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
     (body.support_motion, body.elastic_support) = (motion, elastic_support);
+    if pairs.iter().any(|pair| pair.slides) {
+        body.paired_displacement = Some(state.displacement.like()?);
+    }
     (body.coupling, body.pairs) = (coupling, pairs);
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);

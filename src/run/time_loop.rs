@@ -60,7 +60,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let identity = Identity { version: super::version().into(), physics, start_state };
     let candidates = candidates(session, start, folder)?;
     let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
-    if restored.is_some() && ready.state.paired_displacement.is_some() {
+    if restored.is_some() && ready.body.paired_displacement.is_some() {
         let Setup { scheme, body, state, .. } = &mut ready;
         session.agree(scheme.renew(session, body, state))?;
     }

@@ -18,6 +18,7 @@ mod landings;
 mod materials;
 mod obstacles;
 mod outputs;
+mod pairs;
 mod partitions;
 mod points;
 mod precision;

@@ -159,7 +159,7 @@ pub fn save<const D: usize, const S: usize>(
         width: D,
         values: p,
     }));
-    let paired = state.paired_displacement.as_ref().map(DistributedVector::owned).transpose()?;
+    let paired = body.paired_displacement.as_ref().map(DistributedVector::owned).transpose()?;
     let paired = paired.as_deref();
     tables.extend(paired.map(|values| IdTable { name: PAIRED, set: "nodes", width: D, values }));
     let of_cells: Vec<History> = body.all_cell_histories().collect();
@@ -202,10 +202,11 @@ pub fn restore<const D: usize, const S: usize>(
         let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &wanted, &nodes)?;
         fill(previous, &values[0])?;
     }
-    if let Some(paired) = &mut state.paired_displacement {
+    if body.paired_displacement.is_some() {
         let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(PAIRED, D)], &nodes)?;
-        fill(paired, &values[0])?;
-        body.form_pairs(session, paired)?;
+        let mut paired = state.displacement.like()?;
+        fill(&mut paired, &values[0])?;
+        body.form_pairs(session, &paired)?;
     }
     let cells = cell_ids(body);
     let [of_cells, of_nodes] = kept_by(body);
@@ -276,9 +277,8 @@ pub fn transfer<const D: usize, const S: usize>(
     if let Some(previous) = &mut state.previous_displacement {
         fill(previous, &values[0])?;
     }
-    if let Some(paired) = &mut state.paired_displacement {
-        fill(paired, &values[0])?;
-        body.form_pairs(session, paired)?;
+    if body.paired_displacement.is_some() {
+        body.form_pairs(session, &state.displacement)?;
     }
     let mut known: Vec<&str> = vec!["displacement", "velocity", PAIRED];
     if let Some(traction) = &mut state.contact_traction

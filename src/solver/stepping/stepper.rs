@@ -83,6 +83,8 @@ pub struct Stepper {
     pub set_ups: u64,
     /// How often what sliding bodies face was found anew.
     pub pairings: u64,
+    /// The energy in J that contacts store more since then, until the step is accepted.
+    energy_of_pairing: f64,
     settings: SolverSettings,
     /// Estimated number of steps that share a matrix.
     steps: u64,
@@ -145,6 +147,7 @@ impl Stepper {
             attempted: None,
             set_ups: 0,
             pairings: 0,
+            energy_of_pairing: 0.0,
             settings: settings.clone(),
             steps,
             clock: StepClock::default(),
@@ -264,6 +267,7 @@ impl Stepper {
     ) -> Result<StepOutcome> {
         let range = StepRange::of(self.scheme, step);
         self.attempted = Some(self.attempted.map_or(range, |attempted| attempted.or(range)));
+        self.follow_sliding(session, body, state)?;
         self.prepare_matrix(session, body, step)?;
         self.is_finished = false;
         let start = Instant::now();
@@ -437,7 +441,8 @@ impl Stepper {
         (self.powers, outcome.powers) = (powers, powers);
         outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
-        self.follow_sliding(session, body, state, &mut outcome.energy)
+        outcome.energy[NUMERICAL] += std::mem::take(&mut self.energy_of_pairing);
+        Ok(())
     }
 
     /// Finds anew what bodies face that have slid along each other. The energy that contacts store changes with it, by an error of the
@@ -446,10 +451,11 @@ impl Stepper {
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
-        state: &mut State,
-        energy: &mut Energy,
+        state: &State,
     ) -> Result<()> {
-        let Some(paired) = &mut state.paired_displacement else { return Ok(()) };
+        if body.paired_displacement.is_none() {
+            return Ok(());
+        }
         let slip = {
             let displacement = state.displacement.local()?;
             let seen = body.seen_by_contacts(&displacement);
@@ -459,11 +465,10 @@ impl Stepper {
         if session.largest([slip])[0] <= SLIP_BETWEEN_PAIRINGS {
             return Ok(());
         }
+        let before = body.energy_of_contacts(state.time, &state.displacement)?;
         body.form_pairs(session, &state.displacement)?;
-        let [stored] = session.sum([body.energy_of_contacts(state.time, &state.displacement)?]);
-        energy[NUMERICAL] += stored - energy[STORED_IN_CONTACT];
-        energy[STORED_IN_CONTACT] = stored;
-        paired.copy_from(&state.displacement)?;
+        let after = body.energy_of_contacts(state.time, &state.displacement)?;
+        self.energy_of_pairing += session.sum([after - before])[0];
         self.pairings += 1;
         self.renew(session, body, state)
     }

@@ -288,6 +288,7 @@ fn same_dimension<const A: usize, const D: usize>(mesh: GlobalMesh<A>) -> Global
         boundaries: mesh.boundaries,
         point_sets: mesh.point_sets,
         inner_groups: mesh.inner_groups,
+        inner_facets: Vec::new(),
     }
 }
 

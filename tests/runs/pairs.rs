@@ -1,0 +1,313 @@
+//! Contact between bodies, and faults inside one.
+
+use crate::{
+    case::Case,
+    results::{Results, relative_difference},
+};
+use std::path::Path;
+
+/// Iterates depend on the number of ranks, converged results do not.
+const SHARE: f64 = 1e-9;
+
+/// The job of two blocks in three dimensions, with meshes that do not match.
+fn cubes() -> Case {
+    let blocks = "[{ name = 'lower', size = [1, 1, 0.5], cells = [3, 4, 2] }, \
+                   { name = 'upper', corner = [0, 0, 0.5], size = [1, 1, 0.5], cells = [5, 3, 2] }]";
+    Case::of("pressed_blocks")
+        .without("mesh.rectangle")
+        .set("mesh.box", blocks)
+        .without("material.hypothesis")
+        .set("support.0.fix", "['z']")
+        .set("support.1.fix", "['x', 'y']")
+        .set("support.1.on", "['lower.left', 'upper.left']")
+        .set("traction.0.value", "[0, 0, -5]")
+        .without("output.probe")
+}
+
+/// All values of a column of the last profile.
+fn pressures(results: &Results) -> Vec<f64> {
+    let table = results.table("profiles.csv");
+    let last = table.words("time").last().expect("a row").to_string();
+    table.only("time", &last).numbers("contact_pressure")
+}
+
+#[test]
+fn uniform_stress_passes_through_meshes_that_do_not_match() {
+    for order in ["1", "2"] {
+        for ranks in [1, 2, 3] {
+            for case in [Case::of("pressed_blocks"), cubes()] {
+                let results = case.set("mesh.order", order).run(ranks);
+                for pressure in pressures(&results) {
+                    assert!((pressure - 5.0).abs() < 1e-10, "order {order}, {ranks} ranks: {pressure} Pa");
+                }
+            }
+        }
+    }
+}
+
+/// Two blocks that are mirror images, or the upper one on a rigid plane.
+fn halves(both: bool) -> Case {
+    let upper = "{ name = 'upper', corner = [0, 0.5], size = [1, 0.5], cells = [6, 3], diagonal = 'right' }";
+    let lower = "{ name = 'lower', size = [1, 0.5], cells = [6, 3], diagonal = 'left' }";
+    let load = |on: &str, sign: &str| format!("{{ on = ['{on}'], value = [0, '{sign}(1 + x)*sin(20*t)'] }}");
+    let case = Case::of("pressed_blocks")
+        .without("region")
+        .without("support")
+        .set("material.density", "1.0")
+        .set("material.elasticity.youngs_modulus", "100.0")
+        .set("time.end", "0.5")
+        .set("time.step", "0.01")
+        .set("solver.tolerance", "1e-12");
+    if !both {
+        return case
+            .set("mesh.rectangle", &format!("[{upper}]"))
+            .set("traction", &format!("[{}]", load("upper.top", "-")))
+            .set("contact", "[{ on = ['upper.bottom'], normal = { unilateral = {} } }]");
+    }
+    let loads = [load("upper.top", "-"), load("lower.bottom", "")].join(", ");
+    case.set("mesh.rectangle", &format!("[{lower}, {upper}]")).set("traction", &format!("[{loads}]"))
+}
+
+#[test]
+fn two_equal_blocks_move_as_one_of_them_on_a_rigid_plane() {
+    for scheme in ["implicit_euler", "bdf2", "midpoint"] {
+        for order in ["1", "2"] {
+            let [one, both] = [false, true].map(|both| {
+                let redistributes = (scheme == "midpoint").to_string();
+                let case = halves(both)
+                    .set("time.scheme", &format!("'{scheme}'"))
+                    .set("mesh.order", order)
+                    .set("contact.0.redistribute_mass", &redistributes);
+                let results = case.run(if both { 2 } else { 1 });
+                let probes = results.table("probes.csv");
+                [probes.numbers("displacement_y"), probes.numbers("velocity_y"), pressures(&results)]
+            });
+            for (one, both) in one.iter().zip(&both) {
+                let difference = relative_difference(one, both);
+                assert!(difference < 1e-9, "{scheme}, order {order}: {difference:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_on_free_bodies_are_opposite_in_every_scheme_on_any_number_of_ranks() {
+    let oblique = |scheme: &str| {
+        let case = Case::of("thrown_block").set("time.scheme", &format!("'{scheme}'"));
+        match scheme {
+            "midpoint" => case,
+            "lagged_euler" => case
+                .set("material.viscosity", "{ shear = 0.2, volumetric = 0.1 }")
+                .set("contact.0.redistribute_mass", "false"),
+            _ => case.set("contact.0.redistribute_mass", "false"),
+        }
+    };
+    for scheme in ["lagged_euler", "implicit_euler", "bdf2", "midpoint"] {
+        let alone = oblique(scheme).run_and_keep(1);
+        let reference = alone.results().table("probes.csv");
+        for ranks in [1, 2, 3] {
+            let case = oblique(scheme).run_and_keep(ranks);
+            let results = case.results();
+            let table = results.table("resultants.csv");
+            for column in ["force_x", "force_y"] {
+                let [on, against] = ["contact upper.bottom", "against lower.top"]
+                    .map(|source| table.only("source", source).numbers(column));
+                assert!(on.iter().any(|force| force.abs() > 0.1), "{scheme}: {column}");
+                let opposite: Vec<f64> = against.iter().map(|force| -force).collect();
+                assert!(relative_difference(&on, &opposite) < 1e-12, "{scheme}: {column}");
+            }
+            assert!(results.number("max_energy_imbalance") < 1e-9, "{scheme}");
+            let probes = results.table("probes.csv");
+            for column in ["displacement_x", "displacement_y"] {
+                let difference = relative_difference(&reference.numbers(column), &probes.numbers(column));
+                assert!(difference < SHARE, "{scheme}, {ranks} ranks: {column} differs by {difference:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_body_that_slides_far_acts_on_what_it_faces_and_restarts_in_the_same_bits() {
+    let pad = |order: &str| Case::of("brake_pad").set("mesh.order", order).set("checkpoint.every", "37");
+    for order in ["1", "2"] {
+        let straight = pad(order).run_and_keep(1);
+        let table = straight.results().table("resultants.csv");
+        let [along, across] =
+            ["force_x", "force_y"].map(|column| table.only("source", "contact pad.bottom").numbers(column));
+        // After the first steps, in which the pad begins to slide.
+        for (along, across) in along.iter().zip(&across).skip(5) {
+            assert!((along + 3.0).abs() < 1e-7 && (across - 10.0).abs() < 1e-7, "{along} N/m, {across} N/m");
+        }
+        let history = straight.results().text("history.csv");
+        let restarted = pad(order).set("time.end", "0.5").run_and_keep(1);
+        restarted.run_with(1, &["--restart", "--set", "time.end=0.8"]).expect(0);
+        assert_eq!(restarted.results().text("history.csv"), history, "order {order}");
+        for ranks in [2, 3] {
+            let difference =
+                relative_difference(&pressures(&straight.results()), &pressures(&pad(order).run(ranks)));
+            assert!(difference < 1e-8, "order {order}, {ranks} ranks: {difference:e}");
+        }
+    }
+    let short = Case::of("brake_pad").set("contact.0.sliding", "'small'");
+    short.run_with(1, &[]).expect(0).says("use sliding = \"finite\"");
+}
+
+/// A square of which facets between the columns `from` and `to` at half height are the group `fault`.
+fn write_square_with_fault(path: &Path, n: usize, [from, to]: [usize; 2]) {
+    let node = |i: usize, j: usize| j * (n + 1) + i + 1;
+    let mut facets = Vec::new();
+    for at in 0..n {
+        facets.push((1, [node(at, 0), node(at + 1, 0)]));
+        facets.push((2, [node(at + 1, n), node(at, n)]));
+        if (from..to).contains(&at) {
+            facets.push((3, [node(at, n / 2), node(at + 1, n / 2)]));
+        }
+    }
+    let mut text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n4\n1 1 \"bottom\"\n1 2 \"top\"\n1 3 \"fault\"\n\
+                    2 4 \"body\"\n$EndPhysicalNames\n$Entities\n0 3 1 0\n"
+        .to_owned();
+    (1..=3).for_each(|curve| text += &format!("{curve} 0 0 0 1 1 0 1 {curve} 0\n"));
+    text += "1 0 0 0 1 1 0 1 4 0\n$EndEntities\n$Nodes\n";
+    let count = (n + 1) * (n + 1);
+    text += &format!("1 {count} 1 {count}\n2 1 0 {count}\n");
+    (1..=count).for_each(|tag| text += &format!("{tag}\n"));
+    let at = |index: usize| index as f64 / n as f64;
+    (0..=n).for_each(|j| (0..=n).for_each(|i| text += &format!("{} {} 0\n", at(i), at(j))));
+    let total = facets.len() + 2 * n * n;
+    text += &format!("$EndNodes\n$Elements\n4 {total} 1 {total}\n");
+    let mut tag = 0;
+    for curve in 1..=3 {
+        let own: Vec<_> = facets.iter().filter(|(group, _)| *group == curve).collect();
+        text += &format!("1 {curve} 1 {}\n", own.len());
+        for (_, [a, b]) in own {
+            tag += 1;
+            text += &format!("{tag} {a} {b}\n");
+        }
+    }
+    text += &format!("2 1 2 {}\n", 2 * n * n);
+    for j in 0..n {
+        for i in 0..n {
+            let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+            // Mirror images about the fault, as the blocks are that it is compared with.
+            let halves = if j < n / 2 { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] };
+            for [a, b, c] in halves {
+                tag += 1;
+                text += &format!("{tag} {a} {b} {c}\n");
+            }
+        }
+    }
+    std::fs::write(path, text + "$EndElements\n").expect("written");
+}
+
+/// A square that is held below and pushed along its upper side, with a contact law with friction inside.
+fn sheared(contact: &str) -> Case {
+    Case::of("pressed_blocks")
+        .without("region")
+        .without("output.profile")
+        .set("material.density", "1.0")
+        .set("material.elasticity.youngs_modulus", "100.0")
+        .set("contact", &format!("[{{ {contact}, normal = {{ unilateral = {{}} }}, friction = {{ coulomb = {{ coefficient = 0.3 }} }} }}]"))
+        .set("output.probe", "[{ name = 'inside', point = [0.25, 0.875] }]")
+        .set("time.step", "0.02")
+        .set("time.end", "0.5")
+}
+
+/// The square with a fault between these columns, of eight.
+fn with_fault(columns: [usize; 2]) -> Case {
+    let case = sheared("on = ['fault']")
+        .set("support", "[{ on = ['bottom'], fix = 'all' }]")
+        .set("traction", "[{ on = ['top'], value = ['2*sin(20*t)', -3] }]")
+        .without("mesh.rectangle")
+        .set("mesh.file", "'fault.msh'");
+    write_square_with_fault(&case.folder().join("fault.msh"), 8, columns);
+    case
+}
+
+#[test]
+fn a_fault_through_a_body_is_contact_between_two_bodies() {
+    let blocks = "[{ name = 'lower', size = [1, 0.5], cells = [8, 4], diagonal = 'left' }, \
+                   { name = 'upper', corner = [0, 0.5], size = [1, 0.5], cells = [8, 4], diagonal = 'right' }]";
+    for order in ["1", "2"] {
+        let two = sheared("on = ['lower.top'], against = ['upper.bottom']")
+            .set("mesh.rectangle", blocks)
+            .set("support", "[{ on = ['lower.bottom'], fix = 'all' }]")
+            .set("traction", "[{ on = ['upper.top'], value = ['2*sin(20*t)', -3] }]")
+            .set("mesh.order", order)
+            .run_and_keep(1);
+        let two = two.results().table("probes.csv");
+        for ranks in [1, 2, 3] {
+            let case = with_fault([0, 8]).set("mesh.order", order).run_and_keep(ranks);
+            let probes = case.results().table("probes.csv");
+            for column in ["displacement_x", "velocity_y"] {
+                let difference = relative_difference(&two.numbers(column), &probes.numbers(column));
+                assert!(
+                    difference < SHARE,
+                    "order {order}, {ranks} ranks: {column} differs by {difference:e}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_fault_ends_inside_a_body() {
+    for order in ["1", "2"] {
+        let alone = with_fault([2, 6]).set("mesh.order", order).run_and_keep(1);
+        let results = alone.results();
+        let table = results.table("resultants.csv");
+        let [on, other] = ["contact fault", "other side of fault"]
+            .map(|source| table.only("source", source).numbers("force_y"));
+        assert!(on.iter().any(|force| force.abs() > 0.5), "it presses");
+        let opposite: Vec<f64> = other.iter().map(|force| -force).collect();
+        assert!(relative_difference(&on, &opposite) < 1e-12);
+        assert!(results.number("max_energy_imbalance") < 1e-10);
+        let case = with_fault([2, 6]).set("mesh.order", order).run_and_keep(3);
+        let [one, three] =
+            [&alone, &case].map(|case| case.results().table("probes.csv").numbers("displacement_x"));
+        assert!(relative_difference(&one, &three) < SHARE, "order {order}");
+    }
+    with_fault([3, 4]).run_with(2, &[]).expect(2).says("the fault \"fault\" has no node away from its edge");
+}
+
+#[test]
+fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
+    let swapped = |on: &str, against: &str| {
+        Case::of("pressed_blocks")
+            .set("contact.0.on", &format!("['{on}']"))
+            .set("contact.0.against", &format!("['{against}']"))
+            .without("output.profile")
+    };
+    for (case, words) in [
+        (
+            swapped("upper.top", "lower.bottom"),
+            "no part of the boundary upper.top faces the boundary lower.bottom",
+        ),
+        (
+            swapped("lower.bottom", "upper.top"),
+            "no part of the boundary lower.bottom faces the boundary upper.top",
+        ),
+        (swapped("upper.bottom", "upper.bottom"), "\"upper.bottom\" is on both sides of this contact"),
+        (swapped("upper.bottom", "lower.tip"), "lower.top"),
+        (
+            Case::of("pressed_blocks")
+                .set("contact.0.obstacle", "{ plane = { point = [0, 0], normal = [0, 1] } }"),
+            "touch another body or a rigid obstacle, not both",
+        ),
+        (
+            Case::of("pressed_blocks").set("contact.0.quadrature", "'gauss'"),
+            "contact between bodies acts at nodes",
+        ),
+        (
+            Case::of("indented_block").set("contact.0.sliding", "'finite'"),
+            "only contact `against` another body",
+        ),
+        (
+            Case::of("pressed_blocks")
+                .set("support.0", "{ on = ['upper.bottom'], fix = ['y'], where = 'x < 0.5' }")
+                .set("support.1", "{ on = ['lower.bottom', 'lower.left', 'upper.left'], fix = 'all' }"),
+            "a support holds it along the normal; exchange `on` and `against`",
+        ),
+    ] {
+        case.run_with(2, &[]).expect(2).says(words);
+    }
+}
