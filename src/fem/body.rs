@@ -172,6 +172,34 @@ impl<const D: usize, const S: usize> Body<D, S> {
         seen_by_contacts(self.coupling.as_ref(), &self.held, values)
     }
 
+    /// The nodes of this rank that others face in contact between bodies, with directions in which it can hold them, given those in which
+    /// it can hold the others. Collective.
+    pub fn opposite_directions(&self, touched: &[(usize, Vector<D>)]) -> Result<Vec<(usize, Vector<D>)>> {
+        let Some(coupling) = &self.coupling else { return Ok(Vec::new()) };
+        let mut all = Vec::new();
+        // One direction of each node at a time: those of other nodes must not add up with it.
+        for number in 0..D {
+            let mut sum = DistributedVector::ghosted(D, self.mesh.owned, &self.mesh.ghosts)?;
+            {
+                let mut values = sum.local_mut()?;
+                for of_node in touched.chunk_by(|a, b| a.0 == b.0) {
+                    let Some((node, direction)) = of_node.get(number) else { continue };
+                    coupling.opposites(&self.held, *node as u32, direction, |master, force| {
+                        (0..D).for_each(|i| values[master as usize * D + i] += force[i]);
+                    });
+                }
+            }
+            sum.add_ghosts_to_owners()?;
+            for (node, value) in sum.owned()?.chunks_exact(D).enumerate() {
+                let length = value.iter().map(|x| x * x).sum::<f64>().sqrt();
+                if length > 0.0 {
+                    all.push((node, std::array::from_fn(|i| value[i] / length)));
+                }
+            }
+        }
+        Ok(all)
+    }
+
     /// Finds anew what the nodes of pairs face that slide along each other, at this displacement with ghosts. Collective.
     pub fn form_pairs(&mut self, session: &Session, displacement: &DistributedVector) -> Result<(), Agreed> {
         if let Some(paired) = &mut self.paired_displacement {

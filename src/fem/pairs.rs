@@ -3,7 +3,7 @@
 use super::coupling::MasterShare;
 use crate::{
     fem::space::{
-        SurfacePoint,
+        SurfacePoint, longest_side,
         mortar::{Contribution, Facet, contributions},
         surface_points,
     },
@@ -52,6 +52,8 @@ pub struct Pair<const D: usize> {
     /// Whether what nodes face is found anew as bodies slide. All nodes of the slave side carry the law then; those that face nothing are at
     /// an infinite distance.
     pub slides: bool,
+    /// Whether the undeformed surfaces count as touching wherever they face each other.
+    pub is_closed: bool,
     /// The nodes owned here that carry the law, ascending.
     pub nodes: Vec<PairedNode<D>>,
 }
@@ -88,7 +90,10 @@ impl<const D: usize> Pair<D> {
 
     /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
     pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
-        let found = paired_nodes(session, mesh, places, [&self.on, &self.against])?;
+        let mut found = paired_nodes(session, mesh, places, [&self.on, &self.against])?;
+        if self.is_closed {
+            found.iter_mut().for_each(|node| node.distance = 0.0);
+        }
         if !self.slides {
             self.nodes = found;
             return Ok(());
@@ -130,7 +135,10 @@ pub fn shares<const D: usize>(mesh: &Mesh<D>, pairs: &[Pair<D>]) -> Vec<MasterSh
 }
 
 /// The least part of the surface around a node that must face the other side; nodes with less carry no law.
-const LEAST_SHARE: f64 = 1e-4;
+const LEAST_SHARE: f64 = 1e-3;
+/// The deepest penetration of undeformed bodies at which they face each other, as a share of the longest side of the box around them; it
+/// is larger where facets are.
+const DEEPEST: f64 = 0.05;
 
 /// The nodes owned here of the slave facets `on` that face the facets `against` of all ranks, ascending, with the local nodes of the mesh
 /// at `places` in m. Collective.
@@ -143,7 +151,8 @@ fn paired_nodes<const D: usize>(
     let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
     let masters = gather_facets(session, mesh, places, against)?;
     let mut outgoing = vec![Vec::new(); session.ranks()];
-    for contribution in contributions(&slaves, &masters, f64::INFINITY) {
+    let depth = DEEPEST * longest_side(session, places);
+    for contribution in contributions(&slaves, &masters, [depth, f64::INFINITY]) {
         let Contribution { node, normal, weight, whole, gap, masters } = contribution;
         let list: &mut Vec<f64> = &mut outgoing[mesh.owner(node)];
         list.extend([f64::from(node), weight, whole, gap]);

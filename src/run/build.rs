@@ -78,7 +78,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         }
         contacts.push(laws);
     }
-    refuse_conflicts(session, job, &mesh, &contacts)?;
+    refuse_conflicts(session, job, &mesh, (&contacts, coupling.as_ref()), &held)?;
     let surface_effects = surface_effects(session, &job.contact, &mesh, (&parts, &pairs), &held)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {

@@ -5,7 +5,8 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Closeness, Contact, Gaps, OVERRUN, longest_side},
+        effect::{Closeness, Contact, Gaps, OVERRUN},
+        space::longest_side,
         state::State,
     },
     job::{Job, Sliding},
@@ -41,14 +42,22 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         }
         let deepest = -gaps_of_all(session, contact, 0.0, &displacement).smallest;
         let on = table.on.join(", ");
+        if contact.is_paired() {
+            let other = table.against.join(", ");
+            if deepest > ROUNDING * size && !table.closed {
+                out.push(format!(
+                    "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside {other}, which presses them apart: if they are \
+                     curved and fit each other, or have corners, facets overlap where bodies only touch (use closed = true, refine the \
+                     boundaries, or let corners belong to `on`); otherwise it is an interference"
+                ));
+            }
+            continue;
+        }
         if deepest > TOO_DEEP * size {
             out.push(format!(
                 "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject the body; correct the gap, the obstacle or [initial] displacement",
                 100.0 * deepest / size
             ));
-        }
-        if contact.is_paired() {
-            continue;
         }
         let [least, most] = depths(session, &contact.gap, &body.mesh.nodes);
         if deepest > ROUNDING * size || most <= TOO_DEEP * size {
@@ -181,14 +190,18 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                 }
                 most => format!("the smallest gap after any step was {:.3e} m", -most),
             };
+            let what = match table.against.join(", ") {
+                none if none.is_empty() => "its obstacle".into(),
+                other => other,
+            };
             let last = if smallest.is_finite() {
                 format!(", at the end it is {smallest:.3e} m")
             } else {
                 String::new()
             };
             out.push(format!(
-                "contact.{number}: the boundary {on} never touched its obstacle: {nearest}{last}; if it should have, check position, size \
-                 and motion of the obstacle, and their units"
+                "contact.{number}: the boundary {on} never touched {what}: {nearest}{last}; if it should have, check position, size \
+                 and motion of both, and their units"
             ));
         }
     }

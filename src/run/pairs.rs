@@ -9,11 +9,17 @@ use crate::{
         pairs::{Pair, shares},
         space::{Held, facets},
     },
-    job::{self, Job, Sliding},
+    job::{self, Job, Scalar, Sliding},
+    linear_algebra::tensor::{Vector, dot, norm},
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Component of a unit direction along a normal above which it counts as along the normal.
+const ALONG: f64 = 0.5;
+/// The share of what a node faces that must be held along a direction in which a support holds the node, as on a plane of symmetry.
+const HELD_TOGETHER: f64 = 0.5;
 
 /// The contacts of a job between bodies; the mesh gets the ghosts that their equations need. Collective.
 pub(super) fn find<const D: usize>(
@@ -30,24 +36,35 @@ pub(super) fn find<const D: usize>(
             let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
             let other: Vec<String> = contact.on.iter().map(|name| other_side(name)).collect();
             let against = facets(mesh, &other);
-            let mut pair = Pair { contact: number, on, against, slides: false, nodes: Vec::new() };
+            let mut pair =
+                Pair { contact: number, on, against, slides: false, is_closed: true, nodes: Vec::new() };
             pair.join(session, mesh)?;
             pairs.push(pair);
         }
         if contact.against.is_empty() {
             continue;
         }
+        let varies = contact.normal.gap().is_some_and(Scalar::depends_on_position);
+        session.agree(if D == 3 && mesh.order() == 2 && varies {
+            Err(Error::Refused(format!(
+                "contact.{number}: a `gap` that depends on the place is not available between bodies of quadratic cells in space; use \
+                 [mesh] order = 1, or give the meshes this distance"
+            )))
+        } else {
+            Ok(())
+        })?;
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         let against = facets(mesh, &contact.against);
         let slides = contact.sliding == Sliding::Finite;
-        let mut pair = Pair { contact: number, on, against, slides, nodes: Vec::new() };
+        let mut pair =
+            Pair { contact: number, on, against, slides, is_closed: contact.closed, nodes: Vec::new() };
         pair.form(session, mesh, &mesh.nodes)?;
         let names = [&contact.on, &contact.against].map(|names| names.join(", "));
         let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
         session.agree(if session.total(facing) == 0 && !slides {
             Err(Error::Refused(format!(
-                "contact.{number}: no part of the boundary {} faces the boundary {} along its outward normal; correct `on` or `against`, or \
-                 the positions of the bodies",
+                "contact.{number}: no part of the boundary {} faces the boundary {} along its outward normal, or they overlap by more than \
+                 5 % of the size of the bodies; correct `on` or `against`, or the positions of the bodies",
                 names[0], names[1]
             )))
         } else {
@@ -112,20 +129,43 @@ pub(super) fn coupling<const D: usize>(
     Coupling::new(session, mesh, &shares(mesh, pairs), held).map(Some)
 }
 
-/// Refuses nodes on the side `on` of a pair that supports hold along the normal, or that belong to another contact. Collective.
+/// Refuses nodes on the side `on` of a pair that supports hold along the normal, or tangentially where friction acts, and not what they
+/// face; and nodes that belong to another contact. Collective.
 pub(super) fn refuse_conflicts<const D: usize>(
     session: &Session,
     job: &Job,
     mesh: &Mesh<D>,
-    contacts: &[Contact<D>],
+    (contacts, coupling): (&[Contact<D>], Option<&Coupling<D>>),
+    held: &Held<D>,
 ) -> Result<(), Agreed> {
+    let Some(coupling) = coupling else { return Ok(()) };
+    let masters_of: BTreeMap<usize, &[(u32, f64)]> =
+        coupling.slaves().map(|(slave, masters)| (slave as usize, masters)).collect();
+    // The share of the masters that is held along a direction as well.
+    let held_share = |node: usize, direction: &Vector<D>| -> f64 {
+        let free = |master: u32| norm(&held.free_part(master as usize, direction)).powi(2);
+        let masters = masters_of.get(&node).copied().unwrap_or(&[]);
+        masters.iter().map(|(master, share)| share * (1.0 - free(*master))).sum()
+    };
     let mut paired = BTreeMap::new();
-    let mut conflict = None;
+    let mut conflict: Option<(usize, usize, String)> = None;
     for (number, contact) in contacts.iter().enumerate().filter(|(_, contact)| contact.is_paired()) {
-        if let Some(node) = contact.first_held_node() {
-            conflict.get_or_insert((node, number, "a support holds it along the normal".to_owned()));
+        let rubs = job.contact[number].friction.is_some() || job.contact[number].adhesion.is_some();
+        for (node, normal) in contact.normal_directions().filter(|(node, _)| masters_of.contains_key(node)) {
+            paired.insert(node, number);
+            let (frame, free) = held.frame(node);
+            for direction in &frame[free..] {
+                let along = dot(direction, &normal).abs();
+                let (word, matters) = match along > ALONG {
+                    true => ("along the normal", true),
+                    false => ("along the boundary, where friction or adhesion act", rubs),
+                };
+                if matters && held_share(node, direction) < HELD_TOGETHER {
+                    let why = format!("a support holds it {word}, and not what it faces");
+                    conflict.get_or_insert((node, number, why));
+                }
+            }
         }
-        paired.extend(contact.nodes().map(|node| (node, number)));
     }
     for (number, contact) in contacts.iter().enumerate() {
         let of_others = contact.nodes().filter_map(|node| Some((node, *paired.get(&node)?)));

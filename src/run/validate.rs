@@ -77,8 +77,9 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
             mesh.cell(cell).iter().for_each(|&node| held[node as usize] = [true; D]);
         }
     }
-    let touches = body.contacts.iter().flat_map(Contact::holding_directions);
-    let touched: Vec<_> = touches.chain(body.support_directions()).collect();
+    let mut touched: Vec<_> = body.contacts.iter().flat_map(Contact::holding_directions).collect();
+    touched.extend(session.agree(body.opposite_directions(&touched))?);
+    touched.extend(body.support_directions());
     let free = free_motions(session, mesh, &held, &touched)?;
     if free.is_empty() {
         return Ok(());

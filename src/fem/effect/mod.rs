@@ -54,7 +54,7 @@ pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
     Decrease, Freedom, Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
     OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT,
-    choose_unknowns, contact_nodes, longest_side, set_walls,
+    choose_unknowns, contact_nodes, set_walls,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

@@ -24,6 +24,6 @@ pub use quadratic::{
 };
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};
 pub use surface::{
-    FacetPoint, SurfacePoint, acts_at_midsides, corner_means, facet_points, facets, surface_means,
-    surface_points,
+    FacetPoint, SurfacePoint, acts_at_midsides, corner_means, facet_points, facets, longest_side,
+    surface_means, surface_points,
 };

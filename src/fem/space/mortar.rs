@@ -48,7 +48,7 @@ pub type Vector<const D: usize> = [f64; D];
 
 /// A master facet faces a slave facet if its normal has a component along the slave normal below this.
 const FACING: f64 = -0.2;
-/// The deepest mean penetration of a pair, as a share of the diameter of the slave facet.
+/// The deepest mean penetration of a pair, as a share of the diameter of the slave facet, where it may be deeper than `depth`.
 const DEEPEST: f64 = 0.5;
 /// The smallest clipped part that counts, as a share of the slave facet.
 const SMALLEST_PART: f64 = 1e-12;
@@ -135,8 +135,8 @@ pub struct Contribution<const D: usize> {
 /// their nodes.
 ///
 /// A slave facet e and a master facet form a pair if they share no node, their normals are opposed (component
-/// of one along the other below -0.2), and the mean of the gap g over the clipped part is between -0.5 of the
-/// longest side of e and `reach` in m, which is positive and may be infinite. Where several master facets are
+/// of one along the other below -0.2), and the mean of the gap g over the clipped part is between minus `depth`,
+/// or half of the longest side of e if it is larger, and `reach`, both in m; `reach` may be infinite. Where several master facets are
 /// projected on the same part of e, the one with the smallest mean |g| counts. To that end the pairs are
 /// visited in ascending order of the magnitude of their mean gap, and one whose part overlaps a part already
 /// taken by more than 1e-6 of e is skipped as a whole. Thus where the projections of two master facets
@@ -152,19 +152,19 @@ pub struct Contribution<const D: usize> {
 ///
 /// # Panics
 ///
-/// Where a facet has a number of nodes other than D or 3 (D - 1), or `reach` is not positive.
+/// Where a facet has a number of nodes other than D or 3 (D - 1), `depth` is negative, or `reach` is not positive.
 pub fn contributions<const D: usize>(
     slaves: &[Facet<D>],
     masters: &[Facet<D>],
-    reach: f64,
+    [depth, reach]: [f64; 2],
 ) -> Vec<Contribution<D>> {
     const { assert!(D == 2 || D == 3, "there are segments and triangles only") };
-    assert!(reach > 0.0, "the reach {reach} m is not positive");
+    assert!(depth >= 0.0 && reach > 0.0, "the depth {depth} m or the reach {reach} m is not positive");
     for facet in slaves.iter().chain(masters) {
         let count = facet.nodes.len();
         assert!(count == D || count == 3 * (D - 1), "a facet has {count} nodes");
     }
-    let search = Search::new(masters, reach);
+    let search = Search::new(masters, [depth, reach]);
     let mut result = Vec::with_capacity(slaves.len() * D);
     for facet in slaves {
         let slave = Slave::new(facet);
@@ -205,11 +205,12 @@ struct Search<'a, const D: usize> {
     /// Those with finite coordinates.
     masters: Vec<&'a Facet<D>>,
     tree: Bvh,
-    reach: f64,
+    /// The largest penetration and the largest gap of a pair in m.
+    reach: [f64; 2],
 }
 
 impl<'a, const D: usize> Search<'a, D> {
-    fn new(masters: &'a [Facet<D>], reach: f64) -> Self {
+    fn new(masters: &'a [Facet<D>], reach: [f64; 2]) -> Self {
         let finite = |master: &&Facet<D>| master.corners.as_flattened().iter().all(|x| x.is_finite());
         let masters: Vec<_> = masters.iter().filter(finite).collect();
         let boxes = masters.iter().map(|master| {
@@ -256,7 +257,8 @@ impl<'a, const D: usize> Search<'a, D> {
         }
         let shape = Shape::new(master.is_quadratic(), &corners, centroid);
         let gap = shape.linear(&projected.map(|(_, height)| height));
-        let accepted = (-DEEPEST * slave.diameter..=self.reach).contains(&gap.0);
+        let [depth, reach] = self.reach;
+        let accepted = (-depth.max(DEEPEST * slave.diameter)..=reach).contains(&gap.0);
         accepted.then_some(Part { master, polygon, measure, centroid, shape, gap })
     }
 }
@@ -272,7 +274,7 @@ struct Prism {
 }
 
 impl Prism {
-    fn new<const D: usize>(slave: &Slave<D>, reach: f64) -> Self {
+    fn new<const D: usize>(slave: &Slave<D>, [depth, reach]: [f64; 2]) -> Self {
         let margin = SEARCH_MARGIN * slave.diameter;
         let bound = |k: usize| {
             let along = slave.corners.map(|corner| corner[k]);
@@ -283,7 +285,7 @@ impl Prism {
         Self {
             origin: embed(&slave.plane.origin),
             directions: [embed(&slave.plane.normal), embed(&first), embed(&second)],
-            bounds: [(-DEEPEST * slave.diameter - margin, reach + margin), bound(0), bound(1)],
+            bounds: [(-depth.max(DEEPEST * slave.diameter) - margin, reach + margin), bound(0), bound(1)],
         }
     }
 

@@ -5,7 +5,7 @@ use super::{
     quadrature::{facet_rule, fine_facet_rule},
 };
 use crate::{
-    linear_algebra::tensor::{Vector, dot, norm},
+    linear_algebra::tensor::{Vector, dot, larger, norm},
     mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
@@ -46,6 +46,19 @@ pub fn facets<'a, const D: usize>(mesh: &Mesh<D>, names: impl IntoIterator<Item 
     all.sort_unstable();
     all.dedup();
     all
+}
+
+/// The longest side in m of the box around nodes of all ranks. Collective.
+pub fn longest_side<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> f64 {
+    let mut ends = [[f64::NEG_INFINITY; 3]; 2];
+    for node in nodes {
+        for (axis, x) in node.iter().enumerate() {
+            ends[0][axis] = larger(ends[0][axis], *x);
+            ends[1][axis] = larger(ends[1][axis], -x);
+        }
+    }
+    let ends = ends.map(|end| session.largest(end));
+    (0..D).map(|axis| ends[0][axis] + ends[1][axis]).fold(0.0, larger)
 }
 
 /// Cosine of the angle beyond which facets around a node count as different faces of the body (40 degrees).

@@ -52,12 +52,18 @@ pub struct Contact {
     pub on: Vec<String>,
     /// The names of the boundaries of other bodies that the boundaries `on` may touch, instead of a rigid obstacle. The law acts at nodes
     /// of `on`, the slave side, on their velocity and displacement relative to the surface that they face along their normals in the
-    /// undeformed bodies; friction, adhesion, memory and wear as against an obstacle. Choose as `on` the side with the finer mesh and
-    /// without supports. The distance of the undeformed surfaces is that of the mesh; `gap` of the normal law adds to it, so that a
-    /// negative one is an interference. Absent: an obstacle or `gap`.
+    /// undeformed bodies; friction, adhesion, memory and wear as against an obstacle. Choose as `on` the side with the finer mesh, with
+    /// corners and without supports. The distance of the undeformed surfaces is that of the mesh, whose facets are straight; `gap` of the
+    /// normal law adds to it, so that a negative one is an interference, whose work counts as negative contact dissipation. Absent: an
+    /// obstacle or `gap`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(example = ["top"])]
+    #[schemars(length(min = 1), example = ["top"])]
     pub against: Vec<String>,
+    /// Whether the undeformed boundaries count as touching wherever they face each other, whatever their distance in the mesh: for curved
+    /// boundaries that fit each other, but whose facets do not, as of a shaft in a bush. `gap` of the normal law is then the whole
+    /// distance. Absent: the distance is that of the mesh.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub closed: bool,
     /// How far the boundaries may slide along those in `against`.
     #[serde(default, skip_serializing_if = "Sliding::is_small")]
     pub sliding: Sliding,
@@ -151,6 +157,7 @@ impl Contact {
                 (self.adhesion.is_some(), "adhesion is not available at Gauss points"),
                 (self.memory.is_some(), "memory is not available at Gauss points"),
                 (normal.needs_nodes(), "this contact law is not available at Gauss points"),
+                (!self.against.is_empty(), "contact between bodies acts at nodes"),
             ];
             let help = "use \"nodal\", or delete the key";
             let not_there = not_there.into_iter().filter(|(is_there, _)| *is_there);
@@ -161,42 +168,29 @@ impl Contact {
 
     /// Another body takes the place of an obstacle.
     fn faults_of_pair(&self) -> Vec<LawFault> {
-        let help = "use \"small\", or delete the key";
+        let small = "use \"small\", or delete the key";
+        let slides = self.sliding == Sliding::Finite;
         if self.against.is_empty() {
-            let message = "only contact `against` another body distinguishes small and finite sliding";
-            let fault =
-                (self.sliding == Sliding::Finite).then(|| LawFault::at_value("sliding", message, help));
-            return fault.into_iter().collect();
+            let of_sliding = "only contact `against` another body distinguishes small and finite sliding";
+            let of_distance = "only between bodies is the distance that of the mesh";
+            let sliding = slides.then(|| LawFault::at_value("sliding", of_sliding, small));
+            let closed = self.closed.then(|| LawFault::at_value("closed", of_distance, "delete the key"));
+            return sliding.into_iter().chain(closed).collect();
         }
+        let other = "delete it, or delete `against`";
+        let of_histories = "adhesion and memory belong to the surface that nodes faced first";
+        let of_gap = "this normal law has no gap, so that it would act where nodes face nothing";
+        let of_closed = "the distance of bodies that slide far is that of the mesh";
+        let of_obstacle = "the boundaries `on` touch another body or a rigid obstacle, not both";
+        let of_load = "a load moves a rigid obstacle, and this contact is against a body";
         let has_histories = self.adhesion.is_some() || self.memory.is_some();
-        if self.sliding == Sliding::Finite && (has_histories || !self.normal.has_gap()) {
-            let message = if has_histories {
-                "adhesion and memory belong to the surface that nodes faced first"
-            } else {
-                "this normal law has no gap, so that it would act where nodes face nothing"
-            };
-            return vec![LawFault::at_value("sliding", message, help)];
-        }
-        let not_there = [
-            (
-                self.obstacle.is_some(),
-                "obstacle",
-                "the boundaries `on` touch another body or a rigid obstacle, not both",
-            ),
-            (
-                self.obstacle_load.is_some(),
-                "obstacle_load",
-                "a load moves a rigid obstacle, and this contact is against a body",
-            ),
-        ];
-        let not_there = not_there.into_iter().filter(|(is_there, ..)| *is_there);
-        let mut faults: Vec<LawFault> = not_there
-            .map(|(_, key, message)| LawFault::at_key(key, message, "delete it, or delete `against`"))
-            .collect();
-        if self.quadrature == Quadrature::Gauss {
-            let message = "contact between bodies acts at nodes";
-            faults.push(LawFault::at_value("quadrature", message, "use \"nodal\", or delete the key"));
-        }
+        let mut faults = Vec::new();
+        let mut check = |is_fault: bool, fault: LawFault| faults.extend(is_fault.then_some(fault));
+        check(self.obstacle.is_some(), LawFault::at_key("obstacle", of_obstacle, other));
+        check(self.obstacle_load.is_some(), LawFault::at_key("obstacle_load", of_load, other));
+        check(slides && has_histories, LawFault::at_value("sliding", of_histories, small));
+        check(slides && !self.normal.has_gap(), LawFault::at_value("sliding", of_gap, small));
+        check(slides && self.closed, LawFault::at_value("closed", of_closed, "delete the key"));
         if let Some(name) = self.on.iter().find(|name| self.against.contains(name)) {
             let message = format!("the boundary \"{name}\" is on both sides of this contact");
             faults.push(LawFault::at_value("against", message, "name another boundary"));

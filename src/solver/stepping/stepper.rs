@@ -21,10 +21,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
-        effect::{
-            CONTACT, Contact, Energy, Freedom, LoadedMotion, NUMERICAL, Role, STORED_IN_CONTACT, Step,
-            VISCOUS, WORK,
-        },
+        effect::{CONTACT, Contact, Energy, Freedom, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
         resultants::BalancedMotion,
         state::State,
     },

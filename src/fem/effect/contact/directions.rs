@@ -1,10 +1,6 @@
 //! The motions of nodes on which contact laws act.
 
-use super::{
-    Contact,
-    point::{Point, Unknown},
-    tangential_point::span_without,
-};
+use super::{Contact, point::Unknown, tangential_point::span_without};
 use crate::{fem::space::Held, linear_algebra::tensor::Vector};
 use std::collections::BTreeMap;
 
@@ -73,11 +69,6 @@ impl<const D: usize> Contact<D> {
     /// The nodes of this rank that its points have.
     pub fn nodes(&self) -> impl Iterator<Item = usize> {
         self.points.iter().flat_map(|point| point.nodes().map(|(node, _)| node).collect::<Vec<_>>())
-    }
-
-    /// A node of this rank that supports hold along the normal.
-    pub fn first_held_node(&self) -> Option<usize> {
-        self.points.iter().find(|point| point.unknown == Unknown::Held).map(Point::node)
     }
 
     /// The nodes of this rank, each with the normals of its points.

@@ -49,10 +49,10 @@ use crate::{
     fem::{
         effect::Blend,
         pairs::PairedNode,
-        space::{Held, surface_points},
+        space::{Held, longest_side, surface_points},
     },
     laws::contact::{Gap, NormalResponse, Rate, Wear},
-    linear_algebra::tensor::{Vector, larger},
+    linear_algebra::tensor::Vector,
     mesh::Mesh,
     parallel::session::Session,
 };
@@ -285,17 +285,4 @@ impl<const D: usize> Contact<D> {
             friction.add_tractions(nodal);
         }
     }
-}
-
-/// The longest side in m of the box around nodes of all ranks. Collective.
-pub fn longest_side<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> f64 {
-    let mut ends = [[f64::NEG_INFINITY; 3]; 2];
-    for node in nodes {
-        for (axis, x) in node.iter().enumerate() {
-            ends[0][axis] = larger(ends[0][axis], *x);
-            ends[1][axis] = larger(ends[1][axis], -x);
-        }
-    }
-    let ends = ends.map(|end| session.largest(end));
-    (0..D).map(|axis| ends[0][axis] + ends[1][axis]).fold(0.0, larger)
 }

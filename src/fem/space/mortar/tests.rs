@@ -156,7 +156,7 @@ fn squares(random: &mut Random, slave: bool, master: bool) -> [Surface<3>; 2] {
 }
 
 fn pair<const D: usize>(slave: &Surface<D>, master: &Surface<D>) -> Vec<Contribution<D>> {
-    contributions(&slave.facets, &master.facets, f64::INFINITY)
+    contributions(&slave.facets, &master.facets, [0.0, f64::INFINITY])
 }
 
 /// The contributions summed by node.
@@ -635,13 +635,13 @@ fn of_two_master_facets_over_the_same_part_the_nearer_one_counts() {
         let left = segments(&[0.0, 0.6], |_| 0.1, (-1.0, 30, false));
         let right = segments(&[start, 1.0], |_| 0.15, (-1.0, 40, false));
         let masters = [right.facets, left.facets].concat();
-        let all = contributions(&slave.facets, &masters, f64::INFINITY);
+        let all = contributions(&slave.facets, &masters, [0.0, f64::INFINITY]);
         assert_eq!(all[0].masters.iter().any(|entry| entry.0 >= 40), counts);
         assert!(all[0].masters.iter().any(|entry| entry.0 == 30));
     }
     for masters in [[&far, &near], [&near, &far]] {
         let masters: Vec<_> = masters.iter().flat_map(|surface| surface.facets.clone()).collect();
-        let all = contributions(&slave.facets, &masters, f64::INFINITY);
+        let all = contributions(&slave.facets, &masters, [0.0, f64::INFINITY]);
         for one in &all {
             assert_eq!(one.masters.iter().map(|entry| entry.0).collect::<Vec<_>>(), [20, 21]);
             close(one.gap, -0.05, 1e-15);
@@ -649,13 +649,13 @@ fn of_two_master_facets_over_the_same_part_the_nearer_one_counts() {
     }
     let deep = segments(&[0.0, 1.0], |_| -0.3, (-1.0, 50, false));
     let masters = [deep.facets, far.facets].concat();
-    let all = contributions(&slave.facets, &masters, f64::INFINITY);
+    let all = contributions(&slave.facets, &masters, [0.0, f64::INFINITY]);
     all.iter().for_each(|one| close(one.gap, 0.1, 1e-15));
     let random = &mut Random(8);
     let [slave, near] = squares(random, false, false);
     let far = near.moved(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], &[0.0, 0.0, 0.3]);
     let both = [far.facets, near.facets.clone()].concat();
-    same(&pair(&slave, &near), &contributions(&slave.facets, &both, f64::INFINITY), 1e-14);
+    same(&pair(&slave, &near), &contributions(&slave.facets, &both, [0.0, f64::INFINITY]), 1e-14);
 }
 
 #[test]
@@ -669,7 +669,7 @@ fn reach_and_depth() {
         (-0.6, f64::INFINITY, false),
     ] {
         let master = segments(&[-1.0, 2.0], |_| height, (-1.0, FIRST_MASTER, false));
-        let all = contributions(&slave.facets, &master.facets, reach);
+        let all = contributions(&slave.facets, &master.facets, [0.0, reach]);
         assert_eq!(!is_uncovered(&all), covered, "{height} {reach}");
     }
     // Far above an oblique slave facet, among others beside it.
@@ -688,7 +688,7 @@ fn reach_and_depth() {
             1e-8,
         );
     }
-    assert!(is_uncovered(&contributions(&slave.facets, &far.facets, 499.0)));
+    assert!(is_uncovered(&contributions(&slave.facets, &far.facets, [0.0, 499.0])));
 }
 
 #[test]
@@ -698,7 +698,7 @@ fn facets_of_one_surface_on_both_sides_of_its_gap() {
     let upper = Surface::new(&points, &[[0, 1], [1, 2]], ([0.0, -1.0], 0, false));
     let lower = Surface::new(&points, &[[0, 3], [3, 4]], ([0.0, 1.0], 0, false));
     let all = [upper.facets.clone(), lower.facets.clone()].concat();
-    let result = contributions(&lower.facets, &all, f64::INFINITY);
+    let result = contributions(&lower.facets, &all, [0.0, f64::INFINITY]);
     close(result[2].weight, 0.5, 1e-14);
     close(result[2].gap, 0.1, 1e-14);
     close(entry(&result[2], 1), 0.5, 1e-14);
@@ -711,7 +711,7 @@ fn facets_of_one_surface_on_both_sides_of_its_gap() {
     // If the tip were two nodes, they would be a pair.
     let mut apart = all;
     apart[0].nodes[0] = 9;
-    let result = contributions(&lower.facets, &apart, f64::INFINITY);
+    let result = contributions(&lower.facets, &apart, [0.0, f64::INFINITY]);
     close(result[0].weight + result[1].weight, length, 1e-13);
 }
 
@@ -746,7 +746,7 @@ fn curved_surfaces_have_positive_weights() {
             for out in [1.0, -1.0] {
                 let slave = circle(slaves, (0.1, out, 0, quadratic));
                 let master = circle(masters, (0.0, -out, FIRST_MASTER, quadratic));
-                let sums = by_node(&contributions(&slave.facets, &master.facets, 0.1));
+                let sums = by_node(&contributions(&slave.facets, &master.facets, [0.0, 0.1]));
                 assert_eq!(sums.len(), if quadratic { 2 * slaves } else { slaves });
                 for one in sums.values() {
                     assert!(one.weight > 0.9 * one.whole && one.weight <= 1.0000001 * one.whole);
@@ -868,11 +868,11 @@ fn the_search_finds_all_pairs() {
     };
     let (slaves, masters) = (cloud(200, 0), cloud(200, 1000));
     for reach in [0.1, f64::INFINITY] {
-        let search = Search::new(&masters, reach);
+        let search = Search::new(&masters, [0.0, reach]);
         let (mut pairs, mut visited) = (0, 0);
         for slave in &slaves {
             let slave = Slave::new(slave);
-            let prism = Prism::new(&slave, reach);
+            let prism = Prism::new(&slave, [0.0, reach]);
             let mut near: Vec<u32> = search.tree.leaves(|node| prism.meets(node)).collect();
             near.sort_unstable();
             visited += near.len();
@@ -900,7 +900,7 @@ fn coordinates_that_are_not_finite_form_no_pair() {
 #[test]
 #[should_panic(expected = "is not positive")]
 fn reach_that_is_nan() {
-    contributions::<2>(&[], &[], f64::NAN);
+    contributions::<2>(&[], &[], [0.0, f64::NAN]);
 }
 
 #[test]
@@ -908,5 +908,5 @@ fn reach_that_is_nan() {
 fn wrong_number_of_nodes() {
     let mut slave = slave_segments(&[0.0, 1.0], false);
     slave.facets[0].nodes = vec![0, 1, 2, 3];
-    contributions(&slave.facets, &[], 1.0);
+    contributions(&slave.facets, &[], [0.0, 1.0]);
 }
