@@ -371,12 +371,18 @@ impl StepSolver {
         problem: &mut StepProblem<'_, D, S>,
         start: &DistributedVector,
     ) -> Result<Accuracy> {
-        let norm = problem.forces.norm()?;
+        let mut norm = problem.forces.norm()?;
         if !norm.is_finite() {
             let remedy = "check loads and initial values; use smaller steps";
             return Err(problem.failed("the forces are not finite", remedy));
         }
         let StepProblem { session, body, scale, rounding, .. } = problem;
+        if norm == 0.0 && !body.contacts.is_empty() {
+            // Nothing but gaps that close sets the body in motion.
+            let square = body.contacts.iter().map(Contact::square_of_closing_forces).sum();
+            norm = session.sum([square])[0].sqrt();
+            *scale = norm;
+        }
         // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
         // obstacle rounds `v` as a difference from the obstacle's velocity.
         let mut motion = start.norm()?;

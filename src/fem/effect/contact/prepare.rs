@@ -1,6 +1,10 @@
 //! Preparation of a step at the points of a contact. Vectors are those of the body.
 
-use super::{Contact, point::Vectors::Body, tangential_point::ROUNDING};
+use super::{
+    Contact,
+    point::{Point, Vectors::Body},
+    tangential_point::ROUNDING,
+};
 use crate::{
     error::{Error, Result},
     fem::effect::{Blend, Step},
@@ -70,6 +74,17 @@ impl<const D: usize> Contact<D> {
     /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
     pub fn has_moving_obstacle(&self) -> bool {
         self.friction.is_some() && self.surface_may_move()
+    }
+
+    /// The sum over points on this rank of the squares of the forces in N that would push them out of the obstacle in the started step,
+    /// each alone.
+    pub fn square_of_closing_forces(&self) -> f64 {
+        let force = |point: &Point<D>| {
+            let NodeContext { penetration, step_length, .. } = point.context;
+            let speed = if penetration > 0.0 { penetration / step_length } else { 0.0 };
+            point.weight * self.reference.resistance[0] * speed
+        };
+        self.points.iter().map(|point| force(point).powi(2)).sum()
     }
 
     /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
