@@ -31,14 +31,24 @@ pub enum Method {
 /// Splits the mesh into `ranks` parts of near equal cell count with few facets between parts: METIS on the dual graph
 /// with a fixed seed, so that equal meshes give equal parts.
 pub fn divide<const D: usize>(mesh: &GlobalMesh<D>, ranks: usize, method: Method) -> Result<Partition> {
+    divide_with_pairs(mesh, ranks, method, &[])
+}
+
+/// The same, where these pairs of cells of bodies in contact count as neighbours.
+pub fn divide_with_pairs<const D: usize>(
+    mesh: &GlobalMesh<D>,
+    ranks: usize,
+    method: Method,
+    pairs: &[[u32; 2]],
+) -> Result<Partition> {
     let dual = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?.dual_graph();
-    partition(mesh, &dual, ranks, method)
+    partition(mesh, &dual, (ranks, pairs), method)
 }
 
 fn partition<const D: usize>(
     mesh: &GlobalMesh<D>,
     dual: &DualGraph,
-    ranks: usize,
+    (ranks, pairs): (usize, &[[u32; 2]]),
     method: Method,
 ) -> Result<Partition> {
     let cells = mesh.cell_count();
@@ -48,7 +58,11 @@ fn partition<const D: usize>(
              the mesh"
         )));
     }
-    let mut cell_ranks = if ranks == 1 { vec![0; cells] } else { split(dual, cells, ranks, method)? };
+    let mut cell_ranks = match (ranks, pairs) {
+        (1, _) => vec![0; cells],
+        (_, []) => split(dual, cells, ranks, method)?,
+        _ => split(&dual.with_pairs(pairs), cells, ranks, method)?,
+    };
     fill_empty_parts(&mut cell_ranks, ranks);
     let mut sizes = vec![0usize; ranks];
     for &rank in &cell_ranks {
@@ -141,7 +155,7 @@ mod tests {
     fn parts_are_balanced_and_every_rank_has_cells() {
         let (mesh, dual) = square(16);
         for ranks in [1, 2, 3, 4, 7] {
-            let parts = partition(&mesh, &dual, ranks, Method::KWay).unwrap();
+            let parts = partition(&mesh, &dual, (ranks, &[]), Method::KWay).unwrap();
             assert!(parts.imbalance < 1.1, "{ranks} ranks: {}", parts.imbalance);
             assert!((0..ranks).all(|r| parts.cell_ranks.contains(&(r as u32))));
             assert_eq!(parts.edge_cut == 0, ranks == 1);
@@ -151,16 +165,16 @@ mod tests {
     #[test]
     fn consecutive_parts_of_a_recursive_split_lie_side_by_side() {
         let (mesh, dual) = square(32);
-        let parts = partition(&mesh, &dual, 16, Method::Recursive).unwrap();
+        let parts = partition(&mesh, &dual, (16, &[]), Method::Recursive).unwrap();
         let four: Vec<u32> = parts.cell_ranks.iter().map(|part| part / 4).collect();
-        let direct = partition(&mesh, &dual, 4, Method::Recursive).unwrap();
+        let direct = partition(&mesh, &dual, (4, &[]), Method::Recursive).unwrap();
         assert!(edge_cut(&dual, &four) <= 2 * direct.edge_cut);
     }
 
     #[test]
     fn as_many_ranks_as_cells_get_one_cell_each() {
         let (mesh, dual) = square(2);
-        let mut ranks = partition(&mesh, &dual, 8, Method::KWay).unwrap().cell_ranks;
+        let mut ranks = partition(&mesh, &dual, (8, &[]), Method::KWay).unwrap().cell_ranks;
         ranks.sort_unstable();
         assert_eq!(ranks, (0..8).collect::<Vec<_>>());
     }
@@ -168,14 +182,14 @@ mod tests {
     #[test]
     fn more_ranks_than_cells_are_refused() {
         let (mesh, dual) = square(1);
-        let words = partition(&mesh, &dual, 3, Method::KWay).unwrap_err().to_string();
+        let words = partition(&mesh, &dual, (3, &[]), Method::KWay).unwrap_err().to_string();
         assert!(words.contains("2 cells") && words.contains("3 ranks"), "{words}");
     }
 
     #[test]
     fn nodes_belong_to_a_rank_of_a_cell_around_them() {
         let (mesh, dual) = square(8);
-        let parts = partition(&mesh, &dual, 4, Method::KWay).unwrap();
+        let parts = partition(&mesh, &dual, (4, &[]), Method::KWay).unwrap();
         for node in 0..mesh.nodes.len() {
             let around = (0..mesh.cell_count())
                 .filter(|&c| mesh.cell(c).contains(&(node as u32)))

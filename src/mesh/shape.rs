@@ -173,7 +173,7 @@ impl<const D: usize> GlobalMesh<D> {
     }
 
     /// The corners of a facet (m).
-    pub(super) fn facet_corners(&self, facet: usize) -> [Vector<D>; D] {
+    pub fn facet_corners(&self, facet: usize) -> [Vector<D>; D] {
         self.facets[facet].map(|node| self.nodes[node as usize])
     }
 }

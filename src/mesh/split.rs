@@ -184,3 +184,76 @@ fn sorted<const D: usize>(mut facet: [u32; D]) -> Sorted<D> {
     facet.sort_unstable();
     facet
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{
+        InnerGroup, Tags,
+        check::validate,
+        generate::{Diagonal, box_mesh, rectangle},
+        surface::Topology,
+    };
+
+    /// Makes the facets between cells whose nodes all satisfy this the group `fault`.
+    fn with_fault<const D: usize>(
+        mut mesh: GlobalMesh<D>,
+        on_it: impl Fn(&[f64; D]) -> bool,
+    ) -> GlobalMesh<D> {
+        let outer: BTreeSet<_> = mesh.facets.iter().map(|facet| sorted(*facet)).collect();
+        let cells = mesh.cells.chunks_exact(D + 1);
+        let all =
+            cells.flat_map(|cell| (0..=D).map(|at| sorted(facet_of::<D>(cell, at))).collect::<Vec<_>>());
+        let is_on = |facet: &[u32; D]| facet.iter().all(|node| on_it(&mesh.nodes[*node as usize]));
+        let facets: BTreeSet<_> = all.filter(|facet| is_on(facet) && !outer.contains(facet)).collect();
+        let group = InnerGroup { name: "fault".into(), facets: facets.len(), place: String::new() };
+        mesh.inner_groups.push(group);
+        mesh.inner_facets.push(facets.into_iter().collect());
+        mesh
+    }
+
+    /// Splits the mesh; gives the number of new nodes and of facets on each side, which must be at the same places and opposite.
+    fn split<const D: usize>(mut mesh: GlobalMesh<D>) -> [usize; 3] {
+        let (nodes, cells) = (mesh.nodes.len(), mesh.cells.len());
+        mesh.split_along("fault").unwrap();
+        validate(&mesh, &Tags::default()).unwrap();
+        let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default()).unwrap();
+        assert_eq!(topology.facets_without_neighbour(), mesh.facets.len(), "the surface is complete");
+        assert_eq!(mesh.cells.len(), cells);
+        let places = |name: &str| -> Vec<[u64; D]> {
+            let boundary = mesh.boundaries.iter().find(|boundary| boundary.name == name).unwrap();
+            let corners = boundary.facets.iter().map(|facet| mesh.facet_corners(*facet as usize));
+            let mut all: Vec<[u64; D]> =
+                corners.map(|corners| centroid(&corners).map(|x| (x * 1e9).round() as u64)).collect();
+            all.sort_unstable();
+            all
+        };
+        let [own, other] = [places("fault"), places(&other_side("fault"))];
+        assert_eq!(own, other);
+        [mesh.nodes.len() - nodes, own.len(), other.len()]
+    }
+
+    #[test]
+    fn a_fault_through_a_body_makes_two_and_one_inside_keeps_its_ends() {
+        let square = || rectangle([1.0, 1.0], [4, 4], Diagonal::Alternating, [1.0; 2]).unwrap();
+        assert_eq!(split(with_fault(square(), |x| x[1] == 0.5)), [5, 4, 4]);
+        let inside = |x: &[f64; 2]| x[1] == 0.5 && (0.25..=0.75).contains(&x[0]);
+        assert_eq!(split(with_fault(square(), inside)), [1, 2, 2]);
+        assert_eq!(split(with_fault(square(), |x| x[1] == 0.5 && x[0] <= 0.5)), [2, 2, 2]);
+        let cube = || box_mesh([1.0; 3], [2, 2, 2], [1.0; 3]).unwrap();
+        assert_eq!(split(with_fault(cube(), |x| x[2] == 0.5)), [9, 8, 8]);
+        // One half of the plane: its edge inside the body stays whole.
+        assert_eq!(split(with_fault(cube(), |x| x[2] == 0.5 && x[0] <= 0.5)), [3, 4, 4]);
+    }
+
+    #[test]
+    fn faults_that_branch_or_cannot_open_are_refused() {
+        let square = rectangle([1.0, 1.0], [4, 4], Diagonal::Alternating, [1.0; 2]).unwrap();
+        let mut branched = with_fault(square.clone(), |x| x[1] == 0.5 || (x[0] == 0.5 && x[1] >= 0.5));
+        let error = branched.split_along("fault").unwrap_err().to_string();
+        assert!(error.contains("branches"), "{error}");
+        let mut short = with_fault(square, |x| x[1] == 0.5 && (0.25..=0.5).contains(&x[0]));
+        let error = short.split_along("fault").unwrap_err().to_string();
+        assert!(error.contains("has no node away from its edge"), "{error}");
+    }
+}

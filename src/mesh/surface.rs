@@ -23,6 +23,28 @@ pub(super) struct DualGraph {
     pub adjacency: Vec<i32>,
 }
 
+impl DualGraph {
+    /// The graph with these edges in addition.
+    pub(super) fn with_pairs(&self, pairs: &[[u32; 2]]) -> Self {
+        let cells = self.offsets.len() - 1;
+        let mut more: Vec<Vec<i32>> = vec![Vec::new(); cells];
+        for &[a, b] in pairs.iter().filter(|[a, b]| a != b) {
+            more[a as usize].push(b as i32);
+            more[b as usize].push(a as i32);
+        }
+        let mut graph = Self { offsets: vec![0], adjacency: Vec::with_capacity(self.adjacency.len()) };
+        for (range, more) in self.offsets.windows(2).zip(&mut more) {
+            let known = &self.adjacency[range[0] as usize..range[1] as usize];
+            more.sort_unstable();
+            more.dedup();
+            graph.adjacency.extend(known);
+            graph.adjacency.extend(more.iter().filter(|cell| !known.contains(cell)));
+            graph.offsets.push(graph.adjacency.len() as i32);
+        }
+        graph
+    }
+}
+
 /// The parts of a mesh that are connected through shared facets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bodies {

@@ -3,18 +3,25 @@
 use super::{memory::require_for_cells, validate::validate};
 use crate::{
     error::{Error, Result, regular_file},
+    fem::space::mortar::{Facet, contributions},
     io::partitioned::{self, PartitionedFile},
-    job::{self, Loaded, MeshSource, Partition},
+    job::{self, Job, Loaded, MeshSource, Partition},
+    linear_algebra::tensor::norm,
     mesh::{
         GlobalMesh, Mesh, distribute,
         generate::{Blocks, Cuboid, Grading, Grid, Rectangle, Toward},
         gmsh::{self, AnyMesh},
-        partition::{Method, divide},
+        other_side,
+        partition::{Method, divide_with_pairs},
+        shape::facet_normal,
     },
     parallel::{agreement::Agreed, session::Session},
 };
 use mpi::{topology::Communicator, traits::Root};
-use std::path::Path;
+use std::{
+    collections::{BTreeSet, HashMap},
+    path::Path,
+};
 
 /// Generated meshes with more cells than this are generated in parts, each by its rank.
 const MOST_CELLS_ON_ONE_RANK: usize = 200_000;
@@ -34,16 +41,12 @@ impl Scene {
         let order = usize::from(loaded.job.mesh.order);
         let scene = match &loaded.job.mesh.source {
             MeshSource::Rectangle(of) => {
-                generated(session, blocks(of, rectangle), &loaded.job.mesh).map(Self::Two)?
+                generated(session, blocks(of, rectangle), &loaded.job).map(Self::Two)?
             }
-            MeshSource::Box(of) => {
-                generated(session, blocks(of, cuboid), &loaded.job.mesh).map(Self::Three)?
-            }
+            MeshSource::Box(of) => generated(session, blocks(of, cuboid), &loaded.job).map(Self::Three)?,
             MeshSource::File(path) => {
                 session.on_first(|| refuse_missing(path, loaded))?;
-                let faults = loaded.job.contact.iter().filter(|contact| contact.against.is_empty());
-                let faults: Vec<&str> = faults.flat_map(|contact| &contact.on).map(String::as_str).collect();
-                let (scene, is_second_order) = from_file(session, path, order, &faults)?;
+                let (scene, is_second_order) = from_file(session, path, &loaded.job)?;
                 if is_second_order && order == 1 {
                     loaded.warnings.push(
                         "the cells of the mesh file are of second order, but the run uses only their corners, joined by straight \
@@ -66,20 +69,55 @@ impl Scene {
 pub(super) fn split<const D: usize>(
     session: &Session,
     whole: Option<GlobalMesh<D>>,
-    order: usize,
+    job: &Job,
 ) -> Result<Mesh<D>, Agreed> {
     let split = |mesh: GlobalMesh<D>| {
-        let parts = divide(&mesh, session.ranks(), Method::KWay)?;
+        let facing = facing_cells(&mesh, &job.contact);
+        let parts = divide_with_pairs(&mesh, session.ranks(), Method::KWay, &facing)?;
         Ok::<_, Error>((mesh, parts))
     };
-    distribute(session, session.agree(whole.map(split).transpose())?, order)
+    distribute(session, session.agree(whole.map(split).transpose())?, usize::from(job.mesh.order))
+}
+
+/// The cells at facets that face each other in contact between bodies: ranks that have both exchange less.
+fn facing_cells<const D: usize>(mesh: &GlobalMesh<D>, contacts: &[job::Contact]) -> Vec<[u32; 2]> {
+    let facets_of = |names: &[String]| -> Vec<usize> {
+        let named = mesh.boundaries.iter().filter(|boundary| names.contains(&boundary.name));
+        named.flat_map(|boundary| boundary.facets.iter().map(|facet| *facet as usize)).collect()
+    };
+    let facet = |&at: &usize| {
+        let corners = mesh.facet_corners(at);
+        let normal = facet_normal(&corners);
+        let size = norm(&normal);
+        Facet { nodes: mesh.facets[at].to_vec(), corners, normal: normal.map(|n| n / size) }
+    };
+    let mut pairs = Vec::new();
+    for contact in contacts {
+        let faults = || contact.on.iter().map(|name| other_side(name)).collect();
+        let names: Vec<String> = if contact.against.is_empty() { faults() } else { contact.against.clone() };
+        let [on, against] = [facets_of(&contact.on), facets_of(&names)];
+        let cell_at: HashMap<u32, u32> = against
+            .iter()
+            .flat_map(|at| mesh.facets[*at].map(|node| (node, mesh.facet_cells[*at])))
+            .collect();
+        let [slaves, masters] = [&on, &against].map(|facets| facets.iter().map(facet).collect::<Vec<_>>());
+        // Each facet contributes to its corners.
+        let all = contributions(&slaves, &masters, [0.0, f64::INFINITY]);
+        for (at, of_facet) in on.iter().zip(all.chunks_exact(D)) {
+            let nodes = of_facet.iter().flat_map(|one| &one.masters);
+            let cells: BTreeSet<u32> = nodes.filter_map(|(node, _)| cell_at.get(node).copied()).collect();
+            pairs.extend(cells.into_iter().map(|cell| [mesh.facet_cells[*at], cell]));
+        }
+    }
+    pairs
 }
 
 fn generated<const D: usize, G: Grid<D>>(
     session: &Session,
     blocks: Result<Blocks<D, G>>,
-    of: &job::Mesh,
+    job: &Job,
 ) -> Result<Mesh<D>, Agreed> {
+    let of = &job.mesh;
     let (blocks, order) = (session.agree(blocks)?, usize::from(of.order));
     let cells = blocks.counts()[1].unwrap_or(usize::MAX);
     require_for_cells(session, D, cells)?;
@@ -88,7 +126,7 @@ fn generated<const D: usize, G: Grid<D>>(
         let piece = session.agree(blocks.part(session.rank(), session.ranks()))?;
         return Mesh::assemble(session, piece, blocks.names(), order);
     }
-    split(session, session.on_first(|| blocks.whole())?, order)
+    split(session, session.on_first(|| blocks.whole())?, job)
 }
 
 /// The blocks of a job as grids; a refusal tells which of several it is.
@@ -115,8 +153,9 @@ fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
     })
 }
 
-/// The mesh of a file, split along faults of these names if they are inside the body, and whether the file has cells of second order.
-fn from_file(session: &Session, path: &Path, order: usize, faults: &[&str]) -> Result<(Scene, bool), Agreed> {
+/// The mesh of a file, split along boundaries of contacts that are inside the body, and whether the file has cells of second order.
+fn from_file(session: &Session, path: &Path, job: &Job) -> Result<(Scene, bool), Agreed> {
+    let order = usize::from(job.mesh.order);
     let mut in_parts = session.is_first() && partitioned::is_meant(path);
     session.world().process_at_rank(0).broadcast_into(&mut in_parts);
     if in_parts {
@@ -130,7 +169,11 @@ fn from_file(session: &Session, path: &Path, order: usize, faults: &[&str]) -> R
     let read = || -> Result<AnyMesh> {
         let mut mesh = gmsh::read(path)?;
         let named = |error| Error::Refused(format!("{}: {error}", path.display()));
-        faults.iter().try_for_each(|fault| mesh.split_along(fault)).map_err(named)?;
+        let faults = job.contact.iter().filter(|contact| contact.against.is_empty());
+        faults
+            .flat_map(|contact| &contact.on)
+            .try_for_each(|fault| mesh.split_along(fault))
+            .map_err(named)?;
         Ok(mesh)
     };
     let whole = session.on_first(read)?;
@@ -142,10 +185,10 @@ fn from_file(session: &Session, path: &Path, order: usize, faults: &[&str]) -> R
     session.world().process_at_rank(0).broadcast_into(&mut facts[..]);
     let [dimension, is_second_order] = facts;
     let scene = match (dimension, whole) {
-        (_, Some(AnyMesh::Two(mesh))) => Scene::Two(split(session, Some(mesh), order)?),
-        (_, Some(AnyMesh::Three(mesh))) => Scene::Three(split(session, Some(mesh), order)?),
-        (2, None) => Scene::Two(split(session, None, order)?),
-        (_, None) => Scene::Three(split(session, None, order)?),
+        (_, Some(AnyMesh::Two(mesh))) => Scene::Two(split(session, Some(mesh), job)?),
+        (_, Some(AnyMesh::Three(mesh))) => Scene::Three(split(session, Some(mesh), job)?),
+        (2, None) => Scene::Two(split(session, None, job)?),
+        (_, None) => Scene::Three(split(session, None, job)?),
     };
     Ok((scene, is_second_order == 1))
 }

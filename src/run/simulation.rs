@@ -54,7 +54,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     /// Sets a job up on `mesh`, the whole mesh on rank 0 and nothing elsewhere; adds warnings about the mesh to those of the
     /// job. `S` is the number of stress components that go with the job's hypothesis. Collective.
     pub fn new(session: &Session, loaded: &mut Loaded, mesh: Option<GlobalMesh<D>>) -> Result<Self> {
-        let mesh = split(session, mesh, usize::from(loaded.job.mesh.order))?;
+        let mesh = split(session, mesh, &loaded.job)?;
         validate(session, &mesh, loaded)?;
         Self::on(session, loaded, mesh)
     }

@@ -2,7 +2,7 @@
 
 use crate::verification::scenes::{noise, stir};
 use clarke::mesh::{
-    GlobalMesh,
+    Boundary, GlobalMesh,
     generate::{Diagonal, box_mesh, rectangle},
 };
 use std::fmt::Write;
@@ -190,6 +190,8 @@ struct Content {
     is_quadratic: bool,
     /// Whether adaptive steps leave the range of lengths for which they are certified.
     leaves_range: bool,
+    /// Whether another body takes the place of obstacles.
+    has_base: bool,
 }
 
 /// The scene of this number in a frame.
@@ -208,8 +210,9 @@ pub fn scene<const D: usize>(number: u64, frame: Frame) -> Scene<D> {
         is_viscous: draw.chance(0.5),
         is_quadratic: draw.chance(0.3),
         leaves_range: false,
+        has_base: number % 4 == 3,
     };
-    let mesh = mesh::<D>(&mut draw);
+    let mesh = mesh::<D>(&mut draw, content.has_base);
     draw.line("[mesh]\nfile = \"mesh.msh\"");
     if content.is_quadratic {
         draw.line("order = 2");
@@ -254,7 +257,7 @@ fn second<const D: usize>(draw: &Draw<D>) -> String {
     format!("{}\n[initial]\nfrom = \"out/job\"\n", lines.join("\n"))
 }
 
-fn mesh<const D: usize>(draw: &mut Draw<D>) -> GlobalMesh<D> {
+fn mesh<const D: usize>(draw: &mut Draw<D>, has_base: bool) -> GlobalMesh<D> {
     let diagonal = [Diagonal::Right, Diagonal::Left, Diagonal::Alternating, Diagonal::Crossed]
         [(draw.between(0.0, 4.0) as usize).min(3)];
     let has_core = draw.chance(0.2);
@@ -267,9 +270,37 @@ fn mesh<const D: usize>(draw: &mut Draw<D>) -> GlobalMesh<D> {
         mesh.regions = vec!["body".into(), "core".into()];
         mesh.cell_regions = (0..mesh.cells.len() / (D + 1)).map(|cell| u16::from(cell % 3 == 0)).collect();
     }
+    if has_base {
+        add_base(&mut mesh, diagonal);
+    }
     let (angle, metre) = (draw.frame.angle, draw.frame.units[0]);
     mesh.nodes.iter_mut().for_each(|node| *node = turned(angle, *node).map(|x| x * metre));
     mesh
+}
+
+/// Distance in m of the body from another one below it.
+const ABOVE_BASE: f64 = 0.003;
+
+/// Adds a body below, whose mesh does not match and whose boundaries begin with `base_`.
+fn add_base<const D: usize>(mesh: &mut GlobalMesh<D>, diagonal: Diagonal) {
+    let plane = || rectangle([1.6, 0.5], [5, 2], diagonal, [1.0; 2]).expect("mesh");
+    let space = || box_mesh([1.6, 1.2, 0.5], [3, 3, 1], [1.0; 3]).expect("mesh");
+    let base: GlobalMesh<D> = if D == 2 { same_dimension(plane()) } else { same_dimension(space()) };
+    let base = stir(base, 0.03);
+    let [nodes, cells, facets] =
+        [mesh.nodes.len(), mesh.cells.len() / (D + 1), mesh.facets.len()].map(|count| count as u32);
+    let mut corner = [-0.15; D];
+    (corner[0], corner[D - 1]) = (-0.2, -0.5 - ABOVE_BASE);
+    mesh.nodes
+        .extend(base.nodes.iter().map(|node| -> [f64; D] { std::array::from_fn(|i| node[i] + corner[i]) }));
+    mesh.cells.extend(base.cells.iter().map(|node| node + nodes));
+    mesh.cell_regions.extend(&base.cell_regions);
+    mesh.facets.extend(base.facets.iter().map(|facet| facet.map(|node| node + nodes)));
+    mesh.facet_cells.extend(base.facet_cells.iter().map(|cell| cell + cells));
+    mesh.boundaries.extend(base.boundaries.into_iter().map(|boundary| Boundary {
+        name: format!("base_{}", boundary.name),
+        facets: boundary.facets.iter().map(|facet| facet + facets).collect(),
+    }));
 }
 
 /// The same mesh, whose dimension the compiler does not know.
@@ -421,6 +452,9 @@ fn loads<const D: usize>(draw: &mut Draw<D>, content: &Content) {
         "absorbing" => draw.line("absorbing = true"),
         _ => {}
     }
+    if content.has_base && (!content.is_dynamic || draw.chance(0.6)) {
+        draw.line("[[support]]\non = [\"base_bottom\"]\nfix = \"all\"");
+    }
     if draw.chance(0.5) {
         let (direction, factor) = (draw.direction(), draw.factor());
         let value = draw.varying(direction.map(|x| 3.0 * x), pressure, &factor);
@@ -482,6 +516,15 @@ fn contacts<const D: usize>(draw: &mut Draw<D>, content: &Content) {
         return;
     }
     draw.line("[[contact]]\non = [\"bottom\"]");
+    if content.has_base {
+        // Without the nodes that a support of the left side holds.
+        let mut right = [0.0; D];
+        right[0] = 1.0;
+        let terms = draw.turned(right).into_iter().zip(["x", "y", "z"]).map(|(e, x)| format!("{e:e}*{x}"));
+        let words = terms.collect::<Vec<_>>().join(" + ");
+        let limit = draw.number(0.5, LENGTH);
+        draw.line(format!("against = [\"base_top\"]\nwhere = \"{words} > {limit:e}\""));
+    }
     let redistributes = content.is_dynamic
         && content.scheme != "lagged_euler"
         && !content.is_viscous
@@ -491,7 +534,12 @@ fn contacts<const D: usize>(draw: &mut Draw<D>, content: &Content) {
     }
     let normal = normal_law(draw);
     let gap_of_obstacle = normal == Normal::Gap && draw.chance(0.6);
-    if gap_of_obstacle {
+    if content.has_base {
+        if gap_of_obstacle {
+            let at = draw.text.rfind("against = ").expect("another body");
+            draw.text.insert_str(at, "sliding = \"finite\"\n");
+        }
+    } else if gap_of_obstacle {
         obstacle(draw);
     } else if normal == Normal::Gap {
         let (gap, rate) = (draw.between(0.0, 0.004), draw.between(0.0, 0.3));
@@ -722,8 +770,16 @@ fn the_scenes_of_a_test_have_every_feature() {
         .collect();
     let with = |word: &str| (0..60).filter(|at| scenes[*at].0.contains(word)).collect::<Vec<usize>>();
     let stages: Vec<usize> = (0..60).filter(|at| scenes[*at].1).collect();
-    let words =
-        ["guesses", "\nmoment = ", "\nstrength = ", "land_on", "[time.adaptive]", "order = 2", "[[region]]"];
+    let words = [
+        "guesses",
+        "\nmoment = ",
+        "\nstrength = ",
+        "land_on",
+        "[time.adaptive]",
+        "order = 2",
+        "[[region]]",
+        "finite",
+    ];
     for (word, found) in words.into_iter().map(|word| (word, with(word))).chain([("a second stage", stages)])
     {
         println!("{word}: {found:?}");
