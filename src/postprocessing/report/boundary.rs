@@ -508,7 +508,7 @@ fn is_quantity(column: &str) -> bool {
 mod tests {
     use super::*;
     use crate::{
-        job::{Contact, Quadrature},
+        job::{Contact, Quadrature, Sliding},
         laws::{
             contact::{Compliance, NormalLaw},
             expression::Expression,
@@ -518,6 +518,9 @@ mod tests {
     fn laws(part: &str, stiffness: f64) -> Laws {
         let contact = Contact {
             on: vec!["bottom".into()],
+            against: Vec::new(),
+            closed: false,
+            sliding: Sliding::Small,
             part: Some(Scalar::Expression(Expression::parse(part).expect("expression"))),
             quadrature: Quadrature::Nodal,
             normal: NormalLaw::Compliance(Compliance { stiffness, exponent: 1.0, gap: None }),

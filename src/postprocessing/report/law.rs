@@ -165,7 +165,7 @@ impl Law {
 mod tests {
     use super::*;
     use crate::{
-        job::{Quadrature, Scalar},
+        job::{Quadrature, Scalar, Sliding},
         laws::contact::{Bound, Compliance, DampedResponse, NormalLaw, Symmetry, Unilateral},
     };
 
@@ -174,6 +174,9 @@ mod tests {
         let quadrature = Quadrature::Nodal;
         let contact = Contact {
             on,
+            against: Vec::new(),
+            closed: false,
+            sliding: Sliding::Small,
             part: None,
             quadrature,
             normal,

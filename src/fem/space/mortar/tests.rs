@@ -163,7 +163,14 @@ fn pair<const D: usize>(slave: &Surface<D>, master: &Surface<D>) -> Vec<Contribu
 fn by_node<const D: usize>(contributions: &[Contribution<D>]) -> BTreeMap<u32, Contribution<D>> {
     let mut sums: BTreeMap<u32, Contribution<D>> = BTreeMap::new();
     for one in contributions {
-        let empty = Contribution { node: one.node, weight: 0.0, whole: 0.0, gap: 0.0, masters: Vec::new() };
+        let empty = Contribution {
+            node: one.node,
+            normal: one.normal,
+            weight: 0.0,
+            whole: 0.0,
+            gap: 0.0,
+            masters: Vec::new(),
+        };
         let sum = sums.entry(one.node).or_insert(empty);
         sum.weight += one.weight;
         sum.whole += one.whole;
