@@ -552,11 +552,22 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 .for_each(|e| e.write_forces(self.evaluation, step, nodal, &mut surface));
         });
         for SurfaceForce { node, force, .. } in surface {
-            let sums = &mut forces[node as usize * D..][..D];
-            sums.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+            self.add_contact_force((node, &force), forces);
         }
         self.visit_stress_of(nodal, step, |batch| batch.scatter(&self.mesh, forces));
         Ok(())
+    }
+
+    /// Adds a force of contact in N at a node to `forces` (with ghosts), with the opposite ones on a body that the node faces.
+    pub fn add_contact_force(&self, (node, force): (u32, &Vector<D>), forces: &mut [f64]) {
+        let mut add = |node: u32, force: &Vector<D>| {
+            let sums = &mut forces[node as usize * D..][..D];
+            sums.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+        };
+        add(node, force);
+        if let Some(coupling) = &self.coupling {
+            coupling.opposites(&self.held, node, force, |master, force| add(master, &force));
+        }
     }
 
     /// The share of each point in the volume of its cell, cell by cell; empty where cells have one point.

@@ -6,6 +6,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{ELASTIC, Form, Step, Supports},
+        pairs::PairedNode,
         space::{Held, SurfacePoint, surface_points},
         state::State,
     },
@@ -264,6 +265,13 @@ fn residual<const D: usize, const S: usize>(
         let mut values = forces.local_mut()?;
         values.fill(0.0);
         body.add_forces_at_rest(state, &mut values)?;
+        if let Some(traction) = &state.contact_traction {
+            let traction = traction.owned()?;
+            for point in body.pairs.iter().flat_map(|pair| &pair.nodes).map(PairedNode::point) {
+                let force = point.value(&traction).map(|value| -point.weight * value);
+                body.add_contact_force((point.node, &force), &mut values);
+            }
+        }
         let rest = vec![0.0; values.len()];
         for contact in body.contacts.iter().filter(|contact| contact.needs_ghosts()) {
             contact.forces(&rest, |node, force| {
@@ -279,7 +287,8 @@ fn residual<const D: usize, const S: usize>(
     session.agree(body.write_loads(0.0, &mut loads))?;
     session.agree(forces.add_scaled(1.0, &loads))?;
     let mut of_node: BTreeMap<u32, Vec<SurfacePoint<D>>> = BTreeMap::new();
-    for contact in body.contacts.iter().filter(|contact| !contact.needs_ghosts()) {
+    let nodal = body.contacts.iter().filter(|contact| !contact.needs_ghosts() && !contact.is_paired());
+    for contact in nodal {
         for point in session.agree(surface_points(session, &body.mesh, contact.facets()))? {
             of_node.entry(point.node).or_default().push(body.held.whole(point));
         }

@@ -273,6 +273,21 @@ fn a_fault_ends_inside_a_body() {
 }
 
 #[test]
+fn a_stage_of_bodies_in_contact_starts_in_balance() {
+    let first = Case::of("pressed_blocks").set("checkpoint.every", "1").run_and_keep(2);
+    let from = first.folder().join("out").display().to_string();
+    for ranks in [1, 3] {
+        let second = Case::of("pressed_blocks").set("initial.from", &format!("'{from}'"));
+        let outcome = second.run_with(ranks, &[]).expect(0);
+        let text = format!("{}{}", outcome.stdout, outcome.stderr);
+        assert!(!text.contains("out of balance"), "{text}");
+        for pressure in pressures(&second.results()) {
+            assert!((pressure - 5.0).abs() < 1e-10, "{pressure} Pa");
+        }
+    }
+}
+
+#[test]
 fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
     let swapped = |on: &str, against: &str| {
         Case::of("pressed_blocks")
