@@ -4,13 +4,13 @@ use super::hanging::refuse_hanging_nodes;
 use super::shape::{self, longest_edge, tangent_measures};
 #[cfg(test)]
 use super::surface::Topology;
+use super::surface_names::SurfaceNames;
 use super::tags::{Tags, place};
 use super::{GlobalMesh, Mesh};
 use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
 use crate::parallel::session::Session;
 use serde::Serialize;
-use std::collections::BTreeSet;
 
 /// Cells whose [quality](super::shape::quality) is smaller are called poor: they reduce the accuracy and the condition of the
 /// matrices.
@@ -115,41 +115,6 @@ pub(super) fn nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result
     let names = SurfaceNames::of(mesh);
     refuse_coincident_nodes(mesh, &names, tags)?;
     refuse_hanging_nodes(mesh, &names, tags)
-}
-
-/// The named boundaries of each node and of each facet. Two bodies, or the sides of a crack, may touch where their boundaries have names of
-/// their own.
-pub(super) struct SurfaceNames {
-    of_nodes: Vec<BTreeSet<usize>>,
-    of_facets: Vec<BTreeSet<usize>>,
-}
-
-impl SurfaceNames {
-    fn of<const D: usize>(mesh: &GlobalMesh<D>) -> Self {
-        let mut of_nodes = vec![BTreeSet::new(); mesh.nodes.len()];
-        let mut of_facets = vec![BTreeSet::new(); mesh.facets.len()];
-        for (name, boundary) in mesh.boundaries.iter().enumerate() {
-            for &facet in &boundary.facets {
-                of_facets[facet as usize].insert(name);
-                mesh.facets[facet as usize].iter().for_each(|&node| {
-                    of_nodes[node as usize].insert(name);
-                });
-            }
-        }
-        Self { of_nodes, of_facets }
-    }
-
-    /// Whether nodes at the same place are those of two surfaces: each is on a boundary that the other is not on.
-    fn are_of_two_surfaces(&self, a: u32, b: u32) -> bool {
-        let [a, b] = [a, b].map(|node| &self.of_nodes[node as usize]);
-        !a.is_subset(b) && !b.is_subset(a)
-    }
-
-    /// Whether a node on a facet is one of another surface: both are on boundaries, and on none together.
-    pub(super) fn is_of_another_surface(&self, node: u32, facet: usize) -> bool {
-        let (node, facet) = (&self.of_nodes[node as usize], &self.of_facets[facet]);
-        !node.is_empty() && !facet.is_empty() && node.is_disjoint(facet)
-    }
 }
 
 /// Sweeps the nodes along a direction in which no two nodes of a grid have the same position.

@@ -1,8 +1,8 @@
 //! Hanging nodes: nodes on the surface of one cell that belong to another.
 
 use super::GlobalMesh;
-use super::check::SurfaceNames;
 use super::shape::longest_edge;
+use super::surface_names::SurfaceNames;
 use super::tags::{Tags, place};
 use super::tree::BoxTree;
 use crate::error::{Error, Result};

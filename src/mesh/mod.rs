@@ -18,6 +18,7 @@ pub mod shape;
 mod skeleton;
 mod split;
 pub mod surface;
+mod surface_names;
 mod tags;
 pub mod tree;
 

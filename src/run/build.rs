@@ -3,6 +3,7 @@
 use super::{
     materials::Materials,
     pairs::{coupling, refuse_conflicts},
+    parts::{centre_of, part_of},
 };
 use crate::{
     error::{Error, Result},
@@ -13,20 +14,20 @@ use crate::{
             Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
             surface_effects,
         },
-        pairs::{Pair, nodes_of},
+        pairs::{Pair, PairedNode, nodes_of},
         space::{
             Geometry, Held, SurfacePoint, cell_rule, facets, place_in_cell, surface_means, surface_points,
         },
         state::State,
     },
-    job::{self, Job, Scalar},
+    job::{self, Job},
     laws::{
         contact::{Gap, NormalResponse, Quadrature},
         material::{ByMaterial, Hypothesis, Material},
     },
     linear_algebra::tensor::{Mandel, Vector, component, norm},
     mesh::Mesh,
-    parallel::{agreement::Agreed, session::Session},
+    parallel::session::Session,
     solver::stepping::evaluation,
 };
 use std::collections::BTreeSet;
@@ -78,8 +79,14 @@ pub(super) fn body<const D: usize, const S: usize>(
         }
         contacts.push(laws);
     }
-    refuse_conflicts(session, job, &mesh, (&contacts, coupling.as_ref()), &held)?;
-    let surface_effects = surface_effects(session, &job.contact, &mesh, (&parts, &pairs), &held)?;
+    let points = |at: usize| -> Result<Vec<SurfacePoint<D>>> {
+        let points = match nodes_of(&pairs, at) {
+            Some(paired) => paired.iter().map(PairedNode::point).collect(),
+            None => surface_points(session, &mesh, &parts[at])?,
+        };
+        Ok(points.into_iter().map(|point| held.whole(point)).collect())
+    };
+    let surface_effects = surface_effects(session, &job.contact, &mesh, points)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
@@ -104,6 +111,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.paired_displacement = Some(state.displacement.like()?);
     }
     (body.coupling, body.pairs) = (coupling, pairs);
+    refuse_conflicts(session, job, &body)?;
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
         let mut facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
@@ -267,34 +275,6 @@ fn impedances<const S: usize>(material: &Material<f64>) -> Option<[f64; 2]> {
     let (density, law) = (material.density?, material.elasticity?.tensor(Hypothesis::of(S)));
     let moduli = [law.volumetric + law.shear, 0.5 * law.shear];
     Some(moduli.map(|modulus| (density * modulus).sqrt()))
-}
-
-/// The facets of the boundaries of a table on this rank at whose centre the expression is not 0. Collective.
-pub(super) fn part_of<const D: usize>(
-    session: &Session,
-    mesh: &Mesh<D>,
-    (table, on): (&str, &[String]),
-    part: Option<&Scalar>,
-) -> Result<Vec<u32>, Agreed> {
-    let mut facets = facets(mesh, on);
-    let Some(part) = part else { return Ok(facets) };
-    let refused = |words: String| {
-        let on = on.join(", ");
-        Err(Error::Refused(format!("{table} on {on}: `where` {words}; correct the expression")))
-    };
-    let value = |facet: u32| part.evaluate(0.0, &centre_of(mesh, facet));
-    let wrong = facets.iter().find(|facet| value(**facet).is_nan());
-    let words = |facet: &u32| refused(format!("is not a number at {:?} m", centre_of(mesh, *facet)));
-    session.agree(wrong.map_or(Ok(()), words))?;
-    facets.retain(|&facet| value(facet) != 0.0);
-    let is_empty = session.total(facets.len()) == 0;
-    session.agree(if is_empty { refused("holds at no facet of these boundaries".into()) } else { Ok(()) })?;
-    Ok(facets)
-}
-
-fn centre_of<const D: usize>(mesh: &Mesh<D>, facet: u32) -> Vector<D> {
-    let corners = mesh.facet_corners(facet);
-    std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / D as f64)
 }
 
 /// Refuses facets of a part of a boundary that are among the `taken` ones of other parts, which they join.

@@ -14,6 +14,7 @@ mod memory;
 mod obstacles;
 mod outputs;
 mod pairs;
+mod parts;
 mod phases;
 mod reactions;
 mod restored;

@@ -1,11 +1,11 @@
 //! Contact between bodies: finds what boundaries face, before the body is built, and refuses what cannot be solved.
 
-use super::build::part_of;
+use super::parts::part_of;
 use crate::{
     error::{Error, Result},
     fem::{
+        body::Body,
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
-        effect::Contact,
         pairs::{Pair, shares},
         space::{Held, facets},
     },
@@ -131,14 +131,12 @@ pub(super) fn coupling<const D: usize>(
 
 /// Refuses nodes on the side `on` of a pair that supports hold along the normal, or tangentially where friction acts, and not what they
 /// face; and nodes that belong to another contact. Collective.
-pub(super) fn refuse_conflicts<const D: usize>(
+pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
-    mesh: &Mesh<D>,
-    (contacts, coupling): (&[Contact<D>], Option<&Coupling<D>>),
-    held: &Held<D>,
+    body: &Body<D, S>,
 ) -> Result<(), Agreed> {
-    let Some(coupling) = coupling else { return Ok(()) };
+    let Body { mesh, contacts, coupling: Some(coupling), held, .. } = body else { return Ok(()) };
     let masters_of: BTreeMap<usize, &[(u32, f64)]> =
         coupling.slaves().map(|(slave, masters)| (slave as usize, masters)).collect();
     // The share of the masters that is held along a direction as well.

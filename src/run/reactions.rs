@@ -1,6 +1,6 @@
 //! The reactions that elastic supports of a stage take over from supports of the stage before.
 
-use super::build::{given_resistances, part_of};
+use super::{build::given_resistances, parts::part_of};
 use crate::{
     error::{Error, Result},
     fem::{

@@ -36,15 +36,12 @@ mod viscous_stress;
 
 use crate::{
     error::{Error, Result},
-    fem::{
-        pairs::{Pair, PairedNode, nodes_of},
-        space::{CellRun, Geometry, Held, surface_points},
-    },
+    fem::space::{CellRun, Geometry, SurfacePoint},
     job::{self, Material},
     laws::material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
     linear_algebra::{simd::Pack, tensor::Mandel},
     mesh::Mesh,
-    parallel::{agreement::Agreed, session::Session},
+    parallel::session::Session,
 };
 
 use crate::laws::step::quantity;
@@ -146,24 +143,16 @@ pub fn surface_effects<const D: usize>(
     session: &Session,
     contacts: &[job::Contact],
     mesh: &Mesh<D>,
-    (facets, pairs): (&[Vec<u32>], &[Pair<D>]),
-    held: &Held<D>,
+    points: impl Fn(usize) -> Result<Vec<SurfacePoint<D>>>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
-    for (at, (contact, facets)) in contacts.iter().zip(facets).enumerate() {
-        let points = || {
-            let points = match nodes_of(pairs, at) {
-                Some(paired) => paired.iter().map(PairedNode::point).collect(),
-                None => surface_points(session, mesh, facets)?,
-            };
-            Ok::<Vec<_>, Agreed>(points.into_iter().map(|point| held.whole(point)).collect())
-        };
+    for (at, contact) in contacts.iter().enumerate() {
         if let Some(law) = contact.memory {
-            foundations.push((at, law, points()?));
+            foundations.push((at, law, points(at)?));
         }
         if let Some(law) = contact.adhesion {
-            bonded.push(Bonded { contact: at, law, points: points()? });
+            bonded.push(Bonded { contact: at, law, points: points(at)? });
         }
     }
     if !bonded.is_empty() {

@@ -30,6 +30,7 @@
 //! For the first three the multiplier space has the phi_m as its basis, and N^-1 is known: the functions q_j
 //! at the nodes, because q_j = sum_m q_j(x_m) phi_m.
 
+use crate::linear_algebra::tensor::Vector;
 use geometry::{
     Plane, Point, Shape, clip, dot, inverse, measure_and_centroid, oriented, quadrature, sides, subtract,
 };
@@ -39,12 +40,12 @@ use parry3d_f64::{
     partitioning::{Bvh, BvhBuildStrategy, BvhNode},
 };
 
+mod facet;
 mod geometry;
 #[cfg(test)]
 mod tests;
 
-/// Components along the axes.
-pub type Vector<const D: usize> = [f64; D];
+pub use facet::Facet;
 
 /// A master facet faces a slave facet if its normal has a component along the slave normal below this.
 const FACING: f64 = -0.2;
@@ -60,52 +61,6 @@ const SMALLEST_SHARE: f64 = 1e-9;
 const SMALLEST_PIVOT: f64 = 1e-10;
 /// The width by which the space above a slave facet is searched in excess, as a share of its diameter.
 const SEARCH_MARGIN: f64 = 1e-6;
-
-/// A straight facet of a surface: a segment in two dimensions, a triangle in three.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Facet<const D: usize> {
-    /// Global numbers of the nodes: the D corners, and for quadratic fields then the nodes in the middle of
-    /// the sides: 1 in two dimensions; in three dimensions 3, of the sides between corners 0 and 1, 1 and 2,
-    /// 2 and 0.
-    pub nodes: Vec<u32>,
-    /// Places of the corners in m, in the order of `nodes` and of any orientation.
-    pub corners: [Vector<D>; D],
-    /// The outward unit normal.
-    pub normal: Vector<D>,
-}
-
-impl<const D: usize> Facet<D> {
-    fn is_quadratic(&self) -> bool {
-        self.nodes.len() > D
-    }
-
-    /// The index in `nodes` of the first node that carries a law; the corners of quadratic triangles carry
-    /// none, because the integrals of their shape functions are 0.
-    fn first_law(&self) -> usize {
-        if D == 3 && self.is_quadratic() { D } else { 0 }
-    }
-
-    /// The integral of the shape function of a node over the whole facet, as a share of its length or area.
-    fn share(&self, node: usize) -> f64 {
-        match (D, self.is_quadratic()) {
-            (2, true) => [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0][node],
-            (_, true) => [0.0, 0.0, 0.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0][node],
-            _ => 1.0 / D as f64,
-        }
-    }
-
-    fn shares_node(&self, other: &Self) -> bool {
-        self.nodes.iter().any(|node| other.nodes.contains(node))
-    }
-
-    /// The smallest and largest coordinates in m.
-    fn bounds(&self) -> [Vector<D>; 2] {
-        [f64::min, f64::max].map(|choose| {
-            let [first, rest @ ..] = self.corners.as_slice() else { return [f64::NAN; D] };
-            rest.iter().fold(*first, |bound, corner| std::array::from_fn(|i| choose(bound[i], corner[i])))
-        })
-    }
-}
 
 /// What one slave facet gives to one of its nodes that carries a law: integrals over the part of the facet
 /// that master facets cover. Those of a node are summed over the facets around it; all are 0 where nothing is

@@ -1,6 +1,7 @@
 //! Planes of facets, clipping of segments and triangles, quadrature and shape functions.
 
-use super::{Facet, Vector};
+use super::facet::Facet;
+use crate::linear_algebra::tensor::Vector;
 
 /// Coordinates in m in the plane of a facet; in two dimensions the second one is 0.
 pub(super) type Point = [f64; 2];

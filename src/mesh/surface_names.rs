@@ -1,0 +1,39 @@
+//! The names of the boundaries of nodes and facets.
+
+use super::GlobalMesh;
+use std::collections::BTreeSet;
+
+/// The named boundaries of each node and of each facet. Two bodies, or the sides of a crack, may touch where their boundaries have names of
+/// their own.
+pub(super) struct SurfaceNames {
+    of_nodes: Vec<BTreeSet<usize>>,
+    of_facets: Vec<BTreeSet<usize>>,
+}
+
+impl SurfaceNames {
+    pub(super) fn of<const D: usize>(mesh: &GlobalMesh<D>) -> Self {
+        let mut of_nodes = vec![BTreeSet::new(); mesh.nodes.len()];
+        let mut of_facets = vec![BTreeSet::new(); mesh.facets.len()];
+        for (name, boundary) in mesh.boundaries.iter().enumerate() {
+            for &facet in &boundary.facets {
+                of_facets[facet as usize].insert(name);
+                mesh.facets[facet as usize].iter().for_each(|&node| {
+                    of_nodes[node as usize].insert(name);
+                });
+            }
+        }
+        Self { of_nodes, of_facets }
+    }
+
+    /// Whether nodes at the same place are those of two surfaces: each is on a boundary that the other is not on.
+    pub(super) fn are_of_two_surfaces(&self, a: u32, b: u32) -> bool {
+        let [a, b] = [a, b].map(|node| &self.of_nodes[node as usize]);
+        !a.is_subset(b) && !b.is_subset(a)
+    }
+
+    /// Whether a node on a facet is one of another surface: both are on boundaries, and on none together.
+    pub(super) fn is_of_another_surface(&self, node: u32, facet: usize) -> bool {
+        let (node, facet) = (&self.of_nodes[node as usize], &self.of_facets[facet]);
+        !node.is_empty() && !facet.is_empty() && node.is_disjoint(facet)
+    }
+}
