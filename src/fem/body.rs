@@ -9,7 +9,7 @@ pub use traffic::PassBytes;
 use crate::{
     error::Result,
     fem::{
-        coupling::{Coupling, add_between, seen_by_contacts},
+        coupling::{Coupling, Seen, add_between, seen_by_contacts},
         effect::{
             Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
             HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, Quantity,
@@ -29,7 +29,7 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-use std::{borrow::Cow, cell::RefCell};
+use std::cell::RefCell;
 
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
@@ -168,7 +168,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 
     /// Local nodal values with ghosts as contacts see them: at slave nodes relative to the surface that they face.
-    pub fn seen_by_contacts<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
+    pub fn seen_by_contacts<'a>(&self, values: &'a [f64]) -> Seen<'a> {
         seen_by_contacts(self.coupling.as_ref(), &self.held, values)
     }
 

@@ -14,7 +14,7 @@ use crate::{
     error::Result,
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
-        tensor::{Vector, add_scaled},
+        tensor::Vector,
     },
     mesh::Mesh,
     parallel::{
@@ -24,9 +24,10 @@ use crate::{
     },
 };
 use std::{
-    borrow::Cow,
+    cell::RefCell,
     collections::{BTreeMap, BTreeSet},
-    ops::Range,
+    ops::{Deref, Range},
+    rc::Rc,
 };
 
 /// Adds the forces that act on bodies at their surface; where they act between bodies, with the opposite ones.
@@ -47,8 +48,53 @@ pub fn seen_by_contacts<'a, const D: usize>(
     coupling: Option<&Coupling<D>>,
     held: &Held<D>,
     values: &'a [f64],
-) -> Cow<'a, [f64]> {
-    coupling.map_or(Cow::Borrowed(values), |coupling| coupling.relative(held, values))
+) -> Seen<'a> {
+    coupling.map_or(Seen::Same(values), |coupling| coupling.relative(held, values))
+}
+
+/// Local nodal values as contacts see them.
+#[derive(Debug)]
+pub enum Seen<'a> {
+    /// Those of the bodies.
+    Same(&'a [f64]),
+    /// With relative values at slave nodes.
+    Relative(Buffer),
+}
+
+impl Deref for Seen<'_> {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        match self {
+            Self::Same(values) => values,
+            Self::Relative(buffer) => &buffer.values,
+        }
+    }
+}
+
+/// Memory that is used again: steps allocate none.
+#[derive(Debug)]
+pub struct Buffer {
+    values: Vec<f64>,
+    pool: Pool,
+}
+
+/// The buffers that are not in use.
+type Pool = Rc<RefCell<Vec<Vec<f64>>>>;
+
+impl Buffer {
+    /// An empty one.
+    fn of(pool: &Pool) -> Self {
+        let mut values = pool.borrow_mut().pop().unwrap_or_default();
+        values.clear();
+        Self { values, pool: pool.clone() }
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        self.pool.borrow_mut().push(std::mem::take(&mut self.values));
+    }
 }
 
 /// The share of a master node in the surface that a slave node faces, by global numbers.
@@ -73,6 +119,7 @@ pub struct Coupling<const D: usize> {
     masters: Vec<(u32, f64)>,
     /// The blocks of `T` of all ranks: for each slave node, by global numbers, its masters and how they move its free components.
     blocks: BTreeMap<u32, Vec<(u32, Vec<f64>)>>,
+    pool: Pool,
 }
 
 impl<const D: usize> Coupling<D> {
@@ -110,7 +157,7 @@ impl<const D: usize> Coupling<D> {
         for (pair, block) in numbers.chunks_exact(2).zip(values.chunks_exact(D * D)) {
             blocks.entry(pair[0]).or_default().push((pair[1], block.to_vec()));
         }
-        Ok(Self { owned: mesh.owned, slaves, masters, blocks })
+        Ok(Self { owned: mesh.owned, slaves, masters, blocks, pool: Pool::default() })
     }
 
     /// The slave nodes owned here with their masters and the shares of these, by local numbers.
@@ -136,25 +183,26 @@ impl<const D: usize> Coupling<D> {
     }
 
     /// Local values, with ghosts, whose values at slave nodes owned here are relative to the surface that they face.
-    pub fn relative<'a>(&self, held: &Held<D>, values: &'a [f64]) -> Cow<'a, [f64]> {
+    pub fn relative<'a>(&self, held: &Held<D>, values: &'a [f64]) -> Seen<'a> {
         if self.slaves.is_empty() {
-            return Cow::Borrowed(values);
+            return Seen::Same(values);
         }
-        let mut relative = values.to_vec();
-        self.add_masters(-1.0, held, &mut relative);
-        Cow::Owned(relative)
+        let mut relative = Buffer::of(&self.pool);
+        relative.values.extend_from_slice(values);
+        self.add_masters(-1.0, held, &mut relative.values);
+        Seen::Relative(relative)
     }
 
     /// Lets `add` add the forces that act between the bodies at slave nodes owned here, and adds the opposite ones at their masters, whose
     /// ghosts count. All values are local.
     pub fn add_between(&self, held: &Held<D>, forces: &mut [f64], add: impl FnOnce(&mut [f64])) {
-        let at = |slave: u32, forces: &[f64]| -> Vector<D> {
-            std::array::from_fn(|i| forces[slave as usize * D + i])
-        };
-        let before: Vec<Vector<D>> = self.slaves().map(|(slave, _)| at(slave, forces)).collect();
+        let mut before = Buffer::of(&self.pool);
+        for (slave, _) in self.slaves() {
+            before.values.extend_from_slice(&forces[slave as usize * D..][..D]);
+        }
         add(forces);
-        for ((slave, _), before) in self.slaves().zip(before) {
-            let force = add_scaled(&at(slave, forces), -1.0, &before);
+        for ((slave, _), before) in self.slaves().zip(before.values.chunks_exact(D)) {
+            let force = std::array::from_fn(|i| forces[slave as usize * D + i] - before[i]);
             self.opposites(held, slave, &force, |master, force| {
                 (0..D).for_each(|i| forces[master as usize * D + i] += force[i]);
             });
