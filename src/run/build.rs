@@ -111,6 +111,10 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.paired_displacement = Some(state.displacement.like()?);
     }
     (body.coupling, body.pairs) = (coupling, pairs);
+    if body.paired_displacement.is_some() {
+        // As a restart does.
+        body.form_pairs(session, &state.displacement)?;
+    }
     refuse_conflicts(session, job, &body)?;
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);

@@ -127,6 +127,10 @@ impl Flow {
         (held, coupling): (&Held<D>, Option<&Coupling<D>>),
         values: &DistributedVector,
     ) -> Result<()> {
+        if coupling.is_some() {
+            // Nodes that vectors of Newton's method lack, among which masters may be, move with none of the unknowns.
+            self.values.fill(0.0)?;
+        }
         self.extend::<D>(values)?;
         match coupling {
             Some(coupling) => coupling.make_absolute(held, &mut self.values),
