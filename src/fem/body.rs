@@ -140,7 +140,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(())
     }
 
-    /// The constant matrix, in the unknowns of a step, of a step in which velocity and displacement change by `length` in s times their rates. Collective.
+    /// The constant matrix, in its unknowns, of a step in which velocity and displacement change by `length` in s times their rates.
+    /// Collective.
     pub fn matrix(&self, session: &Session, length: f64) -> Result<BlockRows, Agreed> {
         let rows = self.matrix_of_bodies(session, length)?;
         match &self.coupling {
@@ -220,11 +221,6 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         self.pairs = pairs;
         Ok(())
-    }
-
-    /// Replaces velocities by those that are the unknowns of a step: at slave nodes relative to the surface that they face. Collective.
-    pub fn make_relative(&self, velocity: &mut DistributedVector) -> Result<()> {
-        self.coupling.as_ref().map_or(Ok(()), |coupling| coupling.make_relative(&self.held, velocity))
     }
 
     /// Adds the forces of the converged state at the start of a step to `forces` (with ghosts), and gives the energies that are known

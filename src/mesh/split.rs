@@ -40,10 +40,14 @@ impl Groups {
 impl<const D: usize> GlobalMesh<D> {
     /// Splits the mesh along the facets inside the body that have this name: their nodes become two, except on the edge of the surface
     /// inside the body, where cells stay joined. The sides become two boundaries: one with this name, and [`other_side`]. Refused where
-    /// the surface branches, has one side only, or has no node that can become two.
+    /// the surface branches, meets another fault, has one side only, or has no node that can become two.
     pub fn split_along(&mut self, name: &str) -> Result<()> {
         let Some(at) = self.inner_groups.iter().position(|group| group.name == name) else { return Ok(()) };
         let facets = self.inner_facets[at].clone();
+        if facets.is_empty() {
+            let place = &self.inner_groups[at].place;
+            return Err(Error::Refused(format!("the fault \"{name}\", around {place}, meets another fault")));
+        }
         let refused = |words: &str, facet: &Sorted<D>| {
             let corners = facet.map(|node| self.nodes[node as usize]);
             Err(Error::Refused(format!("the fault \"{name}\" {words} around {}", place(&centroid(&corners)))))
@@ -147,11 +151,9 @@ impl<const D: usize> GlobalMesh<D> {
         self.boundaries.push(Boundary { name: other_side(name), facets: other });
         self.inner_groups.remove(at);
         self.inner_facets.remove(at);
-        let crosses = |facets: &Vec<Sorted<D>>| facets.iter().flatten().any(|node| split.contains_key(node));
-        if let Some(other) = self.inner_facets.iter().position(crosses) {
-            // Their facets would have nodes of one side or the other.
-            self.inner_facets[other].clear();
-        }
+        // Facets of faults that meet this one would have nodes of one side or the other.
+        let meets = |facets: &Vec<Sorted<D>>| facets.iter().flatten().any(|node| split.contains_key(node));
+        self.inner_facets.iter_mut().filter(|facets| meets(facets)).for_each(Vec::clear);
         Ok(())
     }
 
@@ -255,5 +257,16 @@ mod tests {
         let mut short = with_fault(square, |x| x[1] == 0.5 && (0.25..=0.5).contains(&x[0]));
         let error = short.split_along("fault").unwrap_err().to_string();
         assert!(error.contains("has no node away from its edge"), "{error}");
+    }
+
+    #[test]
+    fn a_fault_that_meets_another_is_refused() {
+        let square = rectangle([1.0, 1.0], [4, 4], Diagonal::Alternating, [1.0; 2]).unwrap();
+        let mut first = with_fault(square, |x| x[1] == 0.5);
+        first.inner_groups[0].name = "other".into();
+        let mut both = with_fault(first, |x| x[0] == 0.5);
+        both.split_along("other").unwrap();
+        let error = both.split_along("fault").unwrap_err().to_string();
+        assert!(error.contains("meets another fault"), "{error}");
     }
 }

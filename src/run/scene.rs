@@ -72,7 +72,7 @@ pub(super) fn split<const D: usize>(
     job: &Job,
 ) -> Result<Mesh<D>, Agreed> {
     let split = |mesh: GlobalMesh<D>| {
-        let facing = facing_cells(&mesh, &job.contact);
+        let facing = if session.ranks() == 1 { Vec::new() } else { facing_cells(&mesh, &job.contact) };
         let parts = divide_with_pairs(&mesh, session.ranks(), Method::KWay, &facing)?;
         Ok::<_, Error>((mesh, parts))
     };

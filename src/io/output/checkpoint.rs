@@ -58,7 +58,8 @@ pub struct Header {
     /// The digest of the checkpoint from which the run started, if it started from one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_state: Option<String>,
-    /// For each contact: the largest penetration in m so far of points that are free to move, and of points that supports hold.
+    /// For each contact: the largest penetration in m so far of points that are free to move, and of points that supports hold; the largest
+    /// slip along another body as a share of a facet.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub closeness: Vec<Vec<Option<f64>>>,
     /// Digest of the mesh.
