@@ -10,9 +10,15 @@ use crate::laws::{
     nearest::nearest,
 };
 
-/// The variables of expressions by name.
-const VARIABLES: [(&str, Variable); 4] =
-    [("t", Variable::T), ("x", Variable::X), ("y", Variable::Y), ("z", Variable::Z)];
+/// The variables of a formula with this list of them, such as "v, d", or time and place, if it is a choice among these.
+fn of_formula(variables: &str) -> Vec<Variable> {
+    let named = Variable::ALL.iter().filter(|variable| variables.split(", ").any(|name| name == variable.name()));
+    let named: Vec<Variable> = named.copied().collect();
+    match named.iter().all(|variable| Variable::OF_TIME_AND_PLACE.contains(variable)) {
+        true => Variable::OF_TIME_AND_PLACE.to_vec(),
+        false => named,
+    }
+}
 
 /// The faults of single keys, and what could not be read. Where a required key is missing or a value has another type, the document
 /// gets a neutral value, so that it fills its structs; it loses unknown keys.
@@ -274,7 +280,9 @@ impl Walk<'_> {
             self.faults.push(Fault::new(node.at.clone(), format!("`{path}` is empty"), "a name is expected"));
         }
         match schema.text("format") {
-            Some("expression") => return self.expression(node, text, path),
+            Some("expression") => {
+                return self.expression(node, text, schema.text("variables").unwrap_or_default(), path);
+            }
             Some("name") => {
                 let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
                 if text.is_empty() || !text.chars().all(fits) {
@@ -288,8 +296,9 @@ impl Walk<'_> {
         true
     }
 
-    fn expression(&mut self, node: &Node, text: &str, path: &str) -> bool {
-        let parsed = Expression::parse(text);
+    /// Checks an expression in time and place, or a formula in these variables, if others are among them.
+    fn expression(&mut self, node: &Node, text: &str, variables: &str, path: &str) -> bool {
+        let parsed = Expression::parse_in(text, &of_formula(variables));
         if let Err(fault) = &parsed {
             // Within a string without escape sequences the exact position of the fault is known.
             let (start, end) = (node.at.start + 1, node.at.end.saturating_sub(1));
@@ -314,14 +323,15 @@ impl Walk<'_> {
                 return;
             }
             Value::Text(text) => Expression::parse(text).ok().and_then(|expression| {
-                VARIABLES.iter().find(|(name, variable)| !is_allowed(name) && expression.uses(*variable))
+                let mut all = Variable::OF_TIME_AND_PLACE.iter();
+                all.find(|variable| !is_allowed(variable.name()) && expression.uses(**variable))
             }),
             // A table of values over time.
-            Value::Table(_) => VARIABLES.iter().find(|(name, _)| *name == "t" && !is_allowed(name)),
+            Value::Table(_) => Some(&Variable::T).filter(|time| !is_allowed(time.name())),
             _ => None,
         };
-        if let Some((name, _)) = other {
-            let message = format!("`{path}` can't depend on {name}");
+        if let Some(variable) = other {
+            let message = format!("`{path}` can't depend on {}", variable.name());
             self.faults.push(Fault::new(node.at.clone(), message, "").help(format!("use {variables} only")));
         }
     }

@@ -40,15 +40,15 @@ pub(crate) fn header(path: &str) -> String {
     if is_item { format!("[[{}]]", keys.join(".")) } else { format!("[{}]", keys.join(".")) }
 }
 
-/// The root of an increasing function that is negative at `low` and not negative at `high`, by Newton's method within a bracket.
-/// `function` returns value and derivative.
+/// The root of an increasing function that is negative at `low` and not negative at `high`, by Newton's method within a bracket, with
+/// bisection where its steps leave the bracket or do not become half as long. `function` returns value and derivative.
 pub(crate) fn increasing_root(
     mut low: f64,
     mut high: f64,
     start: f64,
     mut function: impl FnMut(f64) -> [f64; 2],
 ) -> f64 {
-    let mut at = start;
+    let (mut at, mut last) = (start, f64::INFINITY);
     for _ in 0..200 {
         let [value, slope] = function(at);
         if value > 0.0 {
@@ -57,7 +57,8 @@ pub(crate) fn increasing_root(
             low = at
         }
         let newton = at - value / slope;
-        let next = if low < newton && newton < high {
+        let converges = (newton - at).abs() <= 0.5 * last || !low.is_finite();
+        let next = if low < newton && newton < high && converges {
             newton
         } else if high.is_finite() {
             0.5 * (low + high)
@@ -67,18 +68,19 @@ pub(crate) fn increasing_root(
         if (next - at).abs() <= 2.0 * f64::EPSILON * next.abs() || value == 0.0 {
             return if value == 0.0 { at } else { next };
         }
+        last = (next - at).abs();
         at = next;
     }
     at
 }
 
-/// Methods of an enum of laws that delegate to the chosen law, through the `match` of the macro `$each`.
+/// Methods of an enum of laws that delegate to the chosen law, through the `match` of the macro `$each`: its own, or those of a trait.
 macro_rules! calls {
-    ($each:ident $family:ident $contract:ident: $($method:ident($($argument:ident: $kind:ty),*) -> $out:ty;)*) => {
+    ($visibility:vis $each:ident $family:ident $contract:ident: $($method:ident($($argument:ident: $kind:ty),*) -> $out:ty;)*) => {
         $(
             #[doc = concat!("See [`", stringify!($contract), "::", stringify!($method), "`].")]
             #[inline]
-            pub fn $method(&self $(, $argument: $kind)*) -> $out {
+            $visibility fn $method(&self $(, $argument: $kind)*) -> $out {
                 $each!($family, self, law => $contract::$method(law $(, $argument)*))
             }
         )*

@@ -74,8 +74,8 @@ pub(super) fn body<const D: usize, const S: usize>(
         )?;
         laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
         laws.wear = contact.wear;
-        if let Some(friction) = contact.friction {
-            session.agree(laws.add_friction(friction, &mesh, &held))?;
+        if let Some(friction) = &contact.friction {
+            session.agree(laws.add_friction(friction.clone(), &mesh, &held))?;
         }
         contacts.push(laws);
     }

@@ -10,6 +10,7 @@ mod contact;
 mod effects;
 mod example;
 mod failures;
+mod formulas;
 mod friction;
 mod graded;
 mod indicator;

@@ -37,6 +37,10 @@ pub struct SlidingContext {
     pub is_blended: bool,
     /// The speed in m/s of the part of the sliding velocity that supports hold.
     pub held: f64,
+    /// Time in s at which the law holds.
+    pub time: f64,
+    /// Undeformed place of the point in m; 0 where the body has no axis.
+    pub place: [f64; 3],
 }
 
 impl SlidingContext {
@@ -71,6 +75,11 @@ pub trait FrictionBound {
         self.coefficient(speed, at) * pressure.max(0.0)
     }
 
+    /// Derivative of the bound by a positive contact pressure.
+    fn by_pressure(&self, speed: f64, _pressure: f64, at: SlidingContext) -> f64 {
+        self.coefficient(speed, at)
+    }
+
     /// Derivative of the bound by the sliding velocity, in Pa s/m.
     fn slope(&self, _speed: f64, _pressure: f64, _at: SlidingContext) -> f64 {
         0.0
@@ -102,10 +111,16 @@ pub trait FrictionBound {
         None
     }
 
+    /// Whether the graph over the sliding velocity, per contact pressure, is the same at all points and times.
+    fn is_same_everywhere(&self) -> bool {
+        self.history().is_none()
+    }
+
     /// A step from this blend of the histories after the last step and before it.
     fn context(&self, [recent, earlier]: [f64; 2], blend: Blend) -> SlidingContext {
         let history = blend.of(recent, earlier);
-        SlidingContext { history, step_length: blend.length, is_blended: blend.earlier != 0.0, held: 0.0 }
+        let is_blended = blend.earlier != 0.0;
+        SlidingContext { history, step_length: blend.length, is_blended, ..SlidingContext::default() }
     }
 
     /// The history after a step that starts from this blend of the histories after the last step and before it, at this sliding velocity
@@ -143,7 +158,7 @@ pub trait FrictionBound {
             traction: if at_rest > 0.0 { s - c * speed } else { 0.0 },
             derivative: 1.0 / (c + slope),
             slope,
-            coefficient: if pressure > 0.0 { self.coefficient(speed, at) } else { 0.0 },
+            coefficient: if pressure > 0.0 { self.by_pressure(speed, pressure, at) } else { 0.0 },
         }
     }
 
@@ -183,7 +198,7 @@ pub trait FrictionBound {
             return Slip { speed, traction, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
         }
         let whole = speed.hypot(held);
-        let coefficient = if pressure > 0.0 { self.coefficient(whole, at) * speed / whole } else { 0.0 };
+        let coefficient = if pressure > 0.0 { self.by_pressure(whole, pressure, at) * speed / whole } else { 0.0 };
         Slip { speed, traction, derivative, slope, coefficient }
     }
 }
@@ -224,7 +239,7 @@ fn sliding_speed<L: FrictionBound + ?Sized>(
 macro_rules! friction_laws {
     ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
         /// The friction law.
-        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[schemars(rename = "Friction")]
         pub enum FrictionLaw {
             $($(#[$about])* #[serde(rename = $name)] $law($law),)*
@@ -239,15 +254,17 @@ macro_rules! friction_laws {
         }
 
         impl FrictionLaw {
-            crate::laws::law::calls! { each_friction_law FrictionLaw FrictionBound:
+            crate::laws::law::calls! { pub each_friction_law FrictionLaw FrictionBound:
                 coefficient(speed: f64, at: SlidingContext) -> f64;
                 bound(speed: f64, pressure: f64, at: SlidingContext) -> f64;
+                by_pressure(speed: f64, pressure: f64, at: SlidingContext) -> f64;
                 slope(speed: f64, pressure: f64, at: SlidingContext) -> f64;
                 jumps_at_rest() -> bool;
                 follows_pressure() -> bool;
                 steepest_decrease(at: SlidingContext) -> f64;
                 corner_velocity(at: SlidingContext) -> f64;
                 history() -> Option<FrictionHistory>;
+                is_same_everywhere() -> bool;
                 context(histories: [f64; 2], blend: Blend) -> SlidingContext;
                 history_after(histories: [f64; 2], blend: Blend, speed: f64) -> f64;
                 history_measure(history: f64) -> f64;

@@ -1,5 +1,6 @@
 //! The normal and friction laws, from which a job chooses: modules and lists.
 
+mod coefficient_formula;
 mod compliance;
 mod coulomb;
 mod damped_response;
@@ -7,11 +8,13 @@ mod displacement_graph;
 mod distance_weakening;
 mod exponential_damper;
 mod graph;
+mod pressure_formula;
 mod rate_and_state;
 mod slip_weakening;
 mod tresca;
 mod unilateral;
 
+pub use coefficient_formula::CoefficientFormula;
 pub use compliance::Compliance;
 pub use coulomb::Coulomb;
 pub use damped_response::{DampedResponse, Symmetry};
@@ -19,6 +22,7 @@ pub use displacement_graph::DisplacementGraph;
 pub use distance_weakening::{Decay, DistanceWeakening};
 pub use exponential_damper::ExponentialDamper;
 pub use graph::Graph;
+pub use pressure_formula::{FormulaLaw, PressureFormula};
 pub use rate_and_state::{Evolution, RateAndState};
 pub use slip_weakening::SlipWeakening;
 pub use tresca::Tresca;
@@ -49,6 +53,9 @@ normal_laws! {
     DisplacementGraph = "displacement_graph",
     /// An elastic foundation: the pressure is stiffness times the penetration beyond the gap to the power of the exponent.
     Compliance = "compliance",
+    /// Pressure as a formula of the normal velocity or of the penetration, which may decrease and have upward jumps: any locally
+    /// Lipschitz potential of one of them.
+    PressureFormula = "expression",
     /// A rigid obstacle: the normal displacement never exceeds the gap, or the normal velocity never exceeds zero.
     Unilateral = "unilateral",
 }
@@ -64,6 +71,8 @@ friction_laws! {
     DistanceWeakening = "distance_weakening",
     /// A friction coefficient that depends on the sliding velocity and on a state that evolves with slip and time: the law of faults.
     RateAndState = "rate_and_state",
+    /// A friction coefficient as a formula of sliding velocity, slip distance, contact pressure, time and place.
+    CoefficientFormula = "expression",
 }
 
 impl NormalLaw {
@@ -203,7 +212,7 @@ mod tests {
     }
 
     const FIRST: SlidingContext =
-        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] };
 
     fn any_law() -> impl Strategy<Value = FrictionLaw> {
         let weakening =

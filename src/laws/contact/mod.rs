@@ -5,6 +5,7 @@
 //! combinations that are refused. The keys of the table `[[contact]]` are in `table.rs`.
 
 mod adhesion;
+mod curve;
 mod discrete_gradient;
 mod friction_law;
 mod interface;
@@ -17,6 +18,7 @@ mod obstacle_motion;
 mod obstacle_surface;
 mod obstacle_sweep;
 mod obstacles;
+mod penetration_law;
 mod polyline;
 mod stl;
 mod table;

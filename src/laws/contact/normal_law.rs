@@ -177,7 +177,7 @@ macro_rules! normal_laws {
         }
 
         impl NormalResponse {
-            crate::laws::law::calls! { each_normal_law NormalResponse Response:
+            crate::laws::law::calls! { pub each_normal_law NormalResponse Response:
                 resolve(s: f64, c: f64, node: NodeContext) -> Resolved;
                 pressure(velocity: f64, node: NodeContext) -> f64;
                 slope(velocity: f64, node: NodeContext) -> f64;
@@ -196,7 +196,7 @@ macro_rules! normal_laws {
         }
 
         impl NormalLaw {
-            crate::laws::law::calls! { each_normal_law NormalLaw NormalParameters:
+            crate::laws::law::calls! { pub each_normal_law NormalLaw NormalParameters:
                 gap() -> Option<&Scalar>;
                 against_obstacle(name: &str) -> Option<[String; 2]>;
                 own_faults() -> Vec<crate::laws::law::LawFault>;

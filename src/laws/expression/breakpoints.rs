@@ -1,6 +1,6 @@
 //! Times at which an expression switches, or at which one of its tables has a kink.
 
-use super::program::{Instruction, Line, Program, Table, Variable};
+use super::program::{Binary, Line, Machine, Program, Table, Ternary, Unary, Variable};
 
 /// A kink of a table is larger than this share of its largest value.
 const STRAIGHT: f64 = 1e-12;
@@ -17,56 +17,61 @@ pub struct Breakpoints {
 impl Program {
     /// The breakpoints that follow from arguments that are linear functions of time.
     pub(super) fn breakpoints(&self) -> Breakpoints {
-        let mut found = Breakpoints::default();
-        // The value of each entry of the stack, if it is a linear function of time.
-        let mut stack: Vec<Option<Line>> = Vec::new();
-        for instruction in self.instructions.iter() {
-            let mut pop = || stack.pop().flatten();
-            let line = match instruction {
-                Instruction::Number(number) => Some([*number, 0.0]),
-                Instruction::Variable(Variable::T) => Some([0.0, 1.0]),
-                Instruction::Variable(_) => None,
-                Instruction::Unary(function) => {
-                    let argument = pop();
-                    if function.switches {
-                        found.switches.extend(crossing(argument, Some([0.0; 2])));
-                    }
-                    argument.and_then(|argument| match (function.line, argument) {
-                        (Some(line), argument) => Some(line(argument)),
-                        (None, [number, 0.0]) => Some([(function.value)(number), 0.0]),
-                        (None, _) => None,
-                    })
-                }
-                Instruction::Binary(function) => {
-                    let (right, left) = (pop(), pop());
-                    if function.switches {
-                        found.switches.extend(crossing(left, right));
-                    }
-                    left.zip(right).and_then(|lines| match (function.line, lines) {
-                        (Some(line), (left, right)) => line(left, right),
-                        (None, ([left, 0.0], [right, 0.0])) => Some([(function.value)(left, right), 0.0]),
-                        (None, _) => None,
-                    })
-                }
-                Instruction::Ternary(function) => {
-                    let (third, second, first) = (pop(), pop(), pop());
-                    if function.switches {
-                        found
-                            .switches
-                            .extend([second, third].into_iter().filter_map(|at| crossing(first, at)));
-                    }
-                    None
-                }
-                Instruction::Interpolate(table) => {
-                    if let Some([at_start, slope]) = pop().filter(|line| line[1] != 0.0) {
-                        found.kinks.extend(kinks(&self.tables[*table]).map(|at| (at - at_start) / slope));
-                    }
-                    None
-                }
-            };
-            stack.push(line);
+        let mut lines = Lines::default();
+        self.run(&mut lines);
+        lines.0
+    }
+}
+
+/// Linear functions of time, where the entries of the stack are such functions.
+#[derive(Default)]
+struct Lines(Breakpoints);
+
+impl Machine for Lines {
+    type Entry = Option<Line>;
+
+    fn number(&self, number: f64) -> Option<Line> {
+        Some([number, 0.0])
+    }
+
+    fn variable(&self, variable: Variable) -> Option<Line> {
+        (variable == Variable::T).then_some([0.0, 1.0])
+    }
+
+    fn unary(&mut self, function: &Unary, argument: Option<Line>) -> Option<Line> {
+        if function.switches {
+            self.0.switches.extend(crossing(argument, Some([0.0; 2])));
         }
-        found
+        match (function.line, argument?) {
+            (Some(line), argument) => Some(line(argument)),
+            (None, [number, 0.0]) => Some([(function.value)(number), 0.0]),
+            (None, _) => None,
+        }
+    }
+
+    fn binary(&mut self, function: &Binary, [left, right]: [Option<Line>; 2]) -> Option<Line> {
+        if function.switches {
+            self.0.switches.extend(crossing(left, right));
+        }
+        match (function.line, left?, right?) {
+            (Some(line), left, right) => line(left, right),
+            (None, [left, 0.0], [right, 0.0]) => Some([(function.value)(left, right), 0.0]),
+            (None, ..) => None,
+        }
+    }
+
+    fn ternary(&mut self, function: &Ternary, [first, second, third]: [Option<Line>; 3]) -> Option<Line> {
+        if function.switches {
+            self.0.switches.extend([second, third].into_iter().filter_map(|at| crossing(first, at)));
+        }
+        None
+    }
+
+    fn interpolate(&mut self, table: &Table, argument: Option<Line>) -> Option<Line> {
+        if let Some([at_start, slope]) = argument.filter(|line| line[1] != 0.0) {
+            self.0.kinks.extend(kinks(table).map(|at| (at - at_start) / slope));
+        }
+        None
     }
 }
 

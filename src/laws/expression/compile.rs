@@ -6,8 +6,9 @@
 
 use std::ops::Range;
 
-use super::functions::{Meaning, meaning, names};
-use super::program::{Binary, Instruction, Program, Table, Unary};
+use super::functions::{Meaning, comparison, meaning, names, smooth_of_two};
+use super::interval::{Interval, Real};
+use super::program::{Binary, Instruction, Program, Table, Unary, Variable};
 use crate::laws::nearest::nearest;
 
 /// Longest permitted expression in bytes, without and with tables.
@@ -15,27 +16,31 @@ const LONGEST: [usize; 2] = [10_000, 1 << 20];
 /// Deepest permitted nesting of parentheses, signs and powers.
 const DEEPEST: usize = 200;
 
-/// 1 where the comparison holds, else 0.
-macro_rules! comparison {
-    ($operator:tt) => {{
-        fn compare(a: f64, b: f64) -> f64 {
-            if a.is_nan() || b.is_nan() { f64::NAN } else { f64::from(u8::from(a $operator b)) }
-        }
-        Binary::switch(compare)
-    }};
-}
-
-const ADD: Binary = Binary::linear(|a, b| a + b, |[a, p], [b, q]| Some([a + b, p + q]));
-const SUBTRACT: Binary = Binary::linear(|a, b| a - b, |[a, p], [b, q]| Some([a - b, p - q]));
-const MULTIPLY: Binary =
-    Binary::linear(|a, b| a * b, |[a, p], [b, q]| (p == 0.0 || q == 0.0).then_some([a * b, a * q + b * p]));
-const DIVIDE: Binary = Binary::linear(|a, b| a / b, |[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]));
-const POWER: Binary = Binary::smooth(f64::powf);
+const ADD: Binary = smooth_of_two!(left + right, (left, right) => [R::from(1.0), R::from(1.0)])
+    .linear(|[a, p], [b, q]| Some([a + b, p + q]));
+const SUBTRACT: Binary = smooth_of_two!(left - right, (left, right) => [R::from(1.0), R::from(-1.0)])
+    .linear(|[a, p], [b, q]| Some([a - b, p - q]));
+const MULTIPLY: Binary = smooth_of_two!(left * right, (left, right) => [right, left])
+    .linear(|[a, p], [b, q]| (p == 0.0 || q == 0.0).then_some([a * b, a * q + b * p]));
+const DIVIDE: Binary =
+    smooth_of_two!(left / right, (left, right) => [R::from(1.0) / right, -left / right.square()])
+        .linear(|[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]));
+const POWER: Binary = smooth_of_two!(left.power(right), (left, right) => {
+    [right * left.power(right - R::from(1.0)), left.power(right) * left.ln()]
+});
 const BELOW: Binary = comparison!(<);
 const AT_MOST: Binary = comparison!(<=);
 const ABOVE: Binary = comparison!(>);
 const AT_LEAST: Binary = comparison!(>=);
-const NEGATE: Unary = Unary::linear(|a| -a, |[a, p]| [-a, -p]);
+const NEGATE: Unary = {
+    fn value<R: Real>(argument: R) -> R {
+        -argument
+    }
+    fn slope<R: Real>(_: R) -> R {
+        R::from(-1.0)
+    }
+    Unary::smooth([value, slope], [value, slope]).linear(|[a, p]| [-a, -p])
+};
 
 /// An error in an expression, and its position in the text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,14 +59,14 @@ impl Fault {
     }
 }
 
-/// The program that evaluates `text`.
-pub(super) fn compile(text: &str) -> Result<Program, Fault> {
+/// The program that evaluates `text`, an expression in these variables.
+pub(super) fn compile(text: &str, variables: &[Variable]) -> Result<Program, Fault> {
     let longest = LONGEST[usize::from(text.contains("interpolate("))];
     if text.len() > longest {
         let message = format!("this expression has {} characters", text.len());
         return Err(Fault::new(0..text.len(), message, format!("at most {longest} are allowed")));
     }
-    let mut parser = Parser { text, at: 0, depth: 0, program: Vec::new(), tables: Vec::new() };
+    let mut parser = Parser { text, variables, at: 0, depth: 0, program: Vec::new(), tables: Vec::new() };
     parser.value()?;
     match parser.peek() {
         None => Ok(Program::new(parser.program, parser.tables)),
@@ -80,6 +85,7 @@ pub(super) fn compile(text: &str) -> Result<Program, Fault> {
 
 struct Parser<'a> {
     text: &'a str,
+    variables: &'a [Variable],
     at: usize,
     depth: usize,
     program: Vec<Instruction>,
@@ -220,11 +226,11 @@ impl Parser<'_> {
         let span = start..self.at;
         let name = &self.text[span.clone()];
         let called = self.peek() == Some('(');
-        match meaning(name) {
+        match meaning(name, self.variables) {
             None => {
-                let help = match nearest(name, names()) {
+                let help = match nearest(name, names(self.variables)) {
                     Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("known names: {}", names().collect::<Vec<_>>().join(", ")),
+                    None => format!("known names: {}", names(self.variables).collect::<Vec<_>>().join(", ")),
                 };
                 Err(Fault::new(span, format!("unknown name `{name}` in an expression"), help))
             }

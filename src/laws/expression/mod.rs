@@ -3,9 +3,14 @@
 //! An expression is compiled once to a short program for a stack machine, so that it can be evaluated at every
 //! node and step, by any thread.
 
+mod analysis;
 mod breakpoints;
 mod compile;
+mod enclosure;
+mod evaluate;
+mod formula;
 mod functions;
+mod interval;
 mod program;
 
 use std::borrow::Cow;
@@ -16,8 +21,13 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
+pub use analysis::{Border, REACH, Unproven};
 pub use breakpoints::Breakpoints;
 pub use compile::Fault;
+pub use enclosure::Enclosure;
+use evaluate::{Arguments, COUNT};
+pub use formula::Formula;
+pub use interval::Interval;
 use program::Program;
 pub use program::Variable;
 
@@ -58,7 +68,7 @@ impl Scalar {
     pub fn pieces(&self, time: f64, point: &[f64]) -> u64 {
         match self {
             Self::Number(_) => 0,
-            Self::Expression(expression) => expression.program.pieces(time, point),
+            Self::Expression(expression) => expression.program.pieces(&arguments(time, point)),
         }
     }
 
@@ -90,9 +100,14 @@ pub struct Expression {
 }
 
 impl Expression {
-    /// Compiles `text`; an error contains its position in the text.
+    /// Compiles `text`, an expression in t, x, y, z; an error contains its position in the text.
     pub fn parse(text: &str) -> Result<Self, Fault> {
-        Ok(Self { text: text.into(), program: compile::compile(text)? })
+        Self::parse_in(text, Variable::OF_TIME_AND_PLACE)
+    }
+
+    /// Compiles `text`, an expression in these variables.
+    pub fn parse_in(text: &str, variables: &[Variable]) -> Result<Self, Fault> {
+        Ok(Self { text: text.into(), program: compile::compile(text, variables)? })
     }
 
     /// The expression as written.
@@ -107,8 +122,16 @@ impl Expression {
 
     /// Value at `time` and `point`; not finite where the expression is undefined, as in sqrt(-1).
     pub fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
-        self.program.evaluate(time, point)
+        self.program.evaluate(&arguments(time, point))
     }
+}
+
+/// Time and place as arguments of a program.
+fn arguments(time: f64, point: &[f64]) -> Arguments {
+    let mut arguments = [0.0; COUNT];
+    arguments[0] = time;
+    arguments[1..].iter_mut().zip(point.iter().take(3)).for_each(|(argument, x)| *argument = *x);
+    arguments
 }
 
 impl PartialEq for Expression {

@@ -1,5 +1,6 @@
-//! The program of an expression: instructions of a stack machine.
+//! The program of an expression: instructions of a stack machine, and what runs them.
 
+use super::interval::{Interval, Real};
 use std::fmt;
 use std::sync::Arc;
 
@@ -17,6 +18,26 @@ pub enum Variable {
     Y,
     /// Third coordinate.
     Z,
+    /// Normal or sliding velocity in m/s.
+    V,
+    /// Penetration in metres.
+    D,
+    /// Slip distance in metres.
+    L,
+    /// Contact pressure in Pa.
+    P,
+}
+
+impl Variable {
+    /// Those of expressions in time and place.
+    pub const OF_TIME_AND_PLACE: &[Self] = &[Self::T, Self::X, Self::Y, Self::Z];
+    /// All, in their order.
+    pub const ALL: &[Self] = &[Self::T, Self::X, Self::Y, Self::Z, Self::V, Self::D, Self::L, Self::P];
+
+    /// Its name in expressions.
+    pub fn name(self) -> &'static str {
+        ["t", "x", "y", "z", "v", "d", "l", "p"][self as usize]
+    }
 }
 
 /// A compiled program; clones share the instructions.
@@ -26,6 +47,24 @@ pub(super) struct Program {
     /// Points of the tables that the instructions interpolate.
     pub(super) tables: Arc<[Table]>,
     depth: usize,
+}
+
+/// What the instructions of a program act on, and how: numbers, numbers with derivatives, enclosures.
+pub(super) trait Machine {
+    /// An entry of the stack.
+    type Entry: Copy;
+
+    fn number(&self, number: f64) -> Self::Entry;
+
+    fn variable(&self, variable: Variable) -> Self::Entry;
+
+    fn unary(&mut self, function: &Unary, argument: Self::Entry) -> Self::Entry;
+
+    fn binary(&mut self, function: &Binary, arguments: [Self::Entry; 2]) -> Self::Entry;
+
+    fn ternary(&mut self, function: &Ternary, arguments: [Self::Entry; 3]) -> Self::Entry;
+
+    fn interpolate(&mut self, table: &Table, argument: Self::Entry) -> Self::Entry;
 }
 
 impl Program {
@@ -49,70 +88,44 @@ impl Program {
         })
     }
 
-    /// Value at `time` and `point`.
-    pub(super) fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
-        self.with_stack(|stack| self.run::<false>(stack, time, point).0)
+    /// The result on this machine.
+    pub(super) fn run<M: Machine>(&self, machine: &mut M) -> M::Entry {
+        let zero = machine.number(0.0);
+        if self.depth <= SMALL {
+            self.run_on(machine, &mut [zero; SMALL])
+        } else {
+            self.run_on(machine, &mut vec![zero; self.depth])
+        }
     }
 
-    /// A digest of the pieces that determine the value at `time` and `point`.
-    pub(super) fn pieces(&self, time: f64, point: &[f64]) -> u64 {
-        self.with_stack(|stack| self.run::<true>(stack, time, point).1)
-    }
-
-    fn with_stack<T>(&self, run: impl FnOnce(&mut [f64]) -> T) -> T {
-        if self.depth <= SMALL { run(&mut [0.0; SMALL]) } else { run(&mut vec![0.0; self.depth]) }
-    }
-
-    /// The value, and the digest of its pieces if it is requested.
-    fn run<const PIECES: bool>(&self, stack: &mut [f64], time: f64, point: &[f64]) -> (f64, u64) {
-        let (mut top, mut digest) = (0, 0);
-        let mut note = |piece: f64| digest = mix(digest, piece);
+    #[inline]
+    fn run_on<M: Machine>(&self, machine: &mut M, stack: &mut [M::Entry]) -> M::Entry {
+        let mut top = 0;
         for instruction in self.instructions.iter() {
             match instruction {
                 Instruction::Number(number) => {
-                    stack[top] = *number;
+                    stack[top] = machine.number(*number);
                     top += 1;
                 }
                 Instruction::Variable(variable) => {
-                    stack[top] = match variable {
-                        Variable::T => time,
-                        coordinate => point.get(*coordinate as usize - 1).copied().unwrap_or(0.0),
-                    };
+                    stack[top] = machine.variable(*variable);
                     top += 1;
                 }
-                Instruction::Unary(function) => {
-                    let argument = stack[top - 1];
-                    if let (true, Some(piece)) = (PIECES, function.piece) {
-                        note(piece(argument));
-                    }
-                    stack[top - 1] = (function.value)(argument);
-                }
+                Instruction::Unary(function) => stack[top - 1] = machine.unary(function, stack[top - 1]),
                 Instruction::Binary(function) => {
                     top -= 1;
-                    let (left, right) = (stack[top - 1], stack[top]);
-                    if let (true, Some(piece)) = (PIECES, function.piece) {
-                        note(piece(left, right));
-                    }
-                    stack[top - 1] = (function.value)(left, right);
+                    stack[top - 1] = machine.binary(function, [stack[top - 1], stack[top]]);
                 }
                 Instruction::Ternary(function) => {
                     top -= 2;
-                    let arguments = [stack[top - 1], stack[top], stack[top + 1]];
-                    if PIECES {
-                        note((function.piece)(arguments));
-                    }
-                    stack[top - 1] = (function.value)(arguments);
+                    stack[top - 1] = machine.ternary(function, [stack[top - 1], stack[top], stack[top + 1]]);
                 }
                 Instruction::Interpolate(table) => {
-                    let (value, piece) = interpolate(&self.tables[*table], stack[top - 1]);
-                    if PIECES {
-                        note(piece as f64);
-                    }
-                    stack[top - 1] = value;
+                    stack[top - 1] = machine.interpolate(&self.tables[*table], stack[top - 1]);
                 }
             }
         }
-        (stack[0], digest)
+        stack[0]
     }
 }
 
@@ -131,19 +144,22 @@ pub(super) enum Instruction {
 /// Points with ascending first coordinates, at least one.
 pub(super) type Table = Box<[[f64; 2]]>;
 
-/// The value of a table, constant before its first and after its last point, and the number of points before it.
-fn interpolate(table: &Table, at: f64) -> (f64, usize) {
+/// The number of points of a table that are not after `at`.
+pub(super) fn points_before(table: &Table, at: f64) -> usize {
+    table.partition_point(|point| point[0] <= at)
+}
+
+/// The value and the slope of a table behind this many of its points: constant before its first and after its last point.
+pub(super) fn interpolate(table: &Table, behind: usize, at: f64) -> [f64; 2] {
     if at.is_nan() {
-        return (at, 0);
+        return [at; 2];
     }
-    let behind = table.partition_point(|point| point[0] <= at);
-    let value = match (behind.checked_sub(1).map(|k| table[k]), table.get(behind)) {
-        (None, Some(first)) => first[1],
-        (Some(last), None) => last[1],
-        (Some([t0, v0]), Some([t1, v1])) => v0 + (v1 - v0) * ((at - t0) / (t1 - t0)),
-        (None, None) => f64::NAN,
-    };
-    (value, behind)
+    match (behind.checked_sub(1).map(|k| table[k]), table.get(behind)) {
+        (None, Some(first)) => [first[1], 0.0],
+        (Some(last), None) => [last[1], 0.0],
+        (Some([t0, v0]), Some([t1, v1])) => [v0 + (v1 - v0) * ((at - t0) / (t1 - t0)), (v1 - v0) / (t1 - t0)],
+        (None, None) => [f64::NAN; 2],
+    }
 }
 
 /// A linear function of time: its value at time 0 and its slope.
@@ -152,89 +168,132 @@ pub(super) type Line = [f64; 2];
 /// A piecewise function of the three topmost values.
 #[derive(Clone, Copy)]
 pub(super) struct Ternary {
-    value: fn([f64; 3]) -> f64,
-    /// Records which piece is active.
-    piece: fn([f64; 3]) -> f64,
-    /// Whether it switches where its first argument equals another one.
+    /// Which piece is active: 1 or 0, or not a number.
+    pub(super) piece: fn([f64; 3]) -> f64,
+    /// The same for intervals, if it is one piece.
+    pub(super) decide: fn([Interval; 3]) -> Option<f64>,
+    /// Whether its value is the piece, and it switches where its first argument equals another one; otherwise it chooses the second
+    /// argument or the third.
     pub(super) switches: bool,
-}
-
-impl Ternary {
-    pub(super) const fn of_pieces(value: fn([f64; 3]) -> f64, piece: fn([f64; 3]) -> f64) -> Self {
-        Self { value, piece, switches: false }
-    }
-
-    /// A function that has one value in each piece.
-    pub(super) const fn switch(value: fn([f64; 3]) -> f64) -> Self {
-        Self { value, piece: value, switches: true }
-    }
 }
 
 /// A function of the topmost value.
 #[derive(Clone, Copy)]
 pub(super) struct Unary {
     pub(super) value: fn(f64) -> f64,
-    /// Records which piece is active, for piecewise functions.
-    piece: Option<fn(f64) -> f64>,
+    /// Its derivative.
+    pub(super) slope: fn(f64) -> f64,
+    /// Values and derivatives at all points of an interval.
+    pub(super) enclosures: [fn(Interval) -> Interval; 2],
+    /// Records which piece is active, for piecewise functions: never decreasing.
+    pub(super) piece: Option<fn(f64) -> f64>,
     /// Its value for a linear function of time, if that is linear, too.
     pub(super) line: Option<fn(Line) -> Line>,
     /// Whether it switches where its argument is 0.
     pub(super) switches: bool,
+    /// Whether it jumps between its pieces.
+    pub(super) jumps: bool,
+}
+
+fn flat(_: f64) -> f64 {
+    0.0
+}
+
+fn flat_everywhere(_: Interval) -> Interval {
+    Interval::from(0.0)
 }
 
 impl Unary {
-    pub(super) const fn smooth(value: fn(f64) -> f64) -> Self {
-        Self { value, piece: None, line: None, switches: false }
+    pub(super) const fn smooth(
+        [value, slope]: [fn(f64) -> f64; 2],
+        enclosures: [fn(Interval) -> Interval; 2],
+    ) -> Self {
+        Self { value, slope, enclosures, piece: None, line: None, switches: false, jumps: false }
     }
 
-    pub(super) const fn linear(value: fn(f64) -> f64, line: fn(Line) -> Line) -> Self {
-        Self { line: Some(line), ..Self::smooth(value) }
+    pub(super) const fn linear(self, line: fn(Line) -> Line) -> Self {
+        Self { line: Some(line), ..self }
     }
 
-    pub(super) const fn of_pieces(value: fn(f64) -> f64, piece: fn(f64) -> f64) -> Self {
-        Self { piece: Some(piece), ..Self::smooth(value) }
+    /// The absolute value.
+    pub(super) const fn abs() -> Self {
+        fn negative(number: f64) -> f64 {
+            f64::from(u8::from(number >= 0.0))
+        }
+        fn slope(number: f64) -> f64 {
+            if number < 0.0 { -1.0 } else { 1.0 }
+        }
+        fn slopes(argument: Interval) -> Interval {
+            Interval::new(slope(argument.low), slope(argument.high))
+        }
+        let smooth = Self::smooth([f64::abs, slope], [<Interval as Real>::abs, slopes]);
+        Self { piece: Some(negative), ..smooth }
     }
 
-    /// A function that has one value in each piece.
-    pub(super) const fn switch(value: fn(f64) -> f64) -> Self {
-        Self { switches: true, ..Self::of_pieces(value, value) }
+    /// A nondecreasing function of steps, with its values at all points of an interval.
+    pub(super) const fn of_steps(value: fn(f64) -> f64, enclosure: fn(Interval) -> Interval) -> Self {
+        Self { piece: Some(value), jumps: true, ..Self::smooth([value, flat], [enclosure, flat_everywhere]) }
+    }
+
+    /// A function that has one value in each piece and switches at 0.
+    pub(super) const fn switch(self) -> Self {
+        Self { switches: true, ..self }
     }
 }
+
+/// Values and derivatives by both arguments.
+type OfTwo<R> = (fn(R, R) -> R, fn(R, R) -> [R; 2]);
 
 /// A function of the two topmost values.
 #[derive(Clone, Copy)]
 pub(super) struct Binary {
     pub(super) value: fn(f64, f64) -> f64,
-    /// Records which piece is active, for piecewise functions.
-    piece: Option<fn(f64, f64) -> f64>,
+    /// Its derivatives by both arguments.
+    pub(super) slopes: fn(f64, f64) -> [f64; 2],
+    /// The same at all points of intervals.
+    pub(super) enclosures: OfTwo<Interval>,
+    /// For piecewise functions which piece is active: 1 or 0.
+    pub(super) piece: Option<Piece>,
     /// Its value for linear functions of time, where that is linear, too.
     pub(super) line: Option<fn(Line, Line) -> Option<Line>>,
     /// Whether it switches where its arguments are equal.
     pub(super) switches: bool,
 }
 
-impl Binary {
-    pub(super) const fn smooth(value: fn(f64, f64) -> f64) -> Self {
-        Self { value, piece: None, line: None, switches: false }
-    }
-
-    pub(super) const fn linear(value: fn(f64, f64) -> f64, line: fn(Line, Line) -> Option<Line>) -> Self {
-        Self { line: Some(line), ..Self::smooth(value) }
-    }
-
-    pub(super) const fn of_pieces(value: fn(f64, f64) -> f64, piece: fn(f64, f64) -> f64) -> Self {
-        Self { piece: Some(piece), ..Self::smooth(value) }
-    }
-
-    /// A function that has one value in each piece.
-    pub(super) const fn switch(value: fn(f64, f64) -> f64) -> Self {
-        Self { switches: true, ..Self::of_pieces(value, value) }
-    }
+/// Which piece of a function of two arguments is active: at numbers, and for intervals, if it is one piece.
+#[derive(Clone, Copy)]
+pub(super) struct Piece {
+    pub(super) at: fn(f64, f64) -> f64,
+    pub(super) decide: fn(Interval, Interval) -> Option<f64>,
 }
 
-/// A digest extended by one number.
-fn mix(digest: u64, number: f64) -> u64 {
-    (digest ^ number.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+impl Binary {
+    pub(super) const fn smooth((value, slopes): OfTwo<f64>, enclosures: OfTwo<Interval>) -> Self {
+        Self { value, slopes, enclosures, piece: None, line: None, switches: false }
+    }
+
+    pub(super) const fn linear(self, line: fn(Line, Line) -> Option<Line>) -> Self {
+        Self { line: Some(line), ..self }
+    }
+
+    pub(super) const fn piecewise(self, piece: Piece) -> Self {
+        Self { piece: Some(piece), ..self }
+    }
+
+    /// A comparison.
+    pub(super) const fn switch(at: fn(f64, f64) -> f64, decide: fn(Interval, Interval) -> Option<f64>) -> Self {
+        fn flat(_: f64, _: f64) -> [f64; 2] {
+            [0.0; 2]
+        }
+        fn either(_: Interval, _: Interval) -> Interval {
+            Interval::new(0.0, 1.0)
+        }
+        fn flat_everywhere(_: Interval, _: Interval) -> [Interval; 2] {
+            [Interval::from(0.0); 2]
+        }
+        let steps = Self::smooth((at, flat), (either, flat_everywhere));
+        Self { switches: true, ..steps.piecewise(Piece { at, decide }) }
+    }
 }
 
 impl fmt::Debug for Unary {
@@ -257,7 +316,7 @@ impl fmt::Debug for Ternary {
 
 impl PartialEq for Ternary {
     fn eq(&self, other: &Self) -> bool {
-        std::ptr::fn_addr_eq(self.value, other.value)
+        std::ptr::fn_addr_eq(self.piece, other.piece)
     }
 }
 

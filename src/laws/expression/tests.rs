@@ -1,4 +1,5 @@
-use super::{Expression, Scalar};
+use super::evaluate::COUNT;
+use super::{Enclosure, Expression, Formula, Interval, REACH, Scalar, Unproven, Variable};
 
 fn value(text: &str) -> f64 {
     Expression::parse(text)
@@ -160,4 +161,91 @@ fn breakpoints_follow_from_arguments_that_are_linear_in_time() {
         };
         assert!(near(&found.switches, switches) && near(&found.kinks, kinks), "{text}: {found:?}");
     }
+}
+
+const VELOCITY: &[Variable] = &[Variable::V];
+
+fn formula(text: &str) -> Formula {
+    Formula::parse(text, VELOCITY).unwrap_or_else(|fault| panic!("{text}: {fault:?}"))
+}
+
+#[test]
+fn formulas_have_their_own_variables() {
+    assert_eq!(formula("2*v + 1").value(&[(Variable::V, 3.0)]), 7.0);
+    let fault = Formula::parse("v + t", VELOCITY).expect_err("time");
+    assert!(fault.message.contains("unknown name `t`") && fault.help.contains("known names: v, pi"), "{fault:?}");
+    assert!(Expression::parse("v").is_err());
+}
+
+/// A formula of every function, its derivative by differences and enclosures that contain both.
+#[test]
+fn derivatives_agree_with_differences_and_enclosures_contain_all() {
+    let texts = [
+        "v^3 - 2*v/(v^2 + 1)", "(v^2 + 0.1)^(-0.4)", "(v^2 + 0.1)^v", "2^v", "-v^2", "v^-2", "abs(v - 0.3)", "min(v, 0.5, v^2)",
+        "max(sin(3*v), cos(v))", "atan2(v, 2 - v)", "hypot(v, 0.3)", "sign(v)*v", "floor(3*v)*v", "ceil(v) + v", "round(2*v)",
+        "step(v - 0.1)*exp(v)", "if(v < 0, v, v^2)", "(v >= 0.2)*v + (v <= 0.1) + (v > 3) ", "pulse(v, 0.1, 0.5)*v",
+        "interpolate(v, -1, 2, 0, 0, 1, 5)", "sqrt(v^2 + 1)", "cbrt(v)", "ln(v^2 + 0.2)", "log10(v^2 + 0.2)", "tan(v/4)",
+        "asin(v/4)", "acos(v/4)", "atan(5*v)", "sinh(v)", "cosh(v)", "tanh(3*v)", "v*exp(-v/0.02)", "3", "sqrt(v + 5)",
+    ];
+    for text in texts {
+        let formula = formula(text);
+        let program = &formula.0.program;
+        for step in -30..30 {
+            let (low, width) = (f64::from(step) * 0.0937 + 0.001, 0.05);
+            let mut ranges = [Interval::from(0.0); COUNT];
+            ranges[Variable::V as usize] = Interval::new(low, low + width);
+            let known = program.enclose(&ranges, Variable::V);
+            for part in 0..=10 {
+                let v = low + width * f64::from(part) / 10.0;
+                let v = v.min(low + width);
+                let [value, slope] = formula.differentiate(&[(Variable::V, v)], Variable::V);
+                assert_eq!(value, formula.value(&[(Variable::V, v)]), "{text}");
+                assert!(known.value.contains(value) && known.slope.contains(slope), "{text} at {v}: {value} {slope} {known:?}");
+                if known.is_one_piece && part > 0 && part < 10 {
+                    let at = |v| formula.value(&[(Variable::V, v)]);
+                    let by_difference = (at(v + 1e-6) - at(v - 1e-6)) / 2e-6;
+                    assert!((by_difference - slope).abs() <= 1e-5 * (1.0 + slope.abs()), "{text} at {v}: {slope} {by_difference}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn pieces_begin_where_conditions_change() {
+    let all = Interval::new(-REACH, REACH);
+    let borders = |text: &str| formula(text).borders(&[(Variable::V, all)], Variable::V).unwrap();
+    assert!(borders("v*exp(-v)").is_empty());
+    assert_eq!(borders("if(v < 0.1, 1, 2)"), [[0.1_f64.next_down(), 0.1]]);
+    assert_eq!(borders("if(v <= 0.1, 1, 2)"), [[0.1, 0.1_f64.next_up()]]);
+    let found = borders("sign(v) + min(3, abs(v - 1))");
+    let places: Vec<f64> = found.iter().map(|border| (border[0] + border[1]) / 2.0).collect();
+    assert!(places.iter().zip([-2.0, 0.0, 1.0, 4.0]).all(|(a, b)| (a - b).abs() < 1e-15) && places.len() == 4, "{places:?}");
+    let none = |text: &str| formula(text).borders(&[(Variable::V, all)], Variable::V).unwrap_err();
+    assert!(matches!(none("floor(v)"), Unproven::Pieces(_)));
+    assert!(matches!(none("if(v*v - v^2 < 1e-300, 1, 2)"), Unproven::Pieces(_)));
+}
+
+#[test]
+fn suprema_are_sharp_to_a_per_cent_and_never_too_small() {
+    let sup = |text: &str, low: f64, high: f64, of: fn(&Enclosure) -> Interval| {
+        formula(text).supremum([&[(Variable::V, Interval::new(low, high))][..]], Variable::V, of)
+    };
+    let fall = |text: &str, low: f64| sup(text, low, REACH, |known| -known.slope).unwrap()[0];
+    // The steepest decrease of v exp(-v / w) is exp(-2), at 2 w.
+    for width in [1e-6, 0.02, 3.0, 1e6] {
+        let found = fall(&format!("4e3*v*exp(-v/{width})"), 0.0) / 4e3;
+        assert!((1.0..1.011).contains(&(found / (-2.0_f64).exp())), "{found}");
+    }
+    for increasing in ["tanh(v/0.1)", "v^3", "v - tanh(v)", "v", "sqrt(v)", "v + 0.5*sin(v)", "1 - exp(-v/0.02)"] {
+        assert!(fall(increasing, 0.0) <= 0.0, "{increasing}: {}", fall(increasing, 0.0));
+    }
+    assert!((fall("v^3 + 0.1*sin(20*v)", 0.0) / 2.0 - 0.97).abs() < 0.04, "beside slopes of 1e60");
+    assert!((fall("2*exp(-v/0.5)", 0.0) / 4.0 - 1.0).abs() < 0.011);
+    assert_eq!(fall("-sqrt(v)", 0.0), f64::INFINITY, "a vertical tangent");
+    let top = sup("v*exp(-v)", 0.0, REACH, |known| known.value).unwrap()[0] * 1.0_f64.exp();
+    assert!((1.0..1.011).contains(&top), "{top}");
+    assert!(matches!(sup("sqrt(v)", -1.0, 1.0, |known| known.value), Err(Unproven::Undefined(at)) if at <= 0.0));
+    assert!(matches!(sup("1/(1 + v)", -2.0, 2.0, |known| known.slope), Err(Unproven::Undefined(at)) if (at + 1.0).abs() < 1e-9));
+    assert!(matches!(sup("ln(v - 2)", 0.0, 4.0, |known| known.value), Err(Unproven::Undefined(_))));
 }

@@ -139,7 +139,7 @@ impl<'a> Boundary<'a> {
             Some(Scalar::Expression(part)) => format!("{} where {}", self.name, part.text()),
             _ => self.name.to_owned(),
         };
-        Self { law: Some(&laws.normal), friction: laws.friction, is_in_contact, place, ..self }
+        Self { law: Some(&laws.normal), friction: laws.friction.clone(), is_in_contact, place, ..self }
     }
 
     /// Whether each node belongs to a facet of this part; without the body, whether the node itself does.

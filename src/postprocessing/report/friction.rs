@@ -38,8 +38,7 @@ pub(super) fn picture(
 ) -> Result<Option<Picture>> {
     let touching: Vec<&SlidingNode> =
         nodes.iter().filter(|node| !law.follows_pressure() || node.pressure > 0.0).collect();
-    // Nodes with different histories have different graphs.
-    if touching.is_empty() || law.history().is_some() {
+    if touching.is_empty() || !law.is_same_everywhere() {
         return Ok(None);
     }
     let ordinate =

@@ -187,7 +187,7 @@ fn contact_directions(found: &RunFiles, snapshot: &Snapshot) -> Vec<[f64; 3]> {
 fn contact_laws(found: &RunFiles) -> Result<Vec<Laws>> {
     let of = |contact: &Contact| {
         let Contact { on, part, friction, .. } = contact;
-        Ok(Laws { on: on.clone(), part: part.clone(), normal: Law::of(contact)?, friction: *friction })
+        Ok(Laws { on: on.clone(), part: part.clone(), normal: Law::of(contact)?, friction: friction.clone() })
     };
     found.job.iter().flat_map(|job| &job.contact).map(of).collect()
 }

@@ -604,6 +604,22 @@ fn normal_law<const D: usize>(draw: &mut Draw<D>) -> Normal {
         draw.line("[contact.normal.unilateral]\nbound = \"velocity\"");
         return Normal::Rate;
     }
+    let as_formula = is_written(first);
+    if as_formula && let "exponential_damper" = law {
+        let (limit, velocity) = (draw.number(high, pressure), draw.number(first, VELOCITY));
+        let formula = format!("if(v < 0, 0, {limit:e}*(1 - exp(-v/{velocity:e})))");
+        draw.line(format!("[contact.normal.expression]\npressure = \"{formula}\""));
+        return Normal::Rate;
+    }
+    if as_formula && let "displacement_graph" = law {
+        let numbers = [(0.003, 10.0 * high), (0.006, 12.0 * high)];
+        let [(d, p), (e, q)] = numbers.map(|(at, value)| (draw.number(at, LENGTH), draw.number(value, pressure)));
+        let slope = draw.number(500.0, stiffness);
+        let last = format!("{q:e} + {slope:e}*(d - {e:e})");
+        let formula = format!("if(d < {e:e}, interpolate(d, 0, 0, {d:e}, {p:e}, {e:e}, {q:e}), {last})");
+        draw.line(format!("[contact.normal.expression]\npressure = \"{formula}\""));
+        return Normal::Gap;
+    }
     draw.line(format!("[contact.normal.{law}]"));
     let pair = |draw: &Draw<D>, of: f64, value: f64, dimension: Dimension| {
         format!("[{:e}, {:e}]", draw.number(of, dimension), draw.number(value, pressure))
@@ -720,6 +736,11 @@ fn obstacle<const D: usize>(draw: &mut Draw<D>) {
     }
 }
 
+/// Whether a law with this parameter is written as a formula: one in three.
+fn is_written(parameter: f64) -> bool {
+    (parameter * 1e6) as u64 % 3 == 0
+}
+
 fn friction<const D: usize>(draw: &mut Draw<D>) {
     let law = draw.one_of(&[
         "tresca",
@@ -730,6 +751,16 @@ fn friction<const D: usize>(draw: &mut Draw<D>) {
         "rate_and_state",
     ]);
     let (coefficient, more) = (draw.between(0.05, 0.5), draw.between(0.0, 0.2));
+    let weakening = match law {
+        "coulomb" => Some("0".to_owned()),
+        "slip_weakening" => Some(format!("exp(-v/{:e})", draw.number(0.5, VELOCITY))),
+        "distance_weakening" => Some(format!("max(1 - l/{:e}, 0)", draw.number(0.002, LENGTH))),
+        _ => None,
+    };
+    if let Some(weakening) = weakening.filter(|_| is_written(coefficient)) {
+        let formula = format!("{coefficient:e} + {more:e}*{weakening}");
+        return draw.line(format!("[contact.friction.expression]\ncoefficient = \"{formula}\""));
+    }
     draw.line(format!("[contact.friction.{law}]"));
     match law {
         "tresca" => {
@@ -772,6 +803,8 @@ fn the_scenes_of_a_test_have_every_feature() {
     let stages: Vec<usize> = (0..60).filter(|at| scenes[*at].1).collect();
     let words = [
         "guesses",
+        "contact.normal.expression",
+        "contact.friction.expression",
         "\nmoment = ",
         "\nstrength = ",
         "land_on",

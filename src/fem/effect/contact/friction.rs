@@ -104,7 +104,7 @@ impl<const D: usize> Friction<D> {
                 all,
                 obstacle: [0.0; D],
                 obstacle_speed: 0.0,
-                context: SlidingContext::default(),
+                context: SlidingContext { place: std::array::from_fn(|i| if i < D { place[i] } else { 0.0 }), ..SlidingContext::default() },
                 history: law.first_histories(),
                 pressure: 0.0,
                 traction: [0.0; D],
@@ -139,11 +139,14 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Starts a step from this blend of earlier histories.
-    pub(super) fn start_step(&mut self, blend: Blend) {
+    /// Starts a step from this blend of earlier histories, whose equations hold at this time in s.
+    pub(super) fn start_step(&mut self, blend: Blend, time: f64) {
         let Self { law, points, .. } = self;
-        self.context = law.context(law.first_histories(), blend);
-        points.iter_mut().for_each(|point| point.context = law.context(point.history, blend));
+        self.context = SlidingContext { time, ..law.context(law.first_histories(), blend) };
+        for point in points {
+            let place = point.context.place;
+            point.context = SlidingContext { time, place, ..law.context(point.history, blend) };
+        }
     }
 
     /// Advances the histories by a step from this blend of earlier ones, at these velocities at its end, with ghosts.

@@ -19,7 +19,8 @@ impl<const D: usize> Contact<D> {
     /// are their means over the step, which conserve energy.
     pub fn prepare(&mut self, step: Step, blend: Blend, [converged, start]: [&[f64]; 2]) -> Result<()> {
         self.blend = blend;
-        self.friction.iter_mut().for_each(|friction| friction.start_step(blend));
+        let time = blend.balanced(step).time;
+        self.friction.iter_mut().for_each(|friction| friction.start_step(blend, time));
         if !self.law.depends_on_displacement() {
             return Ok(());
         }

@@ -37,8 +37,8 @@ impl<const D: usize> Contact<D> {
     }
 
     /// The friction law, if there is friction.
-    pub fn friction(&self) -> Option<FrictionLaw> {
-        self.friction.as_ref().map(|friction| friction.law)
+    pub fn friction(&self) -> Option<&FrictionLaw> {
+        self.friction.as_ref().map(|friction| &friction.law)
     }
 
     /// Points with friction on this rank that can move along the boundary.

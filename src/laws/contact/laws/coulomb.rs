@@ -24,7 +24,7 @@ mod tests {
     use super::*;
 
     const FIRST: SlidingContext =
-        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0 };
+        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] };
 
     #[test]
     fn the_bound_is_proportional_to_the_pressure() {

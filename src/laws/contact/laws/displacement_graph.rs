@@ -4,14 +4,11 @@
 //! point: the Clarke subdifferential of the potential `integral of g`, as in the adhesive and interlaminar laws of Panagiotopoulos
 //! (Hemivariational Inequalities, 1993) and Makela. The law has no memory: what was separated and returns is bonded again.
 //!
-//! Within a step of length `k` that starts with the penetration `d0` it is a law of the velocity, `g(d0 + k v)`, whose steepest
-//! decrease is `k` times that of `g`. The parameter `s = c v + p` is that of the polyline over `d` with `c / k` in place of `c`:
-//! `(c / k) d + p = s + c d0 / k`. In steps that conserve energy the pressure is its mean over the step ([`discrete_gradient`]); that of
-//! a rigid obstacle behind the last corner remains the one at the end.
+//! Its evaluation within a step is that of a [`PenetrationLaw`].
 
 use crate::laws::contact::{
-    discrete_gradient::{self, Potential, Vertical},
-    normal_law::{NodeContext, NormalParameters, Resolved, Response},
+    normal_law::{NodeContext, NormalParameters, Response},
+    penetration_law::{PenetrationLaw, StoringGraph},
     polyline::Polyline,
 };
 use crate::{
@@ -43,9 +40,9 @@ pub struct DisplacementGraph {
 }
 
 impl NormalParameters for DisplacementGraph {
-    type Response = PenetrationLaw;
+    type Response = PenetrationLaw<StoringPolyline>;
 
-    fn response(&self) -> Result<PenetrationLaw> {
+    fn response(&self) -> Result<PenetrationLaw<StoringPolyline>> {
         let graph = Polyline::new(self.points.clone(), 0.0, self.slope_after)?;
         // The potential at each corner, zero at the penetration zero.
         let mut potentials = vec![0.0];
@@ -53,10 +50,10 @@ impl NormalParameters for DisplacementGraph {
             let [[d, p], [e, q]] = [pair[0], pair[1]];
             potentials.push(potentials[potentials.len() - 1] + 0.5 * (p + q) * (e - d));
         }
-        let mut law = PenetrationLaw { graph, potentials };
-        let at_zero = law.potential(0.0);
-        law.potentials.iter_mut().for_each(|potential| *potential -= at_zero);
-        Ok(law)
+        let mut storing = StoringPolyline { graph, potentials };
+        let at_zero = storing.potential(0.0);
+        storing.potentials.iter_mut().for_each(|potential| *potential -= at_zero);
+        Ok(PenetrationLaw(storing))
     }
 
     fn gap(&self) -> Option<&Scalar> {
@@ -80,16 +77,25 @@ impl NormalParameters for DisplacementGraph {
     }
 }
 
-/// The evaluation of a [`DisplacementGraph`].
+/// A polyline over the penetration in m, with its potential.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PenetrationLaw {
-    /// Over the penetration in m.
+pub struct StoringPolyline {
     graph: Polyline,
     /// The potential in J/m² at each corner.
     potentials: Vec<f64>,
 }
 
-impl PenetrationLaw {
+impl StoringGraph for StoringPolyline {
+    type Graph = Polyline;
+
+    fn graph(&self) -> &Polyline {
+        &self.graph
+    }
+
+    fn is_free_at(&self, penetration: f64) -> bool {
+        self.graph.branch(penetration, NodeContext::AT_THE_GAP) == 0
+    }
+
     fn potential(&self, penetration: f64) -> f64 {
         let corners = self.graph.corners();
         let Some(at) = self.graph.branch(penetration, NodeContext::AT_THE_GAP).checked_sub(1) else {
@@ -102,9 +108,7 @@ impl PenetrationLaw {
             Some(self.graph.slope(penetration, NodeContext::AT_THE_GAP)).filter(|slope| slope.is_finite());
         self.potentials[at] + (pressure + 0.5 * slope.unwrap_or(0.0) * more) * more
     }
-}
 
-impl Potential for PenetrationLaw {
     fn mean(&self, before: f64, after: f64) -> [f64; 2] {
         let (low, high) = (before.min(after), before.max(after));
         // Without rounding, also of small changes, as a sum over the corners between.
@@ -130,100 +134,10 @@ impl Potential for PenetrationLaw {
         [mean, (own - mean) / (after - before)]
     }
 
-    fn vertical_parts(&self, before: f64) -> Vertical {
+    fn wall(&self) -> Option<f64> {
         let corners = self.graph.corners();
-        let jump = corners.windows(2).find(|pair| pair[0][0] == before && pair[1][0] == before);
-        let last = corners[corners.len() - 1][0];
         let is_rigid = self.graph.slope_of(corners.len()) == f64::INFINITY;
-        Vertical { jump: jump.map(|pair| [pair[0][1], pair[1][1]]), wall: is_rigid.then_some(last) }
-    }
-
-    fn steepest_decrease(&self) -> f64 {
-        self.graph.monotonicity_constant(1.0)
-    }
-}
-
-impl Response for PenetrationLaw {
-    fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
-        let k = node.step_length;
-        if node.penetration == f64::NEG_INFINITY {
-            return Resolved::free(s, c);
-        }
-        if let Some(before) = node.mean_from {
-            let found = discrete_gradient::resolve(self, s, c, node, before);
-            let branch = self.branch(found.velocity, node).max(found.branch);
-            return Resolved { branch, ..found };
-        }
-        let parameter = c / k;
-        let of_graph = self.graph.resolve(s + parameter * node.penetration, parameter, node);
-        if of_graph.branch == 0 {
-            return Resolved::free(s, c);
-        }
-        let pressure = of_graph.pressure;
-        let derivative = of_graph.derivative / k;
-        Resolved { velocity: (s - pressure) / c, pressure, derivative, branch: of_graph.branch }
-    }
-
-    fn pressure(&self, velocity: f64, node: NodeContext) -> f64 {
-        if let Some(before) = node.mean_from {
-            return self.mean(before, node.penetration_at(velocity))[0];
-        }
-        match self.branch(velocity, node) {
-            0 => 0.0,
-            _ => self.graph.pressure(node.penetration_at(velocity), node),
-        }
-    }
-
-    fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
-        let after = node.penetration_at(velocity);
-        let own = || self.graph.slope(after, node);
-        node.step_length * node.mean_from.map_or_else(own, |before| self.mean(before, after)[1])
-    }
-
-    fn branch(&self, velocity: f64, node: NodeContext) -> usize {
-        self.graph.branch(node.penetration_at(velocity), node)
-    }
-
-    fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, [width, height]: [f64; 2]) -> f64 {
-        if node.penetration == f64::NEG_INFINITY {
-            return pressure.abs() / height;
-        }
-        if let Some(before) = node.mean_from {
-            return discrete_gradient::distance(self, [velocity, pressure], (node, before), [width, height]);
-        }
-        self.graph.distance(node.penetration_at(velocity), pressure, node, [node.step_length * width, height])
-    }
-
-    fn has_vertical_parts(&self) -> bool {
-        self.graph.has_vertical_parts()
-    }
-
-    fn depends_on_displacement(&self) -> bool {
-        true
-    }
-
-    fn is_zero(&self) -> bool {
-        self.graph.is_zero()
-    }
-
-    fn monotonicity_constant(&self, step_length: f64) -> f64 {
-        step_length * self.graph.monotonicity_constant(1.0)
-    }
-
-    fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
-        Err("there is no growth constant because the law depends on the displacement")
-    }
-
-    fn greatest_pressure(&self) -> f64 {
-        self.graph.greatest_pressure()
-    }
-
-    fn energy(&self, penetration: f64) -> Option<f64> {
-        Some(self.potential(penetration))
-    }
-
-    fn corners(&self) -> &[[f64; 2]] {
-        self.graph.corners()
+        is_rigid.then_some(corners[corners.len() - 1][0])
     }
 }
 
@@ -233,7 +147,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// Pulls with up to 2 Pa, 1 mm away, beside a rigid obstacle.
-    fn glue(slope_after: f64) -> PenetrationLaw {
+    fn glue(slope_after: f64) -> PenetrationLaw<StoringPolyline> {
         let points = vec![[-4e-3, 0.0], [-1e-3, -2.0], [0.0, 0.0]];
         DisplacementGraph { points, slope_after, gap: None }.response().unwrap()
     }

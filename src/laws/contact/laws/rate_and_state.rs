@@ -197,7 +197,7 @@ impl FrictionBound for RateAndState {
     fn context(&self, [recent, earlier]: [f64; 2], blend: Blend) -> SlidingContext {
         let is_blended = blend.earlier != 0.0;
         let history = if is_blended { blend.of(recent.ln(), earlier.ln()).exp() } else { recent };
-        SlidingContext { history, step_length: blend.length, is_blended, held: 0.0 }
+        SlidingContext { history, step_length: blend.length, is_blended, ..SlidingContext::default() }
     }
 
     fn history_after(&self, histories: [f64; 2], blend: Blend, speed: f64) -> f64 {
@@ -296,7 +296,7 @@ mod tests {
     }
 
     fn after(history: f64, step_length: f64) -> SlidingContext {
-        SlidingContext { history, step_length, is_blended: false, held: 0.0 }
+        SlidingContext { history, step_length, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] }
     }
 
     #[test]

@@ -1,0 +1,49 @@
+//! Laws written in the job: built-in laws as formulas have their numbers, on several ranks, for every scheme and through restarts.
+
+use crate::{case::Case, results::assert_same_answer};
+
+const RESPONSE: &str = "if(abs(v) < 0.003, 10*abs(v), if(abs(v) < 0.005, 0.06 - 10*abs(v), 10*abs(v) - 0.04))";
+
+/// A job, the key of its law, and the law as a formula.
+const PAIRS: [(&str, &str, &str); 6] = [
+    ("papers/wang_cheng_2022", "contact.0.normal", RESPONSE),
+    ("stick_on_a_jump", "contact.0.normal", "10*v + 5*sign(v)"),
+    ("sinking_block", "contact.0.normal", "if(v < 0, 0, 10*(1 - exp(-v/0.02)))"),
+    ("compliant_foundation", "contact.0.normal", "1000*max(d, 0)"),
+    ("slip_weakening_block", "contact.0.friction", "0.3 + 0.2*exp(-v/0.05)"),
+    ("distance_weakening_block", "contact.0.friction", "0.3 + 0.3*max(1 - l/0.05, 0)"),
+];
+
+/// The job with its built-in law, and with this formula in its place.
+fn pair(job: &str, key: &str, formula: &str) -> [Case; 2] {
+    let law = match key {
+        _ if job == "compliant_foundation" => format!("{{ expression = {{ pressure = \"{formula}\", gap = 0.001 }} }}"),
+        "contact.0.normal" => format!("{{ expression = {{ pressure = \"{formula}\" }} }}"),
+        _ => format!("{{ expression = {{ coefficient = \"{formula}\" }} }}"),
+    };
+    let end = if job == "compliant_foundation" { "1.0" } else { "0.35" };
+    let short = || Case::of(job).set("time.end", end);
+    [short(), short().set(key, &law)]
+}
+
+#[test]
+fn built_in_laws_written_as_formulas_give_the_same_answer_on_one_and_two_ranks() {
+    for (job, key, formula) in PAIRS {
+        let [built_in, written] = pair(job, key, formula);
+        let wanted = built_in.run(1);
+        for ranks in [1, 2] {
+            assert_same_answer(&wanted, &written.run(ranks), 1e-10, &format!("{job} on {ranks} ranks"));
+        }
+    }
+}
+
+#[test]
+fn formulas_have_the_numbers_of_built_in_laws_under_every_scheme() {
+    for scheme in ["implicit_euler", "bdf2", "midpoint"] {
+        for (job, key, formula) in [PAIRS[0], PAIRS[3], PAIRS[5]] {
+            let [wanted, found] = pair(job, key, formula)
+                .map(|case| case.set("time.scheme", &format!("'{scheme}'")).set("time.end", "0.1").run(1));
+            assert_same_answer(&wanted, &found, 1e-9, &format!("{job} under {scheme}"));
+        }
+    }
+}
