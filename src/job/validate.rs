@@ -12,7 +12,8 @@ use crate::laws::{
 
 /// The variables of a formula with this list of them, such as "v, d", or time and place, if it is a choice among these.
 fn of_formula(variables: &str) -> Vec<Variable> {
-    let named = Variable::ALL.iter().filter(|variable| variables.split(", ").any(|name| name == variable.name()));
+    let named =
+        Variable::ALL.iter().filter(|variable| variables.split(", ").any(|name| name == variable.name()));
     let named: Vec<Variable> = named.copied().collect();
     match named.iter().all(|variable| Variable::OF_TIME_AND_PLACE.contains(variable)) {
         true => Variable::OF_TIME_AND_PLACE.to_vec(),

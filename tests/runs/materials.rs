@@ -6,7 +6,7 @@ const LAW: &str = "material.viscoplasticity";
 const STRAIN: &str = "equivalent_viscoplastic_strain";
 
 /// Each law with values at which the paper's body flows.
-const LAWS: [(&str, &str); 7] = [
+const LAWS: [(&str, &str); 8] = [
     ("perzyna", "{ perzyna = { relaxation = 100, yield_stress = 9 } }"),
     ("power law", "{ perzyna = { relaxation = 100, yield_stress = 9, exponent = 2.5 } }"),
     ("hardening", "{ perzyna = { relaxation = 100, yield_stress = 9, hardening_modulus = 300 } }"),
@@ -20,6 +20,7 @@ const LAWS: [(&str, &str); 7] = [
         "{ norton = { rate = 0.01, reference_stress = 9, exponent = 3, hardening_strain = 0.02, \
          hardening_exponent = 2 } }",
     ),
+    ("creep by a formula", "{ expression = { rate = '0.01*(q/9)^3/(1 + e/0.02)', reference_stress = 9 } }"),
     ("maxwell", "{ maxwell = { relaxation_time = 0.4, volumetric_relaxation_time = 3 } }"),
     ("drucker prager", "{ drucker_prager = { relaxation = 100, friction_coefficient = 0.5, cohesion = 4 } }"),
 ];

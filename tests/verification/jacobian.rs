@@ -10,10 +10,11 @@ use clarke::{
     job::{Expression, Fix, FixedDirections, Scalar},
     laws::{
         contact::{
-            Bound, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw, Gap, Graph,
-            NormalLaw, NormalResponse, ObstacleLoad, Plane, SlipWeakening, Sphere, Symmetry, Tresca,
-            Unilateral,
+            Bound, CoefficientFormula, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw,
+            Gap, Graph, NormalLaw, NormalResponse, ObstacleLoad, Plane, PressureFormula, SlipWeakening,
+            Sphere, Symmetry, Tresca, Unilateral,
         },
+        expression::{Formula, Variable},
         material::{ByMaterial, Isotropic},
     },
     linear_algebra::petsc::{Matrix, NonlinearProblem, ProjectedKsp},
@@ -42,16 +43,28 @@ fn laws() -> Vec<NormalResponse> {
         springs(300.0, 1.0),
         springs(4000.0, 2.0),
         NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap: None }),
+        written("30*v*exp(-v/0.3) + 2*sign(v)"),
+        written("if(d < 0.002, 4e3*max(d, 0), 8 + 300*(d - 0.002)^1.5)"),
     ];
     laws.iter().map(|law| law.response().expect("a law")).collect()
 }
 
-const FRICTION: [Option<FrictionLaw>; 4] = [
-    None,
-    Some(FrictionLaw::Tresca(Tresca { bound: 60.0 })),
-    Some(FrictionLaw::Coulomb(Coulomb { coefficient: 0.6 })),
-    Some(FrictionLaw::SlipWeakening(SlipWeakening { at_rest: 0.9, dynamic: 0.4, decay_velocity: 0.5 })),
-];
+fn written(pressure: &str) -> NormalLaw {
+    let pressure = Formula::parse(pressure, Variable::ALL).expect("a formula");
+    NormalLaw::PressureFormula(PressureFormula { pressure, gap: None })
+}
+
+fn friction_laws() -> [Option<FrictionLaw>; 5] {
+    let formula = "0.3 + 0.2*exp(-v/0.4) + 0.1*exp(-p/20) + 0.2*exp(-l/0.01) + 0.05*sin(3*x)";
+    let formula = Formula::parse(formula, Variable::ALL).expect("a formula");
+    [
+        None,
+        Some(FrictionLaw::Tresca(Tresca { bound: 60.0 })),
+        Some(FrictionLaw::Coulomb(Coulomb { coefficient: 0.6 })),
+        Some(FrictionLaw::SlipWeakening(SlipWeakening { at_rest: 0.9, dynamic: 0.4, decay_velocity: 0.5 })),
+        Some(FrictionLaw::CoefficientFormula(CoefficientFormula::new(formula))),
+    ]
+}
 
 fn wall() -> Gap {
     Gap::Distance(Scalar::Number(0.01))
@@ -82,10 +95,12 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
     both.sort_unstable();
     let mut coupled = 0;
     for (law, normal) in laws().into_iter().enumerate() {
-        let nodal = FRICTION.map(|friction| (Quadrature::Nodal, friction, true, false));
+        let nodal = friction_laws().map(|friction| (Quadrature::Nodal, friction, true, false));
         // For the fixed-point iteration, which keeps the pressures in the friction bounds.
-        let held = FRICTION[2..].iter().map(|friction| (Quadrature::Nodal, *friction, false, false));
-        let dragged = FRICTION[1..].iter().map(|friction| (Quadrature::Nodal, *friction, true, true));
+        let held =
+            friction_laws().into_iter().skip(2).map(|friction| (Quadrature::Nodal, friction, false, false));
+        let dragged =
+            friction_laws().into_iter().skip(1).map(|friction| (Quadrature::Nodal, friction, true, true));
         let dragged = dragged.filter(|_| normal.depends_on_displacement());
         let all = nodal.into_iter().chain(held).chain(dragged);
         for (quadrature, friction, follows, moves) in all.chain([(Quadrature::Gauss, None, true, false)]) {
@@ -115,7 +130,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             };
             assert!(session.total(contacts[0].point_count()) > 0);
             contacts.iter_mut().for_each(|c| c.scale = 2.0 * normal.monotonicity_constant(1.0) + 30.0);
-            if let Some(friction) = friction {
+            if let Some(friction) = friction.clone() {
                 contacts[0].add_friction(friction, &body.mesh, &body.held).expect("friction");
                 assert!(session.total(contacts[0].friction_point_count()) > 0);
                 contacts[0].set_friction(250.0, follows);
@@ -231,7 +246,7 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
     let law = laws()[6].clone();
     let conditions = ContactConditions { quadrature: Quadrature::Nodal, law, gap, paired: None };
     let mut contact = Contact::new(session, &body.mesh, &facets, conditions, &body.held).expect("contact");
-    let friction = FRICTION[1].expect("a law");
+    let friction = friction_laws()[1].clone().expect("a law");
     contact.add_friction(friction, &body.mesh, &body.held).expect("friction");
     let mut direction = vec![0.1; D];
     direction[0] = 1.0;
@@ -299,7 +314,9 @@ fn follows_belt(session: &Session) {
         paired: None,
     };
     let mut contact = Contact::new(session, &body.mesh, &facets, conditions, &body.held).expect("contact");
-    contact.add_friction(FRICTION[2].expect("a law"), &body.mesh, &body.held).expect("friction");
+    contact
+        .add_friction(friction_laws()[2].clone().expect("a law"), &body.mesh, &body.held)
+        .expect("friction");
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
     contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");

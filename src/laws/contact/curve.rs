@@ -52,12 +52,16 @@ impl Curve {
             let at = roundest(before, after);
             // How far the smooth parts may rise between the two numbers.
             let rise = |side: &Enclosure| side.slope.low.abs().max(side.slope.high.abs()) * (after - before);
-            let slack = Some(2.0 * (rise(&low) + rise(&high))).filter(|slack| slack.is_finite()).unwrap_or(0.0);
+            let slack =
+                Some(2.0 * (rise(&low) + rise(&high))).filter(|slack| slack.is_finite()).unwrap_or(0.0);
             let [from, to] = [before, after].map(|at| formula.value(&[(variable, at)]));
             if low.value.low > high.value.high + slack {
                 return Err([
-                    format!("at {name} = {at} the pressure falls from {from} to {to}: a downward jump has no relaxed monotonicity constant"),
-                    "no step is short enough to have a unique solution: replace the jump by a steep slope".into(),
+                    format!(
+                        "at {name} = {at} the pressure falls from {from} to {to}: a downward jump has no relaxed monotonicity constant"
+                    ),
+                    "no step is short enough to have a unique solution: replace the jump by a steep slope"
+                        .into(),
                 ]);
             }
             if high.value.low > low.value.high + slack {
@@ -73,7 +77,9 @@ impl Curve {
             corners.push([0.0, formula.value(&[(variable, 0.0)])]);
             branches = vec![[-REACH, 0.0], [0.0, REACH]];
         }
-        let reach = corners.iter().fold([0.0; 2], |[v, p]: [f64; 2], corner| [v.max(corner[0].abs()), p.max(corner[1].abs())]);
+        let reach = corners
+            .iter()
+            .fold([0.0; 2], |[v, p]: [f64; 2], corner| [v.max(corner[0].abs()), p.max(corner[1].abs())]);
         Ok(Self { formula, variable, corners, branches, facts: Facts { reach, ..facts } })
     }
 
@@ -124,7 +130,8 @@ fn adaptive(function: &dyn Fn(f64) -> f64, [a, b]: [f64; 2], whole: [f64; 2], de
     if depth == 0 || (sum - whole[0]).abs() <= EXACT * (halves[0][1] + halves[1][1]) {
         return sum;
     }
-    adaptive(function, [a, middle], halves[0], depth - 1) + adaptive(function, [middle, b], halves[1], depth - 1)
+    adaptive(function, [a, middle], halves[0], depth - 1)
+        + adaptive(function, [middle, b], halves[1], depth - 1)
 }
 
 /// The integral from `a` to `b` in parts that grow with the distance from `a`, so that no scale is missed.
@@ -156,7 +163,9 @@ impl StoringCurve {
         let far = curve.on_branch(0, -REACH)[0];
         if far.abs() > EXACT * curve.facts.reach[1].max(curve.on_branch(0, 0.0)[0].abs()) {
             return Err([
-                format!("the pressure far from the obstacle is {far} Pa, but a boundary without contact has none"),
+                format!(
+                    "the pressure far from the obstacle is {far} Pa, but a boundary without contact has none"
+                ),
                 "let it vanish where the gap is open, for example by max(d, 0) in place of d".into(),
             ]);
         }
@@ -177,7 +186,11 @@ impl StoringCurve {
             let branch = self.curve.branch(0.5 * (from + to), NodeContext::AT_THE_GAP);
             let pressure = |at: f64| self.curve.on_branch(branch, at)[0];
             // From the end that is nearer to the obstacle.
-            sum += if from.abs() < to.abs() { integral(&pressure, from, to) } else { -integral(&pressure, to, from) };
+            sum += if from.abs() < to.abs() {
+                integral(&pressure, from, to)
+            } else {
+                -integral(&pressure, to, from)
+            };
             from = to;
         }
         sum
@@ -212,18 +225,26 @@ impl StoringGraph for StoringCurve {
         }
         // On one branch the derivative is an integral, too, without the rounding of a difference.
         let at = |share: f64| self.curve.on_branch(branch, before + share * advance);
-        let mean = |function: &dyn Fn(f64) -> f64| adaptive(function, [0.0, 1.0], gauss(function, 0.0, 1.0), 12);
+        let mean =
+            |function: &dyn Fn(f64) -> f64| adaptive(function, [0.0, 1.0], gauss(function, 0.0, 1.0), 12);
         [mean(&|share| at(share)[0]), mean(&|share| share * at(share)[1])]
     }
 }
 
 impl Facts {
-    fn new(formula: &Formula, variable: Variable, branches: &[[f64; 2]], corners: &[[f64; 2]]) -> Result<Self, [String; 2]> {
+    fn new(
+        formula: &Formula,
+        variable: Variable,
+        branches: &[[f64; 2]],
+        corners: &[[f64; 2]],
+    ) -> Result<Self, [String; 2]> {
         let name = variable.name();
         let explain = |unproven| explain(unproven, name);
         let parts = |reach: f64| -> Vec<[(Variable, Interval); 1]> {
             let kept = branches.iter().map(|[low, high]| [low.max(-reach), high.min(reach)]);
-            kept.filter(|[low, high]| low < high).map(|[low, high]| [(variable, Interval::new(low, high))]).collect()
+            kept.filter(|[low, high]| low < high)
+                .map(|[low, high]| [(variable, Interval::new(low, high))])
+                .collect()
         };
         let supremum = |reach: f64, of: &dyn Fn(&Enclosure) -> Interval| {
             let parts = parts(reach);
@@ -232,7 +253,9 @@ impl Facts {
         let [fall, steepest] = supremum(REACH, &|known| -known.slope).map_err(explain)?;
         if fall == f64::INFINITY {
             return Err([
-                format!("the pressure falls without bound near {name} = {steepest}, so that no step is short enough to have a unique solution"),
+                format!(
+                    "the pressure falls without bound near {name} = {steepest}, so that no step is short enough to have a unique solution"
+                ),
                 format!("bound the decrease, for example by max({name}, -1) in place of {name}"),
             ]);
         }
@@ -244,18 +267,32 @@ impl Facts {
             let [first, last] = [branches[0], branches[branches.len() - 1]];
             let ends = [first, last].map(|ends| ends.map(|end| end.clamp(-reach, reach)));
             let ends = ends.map(|[low, high]| [(variable, Interval::new(low, high))]);
-            formula.supremum(ends.iter().map(|part| &part[..]), variable, |known| known.slope.size()).map_err(explain)
+            formula
+                .supremum(ends.iter().map(|part| &part[..]), variable, |known| known.slope.size())
+                .map_err(explain)
         };
         let ([steepest, _], [near, _]) = (outer(REACH)?, outer(REACH.sqrt())?);
         let reach = corners.iter().fold(0.0, |reach: f64, corner| reach.max(corner[0].abs()));
         let inner = formula.supremum(
-            branches.iter().map(|[low, high]| [(variable, Interval::new(low.clamp(-reach, reach), high.clamp(-reach, reach)))]).collect::<Vec<_>>().iter().map(|part| &part[..]),
+            branches
+                .iter()
+                .map(|[low, high]| {
+                    [(variable, Interval::new(low.clamp(-reach, reach), high.clamp(-reach, reach)))]
+                })
+                .collect::<Vec<_>>()
+                .iter()
+                .map(|part| &part[..]),
             variable,
             |known| known.value.size(),
         );
         let [inner, _] = inner.map_err(explain)?;
         let growth = (steepest <= near * 10.0 && steepest.is_finite()).then_some([inner, steepest]);
-        Ok(Self { fall: fall.max(0.0), greatest: if is_bounded { greatest } else { f64::INFINITY }, growth, reach: [0.0; 2] })
+        Ok(Self {
+            fall: fall.max(0.0),
+            greatest: if is_bounded { greatest } else { f64::INFINITY },
+            growth,
+            reach: [0.0; 2],
+        })
     }
 }
 
@@ -266,7 +303,8 @@ fn point(formula: &Formula, variable: Variable, at: f64) -> Enclosure {
 
 /// The one of the few numbers from `before` to `after` that has the fewest digits.
 fn roundest(before: f64, after: f64) -> f64 {
-    let numbers = std::iter::successors(Some(before), |number| Some(number.next_up()).filter(|next| *next <= after));
+    let numbers =
+        std::iter::successors(Some(before), |number| Some(number.next_up()).filter(|next| *next <= after));
     numbers.min_by_key(|number| format!("{number:e}").len()).unwrap_or(after)
 }
 
@@ -302,7 +340,7 @@ impl Response for Curve {
             [c * velocity + pressure - s, c + slope]
         };
         let free = s / c;
-        let start = if low < free && free < high { free } else { (0.5 * (low + high)).clamp(low, high) };
+        let start = if low < free && free < high { free } else { 0.5 * (low + high) };
         let velocity = increasing_root(low, high, start, open);
         let [pressure, slope] = self.on_branch(branch, velocity);
         let derivative = 1.0 / (c + slope);
@@ -324,15 +362,17 @@ impl Response for Curve {
         self.corners.partition_point(|corner| corner[0] <= velocity)
     }
 
-    /// The distance from the point of the graph with the same parameter.
+    /// The smaller one of the distances at the same velocity and from the point of the graph with the same parameter.
     fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64 {
         let [width, height] = std::array::from_fn(|i| self.facts.reach[i].max(range[i]));
+        let off = (self.pressure(velocity, node) - pressure).abs();
         let c = (height / width).max(2.0 * self.facts.fall);
-        let found = self.resolve(c * velocity + pressure, c, node);
-        if found.velocity == velocity && found.pressure == pressure {
-            return 0.0;
+        if off == 0.0 || off.is_nan() || !c.is_finite() || c == 0.0 {
+            return off / height.max(f64::MIN_POSITIVE);
         }
-        ((found.velocity - velocity) / width).hypot((found.pressure - pressure) / height)
+        let found = self.resolve(c * velocity + pressure, c, node);
+        let beside = ((found.velocity - velocity) / width).hypot((found.pressure - pressure) / height);
+        beside.min(off / height)
     }
 
     fn has_vertical_parts(&self) -> bool {
@@ -348,7 +388,9 @@ impl Response for Curve {
     }
 
     fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
-        self.facts.growth.ok_or("there are no growth constants because the pressure grows faster than the velocity")
+        self.facts
+            .growth
+            .ok_or("there are no growth constants because the pressure grows faster than the velocity")
     }
 
     fn greatest_pressure(&self) -> f64 {

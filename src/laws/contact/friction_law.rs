@@ -198,7 +198,8 @@ pub trait FrictionBound {
             return Slip { speed, traction, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
         }
         let whole = speed.hypot(held);
-        let coefficient = if pressure > 0.0 { self.by_pressure(whole, pressure, at) * speed / whole } else { 0.0 };
+        let coefficient =
+            if pressure > 0.0 { self.by_pressure(whole, pressure, at) * speed / whole } else { 0.0 };
         Slip { speed, traction, derivative, slope, coefficient }
     }
 }

@@ -211,8 +211,14 @@ mod tests {
         }
     }
 
-    const FIRST: SlidingContext =
-        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] };
+    const FIRST: SlidingContext = SlidingContext {
+        history: 0.0,
+        step_length: 0.0,
+        is_blended: false,
+        held: 0.0,
+        time: 0.0,
+        place: [0.0; 3],
+    };
 
     fn any_law() -> impl Strategy<Value = FrictionLaw> {
         let weakening =

@@ -98,7 +98,12 @@ impl<G: StoringGraph> Response for PenetrationLaw<G> {
         if let Some(before) = node.mean_from {
             return discrete_gradient::distance(self, [velocity, pressure], (node, before), [width, height]);
         }
-        self.0.graph().distance(node.penetration_at(velocity), pressure, node, [node.step_length * width, height])
+        self.0.graph().distance(
+            node.penetration_at(velocity),
+            pressure,
+            node,
+            [node.step_length * width, height],
+        )
     }
 
     fn has_vertical_parts(&self) -> bool {

@@ -88,7 +88,13 @@ impl Program {
             let middles = ranges.map(|range| Interval::from(middle(range.low, range.high)));
             let (there, known) = (of(&self.enclose(&middles, by)), self.enclose(&ranges, by));
             let is_defined = known.value.is_defined;
-            Part { bound: of(&known).high, taken: there.low, rounding: there.high - there.low, is_defined, ranges }
+            Part {
+                bound: of(&known).high,
+                taken: there.low,
+                rounding: there.high - there.low,
+                is_defined,
+                ranges,
+            }
         };
         let mut add = |heap: &mut BinaryHeap<Part>, ranges: Ranges| {
             let part = part(ranges);
@@ -105,8 +111,10 @@ impl Program {
             count += 1;
             let is_rounding = rounding.is_finite() && bound.abs().max(taken.abs()) <= ROUNDING * rounding;
             let is_sharp = bound <= known + SHARP * known.abs() || is_rounding;
-            let widest = axes.iter().copied().max_by_key(|&axis| steps_between(ranges[axis].low, ranges[axis].high));
-            let widest = widest.filter(|&axis| middle(ranges[axis].low, ranges[axis].high) != ranges[axis].low);
+            let widest =
+                axes.iter().copied().max_by_key(|&axis| steps_between(ranges[axis].low, ranges[axis].high));
+            let widest =
+                widest.filter(|&axis| middle(ranges[axis].low, ranges[axis].high) != ranges[axis].low);
             let place = middle(ranges[by as usize].low, ranges[by as usize].high);
             match widest {
                 _ if is_sharp && is_defined => {

@@ -106,7 +106,8 @@ impl Machine for Enclosures<'_> {
         let mut outer = Interval::from(ends[0][1]);
         for behind in first..=last {
             outer = outer.hull(Interval::from(interpolate(table, behind, argument.low)[1]));
-            value = table[first..last].iter().fold(value, |value, point| value.hull(Interval::from(point[1])));
+            value =
+                table[first..last].iter().fold(value, |value, point| value.hull(Interval::from(point[1])));
         }
         // Interpolated values are rounded a few times.
         let slack = 8.0 * f64::EPSILON * value.low.abs().max(value.high.abs());

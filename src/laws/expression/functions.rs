@@ -118,7 +118,11 @@ const BELOW: Piece = Piece {
 const MIN: Binary = Binary::smooth(
     (f64::min, |left, right| if left < right { [1.0, 0.0] } else { [0.0, 1.0] }),
     (
-        |left, right| Interval { low: left.low.min(right.low), high: left.high.min(right.high), ..left.hull(right) },
+        |left, right| Interval {
+            low: left.low.min(right.low),
+            high: left.high.min(right.high),
+            ..left.hull(right)
+        },
         |left, right| chosen(left, right),
     ),
 )
@@ -126,7 +130,11 @@ const MIN: Binary = Binary::smooth(
 const MAX: Binary = Binary::smooth(
     (f64::max, |left, right| if left < right { [0.0, 1.0] } else { [1.0, 0.0] }),
     (
-        |left, right| Interval { low: left.low.max(right.low), high: left.high.max(right.high), ..left.hull(right) },
+        |left, right| Interval {
+            low: left.low.max(right.low),
+            high: left.high.max(right.high),
+            ..left.hull(right)
+        },
         |left, right| chosen(right, left),
     ),
 )
@@ -144,7 +152,9 @@ fn chosen(smaller: Interval, larger: Interval) -> [Interval; 2] {
 
 /// The second value where the first is not 0, else the third.
 const CHOICE: Ternary = Ternary {
-    piece: |[condition, ..]| if condition.is_nan() { condition } else { f64::from(u8::from(condition != 0.0)) },
+    piece: |[condition, ..]| {
+        if condition.is_nan() { condition } else { f64::from(u8::from(condition != 0.0)) }
+    },
     decide: |[condition, ..]| match condition.contains(0.0) {
         false => Some(1.0),
         true => condition.is(0.0).then_some(0.0),

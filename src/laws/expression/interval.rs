@@ -305,14 +305,16 @@ impl Real for Interval {
 
     fn ln(self) -> Self {
         let all = [f64::NEG_INFINITY, f64::INFINITY];
-        let part = self.within(0.0, f64::INFINITY).map_or(Self::NOTHING_KNOWN, |part| part.increasing(f64::ln, all));
+        let part =
+            self.within(0.0, f64::INFINITY).map_or(Self::NOTHING_KNOWN, |part| part.increasing(f64::ln, all));
         Self { is_defined: part.is_defined && self.low > 0.0, ..part }
     }
 
     fn log10(self) -> Self {
         let all = [f64::NEG_INFINITY, f64::INFINITY];
-        let part =
-            self.within(0.0, f64::INFINITY).map_or(Self::NOTHING_KNOWN, |part| part.increasing(f64::log10, all));
+        let part = self
+            .within(0.0, f64::INFINITY)
+            .map_or(Self::NOTHING_KNOWN, |part| part.increasing(f64::log10, all));
         Self { is_defined: part.is_defined && self.low > 0.0, ..part }
     }
 
@@ -325,7 +327,8 @@ impl Real for Interval {
     }
 
     fn tan(self) -> Self {
-        if self.high - self.low >= PI || self.low.abs().max(self.high.abs()) > 1e6 || self.meets(0.5 * PI, PI) {
+        if self.high - self.low >= PI || self.low.abs().max(self.high.abs()) > 1e6 || self.meets(0.5 * PI, PI)
+        {
             return Self::NOTHING_KNOWN;
         }
         self.increasing(f64::tan, [f64::NEG_INFINITY, f64::INFINITY])
@@ -336,7 +339,8 @@ impl Real for Interval {
     }
 
     fn acos(self) -> Self {
-        self.within(-1.0, 1.0).map_or(Self::NOTHING_KNOWN, |part| (-part).increasing(|x| (-x).acos(), [0.0, 4.0]))
+        self.within(-1.0, 1.0)
+            .map_or(Self::NOTHING_KNOWN, |part| (-part).increasing(|x| (-x).acos(), [0.0, 4.0]))
     }
 
     fn atan(self) -> Self {

@@ -26,17 +26,22 @@ pub enum Variable {
     L,
     /// Contact pressure in Pa.
     P,
+    /// Von Mises norm of the stress in Pa.
+    Q,
+    /// Accumulated viscoplastic strain.
+    E,
 }
 
 impl Variable {
     /// Those of expressions in time and place.
     pub const OF_TIME_AND_PLACE: &[Self] = &[Self::T, Self::X, Self::Y, Self::Z];
     /// All, in their order.
-    pub const ALL: &[Self] = &[Self::T, Self::X, Self::Y, Self::Z, Self::V, Self::D, Self::L, Self::P];
+    pub const ALL: &[Self] =
+        &[Self::T, Self::X, Self::Y, Self::Z, Self::V, Self::D, Self::L, Self::P, Self::Q, Self::E];
 
     /// Its name in expressions.
     pub fn name(self) -> &'static str {
-        ["t", "x", "y", "z", "v", "d", "l", "p"][self as usize]
+        ["t", "x", "y", "z", "v", "d", "l", "p", "q", "e"][self as usize]
     }
 }
 
@@ -281,7 +286,10 @@ impl Binary {
     }
 
     /// A comparison.
-    pub(super) const fn switch(at: fn(f64, f64) -> f64, decide: fn(Interval, Interval) -> Option<f64>) -> Self {
+    pub(super) const fn switch(
+        at: fn(f64, f64) -> f64,
+        decide: fn(Interval, Interval) -> Option<f64>,
+    ) -> Self {
         fn flat(_: f64, _: f64) -> [f64; 2] {
             [0.0; 2]
         }

@@ -173,7 +173,10 @@ fn formula(text: &str) -> Formula {
 fn formulas_have_their_own_variables() {
     assert_eq!(formula("2*v + 1").value(&[(Variable::V, 3.0)]), 7.0);
     let fault = Formula::parse("v + t", VELOCITY).expect_err("time");
-    assert!(fault.message.contains("unknown name `t`") && fault.help.contains("known names: v, pi"), "{fault:?}");
+    assert!(
+        fault.message.contains("unknown name `t`") && fault.help.contains("known names: v, pi"),
+        "{fault:?}"
+    );
     assert!(Expression::parse("v").is_err());
 }
 
@@ -181,11 +184,40 @@ fn formulas_have_their_own_variables() {
 #[test]
 fn derivatives_agree_with_differences_and_enclosures_contain_all() {
     let texts = [
-        "v^3 - 2*v/(v^2 + 1)", "(v^2 + 0.1)^(-0.4)", "(v^2 + 0.1)^v", "2^v", "-v^2", "v^-2", "abs(v - 0.3)", "min(v, 0.5, v^2)",
-        "max(sin(3*v), cos(v))", "atan2(v, 2 - v)", "hypot(v, 0.3)", "sign(v)*v", "floor(3*v)*v", "ceil(v) + v", "round(2*v)",
-        "step(v - 0.1)*exp(v)", "if(v < 0, v, v^2)", "(v >= 0.2)*v + (v <= 0.1) + (v > 3) ", "pulse(v, 0.1, 0.5)*v",
-        "interpolate(v, -1, 2, 0, 0, 1, 5)", "sqrt(v^2 + 1)", "cbrt(v)", "ln(v^2 + 0.2)", "log10(v^2 + 0.2)", "tan(v/4)",
-        "asin(v/4)", "acos(v/4)", "atan(5*v)", "sinh(v)", "cosh(v)", "tanh(3*v)", "v*exp(-v/0.02)", "3", "sqrt(v + 5)",
+        "v^3 - 2*v/(v^2 + 1)",
+        "(v^2 + 0.1)^(-0.4)",
+        "(v^2 + 0.1)^v",
+        "2^v",
+        "-v^2",
+        "v^-2",
+        "abs(v - 0.3)",
+        "min(v, 0.5, v^2)",
+        "max(sin(3*v), cos(v))",
+        "atan2(v, 2 - v)",
+        "hypot(v, 0.3)",
+        "sign(v)*v",
+        "floor(3*v)*v",
+        "ceil(v) + v",
+        "round(2*v)",
+        "step(v - 0.1)*exp(v)",
+        "if(v < 0, v, v^2)",
+        "(v >= 0.2)*v + (v <= 0.1) + (v > 3) ",
+        "pulse(v, 0.1, 0.5)*v",
+        "interpolate(v, -1, 2, 0, 0, 1, 5)",
+        "sqrt(v^2 + 1)",
+        "cbrt(v)",
+        "ln(v^2 + 0.2)",
+        "log10(v^2 + 0.2)",
+        "tan(v/4)",
+        "asin(v/4)",
+        "acos(v/4)",
+        "atan(5*v)",
+        "sinh(v)",
+        "cosh(v)",
+        "tanh(3*v)",
+        "v*exp(-v/0.02)",
+        "3",
+        "sqrt(v + 5)",
     ];
     for text in texts {
         let formula = formula(text);
@@ -200,11 +232,17 @@ fn derivatives_agree_with_differences_and_enclosures_contain_all() {
                 let v = v.min(low + width);
                 let [value, slope] = formula.differentiate(&[(Variable::V, v)], Variable::V);
                 assert_eq!(value, formula.value(&[(Variable::V, v)]), "{text}");
-                assert!(known.value.contains(value) && known.slope.contains(slope), "{text} at {v}: {value} {slope} {known:?}");
+                assert!(
+                    known.value.contains(value) && known.slope.contains(slope),
+                    "{text} at {v}: {value} {slope} {known:?}"
+                );
                 if known.is_one_piece && part > 0 && part < 10 {
                     let at = |v| formula.value(&[(Variable::V, v)]);
                     let by_difference = (at(v + 1e-6) - at(v - 1e-6)) / 2e-6;
-                    assert!((by_difference - slope).abs() <= 1e-5 * (1.0 + slope.abs()), "{text} at {v}: {slope} {by_difference}");
+                    assert!(
+                        (by_difference - slope).abs() <= 1e-5 * (1.0 + slope.abs()),
+                        "{text} at {v}: {slope} {by_difference}"
+                    );
                 }
             }
         }
@@ -220,7 +258,10 @@ fn pieces_begin_where_conditions_change() {
     assert_eq!(borders("if(v <= 0.1, 1, 2)"), [[0.1, 0.1_f64.next_up()]]);
     let found = borders("sign(v) + min(3, abs(v - 1))");
     let places: Vec<f64> = found.iter().map(|border| (border[0] + border[1]) / 2.0).collect();
-    assert!(places.iter().zip([-2.0, 0.0, 1.0, 4.0]).all(|(a, b)| (a - b).abs() < 1e-15) && places.len() == 4, "{places:?}");
+    assert!(
+        places.iter().zip([-2.0, 0.0, 1.0, 4.0]).all(|(a, b)| (a - b).abs() < 1e-15) && places.len() == 4,
+        "{places:?}"
+    );
     let none = |text: &str| formula(text).borders(&[(Variable::V, all)], Variable::V).unwrap_err();
     assert!(matches!(none("floor(v)"), Unproven::Pieces(_)));
     assert!(matches!(none("if(v*v - v^2 < 1e-300, 1, 2)"), Unproven::Pieces(_)));
@@ -237,7 +278,9 @@ fn suprema_are_sharp_to_a_per_cent_and_never_too_small() {
         let found = fall(&format!("4e3*v*exp(-v/{width})"), 0.0) / 4e3;
         assert!((1.0..1.011).contains(&(found / (-2.0_f64).exp())), "{found}");
     }
-    for increasing in ["tanh(v/0.1)", "v^3", "v - tanh(v)", "v", "sqrt(v)", "v + 0.5*sin(v)", "1 - exp(-v/0.02)"] {
+    for increasing in
+        ["tanh(v/0.1)", "v^3", "v - tanh(v)", "v", "sqrt(v)", "v + 0.5*sin(v)", "1 - exp(-v/0.02)"]
+    {
         assert!(fall(increasing, 0.0) <= 0.0, "{increasing}: {}", fall(increasing, 0.0));
     }
     assert!((fall("v^3 + 0.1*sin(20*v)", 0.0) / 2.0 - 0.97).abs() < 0.04, "beside slopes of 1e60");
@@ -245,7 +288,11 @@ fn suprema_are_sharp_to_a_per_cent_and_never_too_small() {
     assert_eq!(fall("-sqrt(v)", 0.0), f64::INFINITY, "a vertical tangent");
     let top = sup("v*exp(-v)", 0.0, REACH, |known| known.value).unwrap()[0] * 1.0_f64.exp();
     assert!((1.0..1.011).contains(&top), "{top}");
-    assert!(matches!(sup("sqrt(v)", -1.0, 1.0, |known| known.value), Err(Unproven::Undefined(at)) if at <= 0.0));
-    assert!(matches!(sup("1/(1 + v)", -2.0, 2.0, |known| known.slope), Err(Unproven::Undefined(at)) if (at + 1.0).abs() < 1e-9));
+    assert!(
+        matches!(sup("sqrt(v)", -1.0, 1.0, |known| known.value), Err(Unproven::Undefined(at)) if at <= 0.0)
+    );
+    assert!(
+        matches!(sup("1/(1 + v)", -2.0, 2.0, |known| known.slope), Err(Unproven::Undefined(at)) if (at + 1.0).abs() < 1e-9)
+    );
     assert!(matches!(sup("ln(v - 2)", 0.0, 4.0, |known| known.value), Err(Unproven::Undefined(_))));
 }

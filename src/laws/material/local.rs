@@ -116,7 +116,7 @@ impl Material<f64> {
 
     /// The fault of the viscoplastic law; its key is that of the table of the material.
     pub fn fault_of_flow(&self) -> Option<LawFault> {
-        let law = self.viscoplasticity?;
+        let law = self.viscoplasticity.as_ref()?;
         Some(law.fault()?.within(law.name()).within("viscoplasticity"))
     }
 
@@ -127,7 +127,7 @@ impl Material<f64> {
             self.elasticity.map(|law| law.youngs_modulus),
             self.viscosity.map(|law| law.volumetric),
             self.viscosity.map(|law| law.shear),
-            self.viscoplasticity.and_then(|law| law.yield_stress().copied()),
+            self.viscoplasticity.as_ref().and_then(|law| law.yield_stress().copied()),
         ]
     }
 }

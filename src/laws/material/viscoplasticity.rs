@@ -3,6 +3,7 @@
 //! Each law has a file in the folder `viscoplasticity` and a module and an entry in the list of this file. Its file defines its
 //! [`Parameters`], as in the job file, and its [`Flow`], which evaluates it. No other module contains the name of a law.
 
+mod creep_formula;
 mod drucker_prager;
 #[cfg(test)]
 mod fastest_rates;
@@ -10,10 +11,12 @@ mod flow;
 mod maxwell;
 mod norton;
 mod perzyna;
+mod release;
 mod return_mapping;
 mod tangent;
 mod thickness;
 
+pub use creep_formula::CreepFormula;
 pub use drucker_prager::DruckerPrager;
 pub use flow::{Flow, InPlaces, Parameters};
 pub use maxwell::{Dashpots, Maxwell};
@@ -40,7 +43,7 @@ use serde::{Deserialize, Serialize};
 macro_rules! laws {
     ($($(#[$about:meta])* $law:ident $(<$number:ident>)? = $name:literal,)*) => {
         /// The viscoplastic law, at a point or with a yield stress that may vary with place.
-        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[schemars(rename = "Viscoplasticity", description = "The viscoplastic law.")]
         pub enum Viscoplasticity<N = f64> {
             $($(#[$about])* #[serde(rename = $name)] $law($law $(<$number>)?),)*
@@ -102,7 +105,7 @@ macro_rules! laws {
         }
 
         /// A law in its material.
-        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[derive(Debug, Clone, PartialEq)]
         pub enum FlowLaw {
             $($(#[$about])* $law(<$law as Parameters>::Flow),)*
         }
@@ -126,6 +129,8 @@ laws! {
     DruckerPrager<N> = "drucker_prager",
     /// Norton's creep: the creep rate is a power of the stress, without a yield stress, with optional strain hardening.
     Norton = "norton",
+    /// Creep at a rate that is a formula of von Mises stress and accumulated creep strain.
+    CreepFormula = "expression",
 }
 
 /// Methods that delegate to the chosen law.

@@ -383,8 +383,17 @@ fn flow<const D: usize>(draw: &mut Draw<D>, table: &str) {
     let pressure = draw.pressure();
     let viscosity = times(pressure, TIME);
     let law = draw.one_of(&["perzyna", "maxwell", "norton", "drucker_prager"]);
-    draw.line(format!("[{table}.viscoplasticity.{law}]"));
     let (relaxation, bound) = (draw.between(1.0, 10.0), draw.between(0.05, 0.5));
+    if law == "norton" && is_written(bound) {
+        let (rate, reference) = (draw.between(0.001, 0.02), draw.number(1.0, pressure));
+        let rate = draw.number(rate, [0.0, 0.0, -1.0]);
+        let hardening = if draw.chance(0.5) { "/(1 + e/0.1)" } else { "" };
+        let formula = format!("{rate:e}*(q/{reference:e})^2{hardening}");
+        return draw.line(format!(
+            "[{table}.viscoplasticity.expression]\nrate = \"{formula}\"\nreference_stress = {reference:e}"
+        ));
+    }
+    draw.line(format!("[{table}.viscoplasticity.{law}]"));
     match law {
         "perzyna" => {
             let metric = draw.one_of(&["elasticity", "compliance", "frobenius"]);
@@ -613,7 +622,8 @@ fn normal_law<const D: usize>(draw: &mut Draw<D>) -> Normal {
     }
     if as_formula && let "displacement_graph" = law {
         let numbers = [(0.003, 10.0 * high), (0.006, 12.0 * high)];
-        let [(d, p), (e, q)] = numbers.map(|(at, value)| (draw.number(at, LENGTH), draw.number(value, pressure)));
+        let [(d, p), (e, q)] =
+            numbers.map(|(at, value)| (draw.number(at, LENGTH), draw.number(value, pressure)));
         let slope = draw.number(500.0, stiffness);
         let last = format!("{q:e} + {slope:e}*(d - {e:e})");
         let formula = format!("if(d < {e:e}, interpolate(d, 0, 0, {d:e}, {p:e}, {e:e}, {q:e}), {last})");

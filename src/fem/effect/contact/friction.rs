@@ -104,7 +104,10 @@ impl<const D: usize> Friction<D> {
                 all,
                 obstacle: [0.0; D],
                 obstacle_speed: 0.0,
-                context: SlidingContext { place: std::array::from_fn(|i| if i < D { place[i] } else { 0.0 }), ..SlidingContext::default() },
+                context: SlidingContext {
+                    place: std::array::from_fn(|i| if i < D { place[i] } else { 0.0 }),
+                    ..SlidingContext::default()
+                },
                 history: law.first_histories(),
                 pressure: 0.0,
                 traction: [0.0; D],

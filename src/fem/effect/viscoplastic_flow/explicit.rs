@@ -131,13 +131,13 @@ mod tests {
     /// What two steps leave, of cells whose runs are cut as `material` has it: forces, histories, energies, cells that flow.
     /// Each history has the bits of a cell that is alone.
     fn two_steps<const D: usize, const S: usize>(
-        law: FlowLaw,
+        law: &FlowLaw,
         material: fn(usize) -> usize,
     ) -> (Vec<f64>, Vec<f64>, [f64; 2], usize) {
         let mesh = row::<D>();
         let geometry = Geometry::with_materials(&mesh, material);
         let materials = 1 + geometry.runs.iter().map(|run| run.material).max().expect("cells");
-        let laws = ByMaterial::new(vec![Some(law); materials]).expect("a law");
+        let laws = ByMaterial::new(vec![Some(law.clone()); materials]).expect("a law");
         let mut effect = ViscoplasticFlow::<S>::new(laws, &geometry);
         let values = |shift: usize| -> Vec<f64> {
             (0..mesh.nodes.len() * D).map(|i| 0.1 * number(i + shift) * number(1 + i / 20).powi(4)).collect()
@@ -198,11 +198,11 @@ mod tests {
             Viscoplasticity::Maxwell(Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: None }),
         ];
         for law in laws.map(|law| law.prepare(&ELASTICITY, hypothesis)) {
-            let (forces, histories, energies, flowing) = two_steps::<D, S>(law, |_| 0);
+            let (forces, histories, energies, flowing) = two_steps::<D, S>(&law, |_| 0);
             let cells = 2 * row::<D>().cell_regions.len();
             let all = law.equivalent_stress(&[0.0; S]).is_none();
             assert!(flowing > cells / 4 && (flowing < cells) != all, "{flowing} of {cells}");
-            let cut = two_steps::<D, S>(law, |region| region);
+            let cut = two_steps::<D, S>(&law, |region| region);
             assert_eq!((forces, histories, flowing), (cut.0, cut.1, cut.3), "other packs, the same bits");
             for (one, other) in energies.iter().zip(&cut.2) {
                 assert!((one - other).abs() <= 1e-13 * one.abs() && *one != 0.0, "{one} {other}");

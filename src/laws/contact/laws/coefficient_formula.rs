@@ -66,7 +66,9 @@ impl CoefficientFormula {
                 if !self.coefficient.uses(by) {
                     return 0.0;
                 }
-                self.coefficient.supremum([&ranges()[..]], by, of).map_or(f64::INFINITY, |[bound, _]| bound.max(0.0))
+                self.coefficient
+                    .supremum([&ranges()[..]], by, of)
+                    .map_or(f64::INFINITY, |[bound, _]| bound.max(0.0))
             };
             Facts {
                 fall_with_velocity: steepest(Variable::V, |known| -known.slope),
@@ -108,7 +110,9 @@ impl CoefficientFormula {
             let name = variable.name();
             if formula.jumps_along(variable) {
                 return Some([
-                    format!("the coefficient may jump with {name}: a comparison, if, step, sign or a rounded number contains {name}"),
+                    format!(
+                        "the coefficient may jump with {name}: a comparison, if, step, sign or a rounded number contains {name}"
+                    ),
                     "write it with min, max, abs or interpolate, which are continuous".into(),
                 ]);
             }
@@ -118,7 +122,10 @@ impl CoefficientFormula {
             match formula.supremum([&ranges()[..]], variable, |known| -known.slope) {
                 Ok([bound, at]) if bound == f64::INFINITY && variable != Variable::P => {
                     return Some([
-                        format!("the coefficient falls without bound {}, so that no step is short enough to have a unique solution", near([bound, at], name)),
+                        format!(
+                            "the coefficient falls without bound {}, so that no step is short enough to have a unique solution",
+                            near([bound, at], name)
+                        ),
                         format!("bound the decrease, for example by {name} + 1e-6 in place of {name}"),
                     ]);
                 }
@@ -129,9 +136,10 @@ impl CoefficientFormula {
         let by = [Variable::V, Variable::L, Variable::P].into_iter().find(|variable| formula.uses(*variable));
         let by = by.unwrap_or(Variable::T);
         match formula.supremum([&ranges()[..]], by, |known| -known.value) {
-            Ok([least, at]) if least > 0.0 => {
-                Some([format!("the coefficient may be negative {}", near([least, at], by.name())), "write max(..., 0) around it".into()])
-            }
+            Ok([least, at]) if least > 0.0 => Some([
+                format!("the coefficient may be negative {}", near([least, at], by.name())),
+                "write max(..., 0) around it".into(),
+            ]),
             Ok(_) => None,
             Err(unproven) => Some(explain(unproven, by.name())),
         }
@@ -178,9 +186,11 @@ impl FrictionBound for CoefficientFormula {
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        self.coefficient
-            .uses(Variable::L)
-            .then(|| FrictionHistory { quantity: quantity!("slip"), initial: 0.0, share: 1.0 })
+        self.coefficient.uses(Variable::L).then(|| FrictionHistory {
+            quantity: quantity!("slip"),
+            initial: 0.0,
+            share: 1.0,
+        })
     }
 
     fn is_same_everywhere(&self) -> bool {
@@ -256,16 +266,21 @@ mod tests {
                 let at = law.context([history; 2], Blend::euler(0.1));
                 let [a, b] = [&law, &formula].map(|law| law.steepest_decrease(at));
                 assert!(a <= b * (1.0 + 1e-12) && b <= 1.011 * a, "{text}: {a} {b}");
-                assert_eq!(law.history_after([0.1, 0.0], Blend::euler(0.1), 2.0), 0.1 + if law.history().is_some() { 0.2 } else { 0.0 });
+                assert_eq!(
+                    law.history_after([0.1, 0.0], Blend::euler(0.1), 2.0),
+                    0.1 + if law.history().is_some() { 0.2 } else { 0.0 }
+                );
                 for pressure in [-1.0, 0.0, 3.0] {
                     let c = 2.0 * b * f64::max(pressure, 0.0) + 0.7;
                     for step in 0..60 {
                         let s = 0.13 * f64::from(step);
                         for held in [0.0, 0.02] {
-                            let [a, b] = [&law, &formula].map(|law| law.resolve_beside(s, c, pressure, at.beside(held)));
+                            let [a, b] = [&law, &formula]
+                                .map(|law| law.resolve_beside(s, c, pressure, at.beside(held)));
                             let off = (a.speed - b.speed).abs() * c + (a.traction - b.traction).abs();
                             assert!(off < 1e-12 * (1.0 + s), "{text} {s} {pressure} {held}: {a:?} {b:?}");
-                            let off = (a.derivative - b.derivative).abs() * c + (a.coefficient - b.coefficient).abs();
+                            let off = (a.derivative - b.derivative).abs() * c
+                                + (a.coefficient - b.coefficient).abs();
                             assert!(off < 1e-9, "{text} {s} {pressure} {held}: {a:?} {b:?}");
                         }
                     }
@@ -311,7 +326,10 @@ mod tests {
         ] {
             let faults = written(text).own_faults();
             assert!(faults.len() == 1 && faults[0].key == "coefficient", "{text}: {faults:?}");
-            assert!(faults[0].message.contains(message) && faults[0].help.contains(help), "{text}: {faults:?}");
+            assert!(
+                faults[0].message.contains(message) && faults[0].help.contains(help),
+                "{text}: {faults:?}"
+            );
         }
         assert!(written("if(t < 1, 0.3, 0.2 + 0.1*exp(-v))").own_faults().is_empty(), "time may switch");
     }

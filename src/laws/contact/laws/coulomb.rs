@@ -23,8 +23,14 @@ impl FrictionBound for Coulomb {
 mod tests {
     use super::*;
 
-    const FIRST: SlidingContext =
-        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] };
+    const FIRST: SlidingContext = SlidingContext {
+        history: 0.0,
+        step_length: 0.0,
+        is_blended: false,
+        held: 0.0,
+        time: 0.0,
+        place: [0.0; 3],
+    };
 
     #[test]
     fn the_bound_is_proportional_to_the_pressure() {

@@ -83,7 +83,11 @@ impl NormalParameters for PressureFormula {
         }
         if self.gap.is_some() && !self.is_of_penetration() {
             let help = "delete the gap, or write the pressure as a formula of the penetration d";
-            faults.push(LawFault::at_key("gap", "a pressure of the velocity does not depend on the gap", help));
+            faults.push(LawFault::at_key(
+                "gap",
+                "a pressure of the velocity does not depend on the gap",
+                help,
+            ));
         }
         faults
     }
@@ -126,7 +130,9 @@ impl Response for FormulaLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::contact::{DampedResponse, DisplacementGraph, ExponentialDamper, NormalLaw, NormalResponse, Symmetry};
+    use crate::laws::contact::{
+        DampedResponse, DisplacementGraph, ExponentialDamper, NormalLaw, NormalResponse, Symmetry,
+    };
     use proptest::prelude::*;
 
     fn by_formula(text: &str) -> NormalResponse {
@@ -153,7 +159,11 @@ mod tests {
                 slope_after: 1e4,
                 gap: None,
             }),
-            NormalLaw::Compliance(crate::laws::contact::Compliance { stiffness: 300.0, exponent: 1.5, gap: None }),
+            NormalLaw::Compliance(crate::laws::contact::Compliance {
+                stiffness: 300.0,
+                exponent: 1.5,
+                gap: None,
+            }),
         ];
         let formulas = [
             "if(abs(v) < 0.003, 10*abs(v), if(abs(v) < 0.005, 0.06 - 10*abs(v), 10*abs(v) - 0.04))",
@@ -193,7 +203,9 @@ mod tests {
             for step in -50..50 {
                 let d = 1.3e-4 * f64::from(step);
                 match (law.energy(d), written.energy(d)) {
-                    (Some(a), Some(b)) => assert!((a - b).abs() < 1e-12 * (1e-3 + a.abs()), "{number} {d}: {a} {b}"),
+                    (Some(a), Some(b)) => {
+                        assert!((a - b).abs() < 1e-12 * (1e-3 + a.abs()), "{number} {d}: {a} {b}")
+                    }
                     (a, b) => assert_eq!(a, b),
                 }
             }
@@ -216,7 +228,10 @@ mod tests {
             let pressure = Formula::parse(text, &[Variable::V, Variable::D]).unwrap();
             let faults = PressureFormula { pressure, gap: None }.own_faults();
             assert!(faults.len() == 1 && faults[0].key == "pressure", "{text}: {faults:?}");
-            assert!(faults[0].message.contains(message) && faults[0].help.contains(help), "{text}: {faults:?}");
+            assert!(
+                faults[0].message.contains(message) && faults[0].help.contains(help),
+                "{text}: {faults:?}"
+            );
         }
         let pressure = Formula::parse("v", &[Variable::V]).unwrap();
         let faults = PressureFormula { pressure, gap: Some(Scalar::Number(1.0)) }.own_faults();
@@ -232,7 +247,10 @@ mod tests {
         let top = 4e3 * 0.02 * (-1.0_f64).exp();
         assert!(top <= damper.greatest_pressure() && damper.greatest_pressure() <= 1.011 * top);
         assert_eq!(by_formula("5*v").growth_constants(), Ok([0.0, 5.0]));
-        assert_eq!((by_formula("5*v").greatest_pressure(), by_formula("5*v").monotonicity_constant(1.0)), (f64::INFINITY, 0.0));
+        assert_eq!(
+            (by_formula("5*v").greatest_pressure(), by_formula("5*v").monotonicity_constant(1.0)),
+            (f64::INFINITY, 0.0)
+        );
         assert!(by_formula("v^3").growth_constants().is_err());
         assert!(by_formula("0*v").is_zero() && by_formula("0").is_zero() && !by_formula("3").is_zero());
         // Bonds that soften exponentially: nonzero everywhere, with an energy of 3 Pa times 1 mm.

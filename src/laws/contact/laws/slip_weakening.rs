@@ -54,8 +54,14 @@ impl FrictionBound for SlipWeakening {
 mod tests {
     use super::*;
 
-    const FIRST: SlidingContext =
-        SlidingContext { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] };
+    const FIRST: SlidingContext = SlidingContext {
+        history: 0.0,
+        step_length: 0.0,
+        is_blended: false,
+        held: 0.0,
+        time: 0.0,
+        place: [0.0; 3],
+    };
 
     #[test]
     fn the_coefficient_falls_by_hand() {

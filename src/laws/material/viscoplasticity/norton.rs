@@ -15,9 +15,7 @@
 //! data in engineering design, Proc. Inst. Mech. Eng. 131 (1935), 131-349; J. T. Boyle, J. Spence, Stress Analysis for Creep,
 //! 1983.)
 //!
-//! `3/2 dev s` is `W s` with `W = 3/2 I - 1/2 tr I`, which shares its eigenspaces with `E`. A step ends in `s = s* / (1 + x E W)`
-//! with
-//! `x = dp / q`, whose logarithm is the root of an increasing equation,
+//! A step ends in `s = s* / (1 + x E W)` ([`Release`]) with `x = dp / q`, whose logarithm is the root of an increasing equation,
 //!
 //! ```text
 //! ln x = ln(k rate / reference stress^n) + (n - 1) ln q(x) - m ln(1 + (p + x q(x)) / p0)
@@ -25,11 +23,12 @@
 
 use super::{
     flow::{Flow, InPlaces, Parameters},
+    release::{Release, WEIGHT},
     tangent::{Tangent, add_product, write_isotropic},
 };
 use crate::{
     laws::material::{Elastic, Elasticity, Hypothesis, Isotropic},
-    linear_algebra::tensor::{Mandel, normal_components, trace, von_mises},
+    linear_algebra::tensor::{Mandel, von_mises},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -85,8 +84,6 @@ impl Parameters for Norton {
     }
 }
 
-/// `W`: the square of the von Mises norm is `s : W s`, also in the plane.
-const WEIGHT: Isotropic = Isotropic { volumetric: -0.5, shear: 1.5 };
 /// Change of the logarithm below which the next correction of Newton's method is a rounding error.
 const LAST: f64 = 1e-10;
 /// Larger than the number of iterations for any stress.
@@ -94,9 +91,7 @@ const ITERATIONS: usize = 200;
 
 /// The coefficients of the equation of a step.
 struct Step {
-    /// Parts of the square of the norm of `s*`, and eigenvalues of `E W`: on multiples of the identity, and on the rest.
-    squares: [f64; 2],
-    stiffness: [f64; 2],
+    release: Release,
     /// Logarithm of `k rate / reference stress^n / (1 + p / p0)^m`.
     pace: f64,
     /// `n - 1`, `m` and `p0 + p`.
@@ -117,15 +112,7 @@ struct Point {
 impl Step {
     fn at(&self, logarithm: f64) -> Point {
         let x = logarithm.exp();
-        let (mut square, mut fall) = (0.0, 0.0);
-        for (part, stiffness) in self.squares.iter().zip(&self.stiffness) {
-            let gain = x * stiffness;
-            let left = part / ((1.0 + gain) * (1.0 + gain));
-            square += left;
-            fall += left * gain / (1.0 + gain);
-        }
-        // Minus the derivative of the norm's logarithm by that of `x`.
-        let (norm, fall) = (square.sqrt(), fall / square);
+        let (norm, fall) = self.release.at(x);
         let growth = x * norm;
         let open =
             logarithm - self.pace - self.power * norm.ln() + self.hardening * (growth / self.strain).ln_1p();
@@ -135,8 +122,9 @@ impl Step {
 
     /// The root, by Newton's method in a bracket. The slope is at least 1.
     fn solve(&self) -> f64 {
-        let norm = (self.squares[0] + self.squares[1]).sqrt();
-        let softest = self.stiffness.into_iter().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+        let Release { squares, stiffness } = &self.release;
+        let norm = (squares[0] + squares[1]).sqrt();
+        let softest = stiffness.iter().copied().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
         // `q` is at most the norm of `s*`, and that over `x` times the softest stiffness.
         let soft = (self.pace + self.power * (norm / softest).ln()) / (self.power + 1.0);
         let start = (self.pace + self.power * norm.ln()).min(soft);
@@ -203,14 +191,9 @@ impl Flow for Elastic<Norton> {
             return None;
         }
         let Norton { rate, reference_stress, exponent, hardening_exponent, .. } = self.parameters;
-        let normal = normal_components::<S>() as f64;
-        let eigenvalues = |tensor: &Isotropic| [tensor.shear + normal * tensor.volumetric, tensor.shear];
-        let ([e, f], [w, v]) = (eigenvalues(&self.elasticity), eigenvalues(&WEIGHT));
-        let along = w * trace(trial) * trace(trial) / normal;
         let hardened = hardening_exponent * (accumulated / self.hardening_strain()).ln_1p();
         let step = Step {
-            squares: [along, (norm * norm - along).max(0.0)],
-            stiffness: [e * w, f * v],
+            release: Release::new(trial, norm, &self.elasticity),
             pace: (length * rate).ln() - exponent * reference_stress.ln() - hardened,
             power: exponent - 1.0,
             hardening: hardening_exponent,
@@ -220,9 +203,7 @@ impl Flow for Elastic<Norton> {
         let Point { slope, norm, .. } = step.at(logarithm);
         let x = logarithm.exp();
         let growth = x * norm;
-        // s = R s* with these eigenvalues of R.
-        let [a, b] = step.stiffness.map(|stiffness| 1.0 / (1.0 + x * stiffness));
-        let left = Isotropic { volumetric: (a - b) / normal, shear: b };
+        let (left, [a, b]) = step.release.map::<S>(x);
         let weighted = WEIGHT.apply(&left.apply(trial));
         if let Some(tangent) = tangent {
             // The derivative of ln q(x) by s* at this x is R W s / q², that of R s* by x is -E W R s.

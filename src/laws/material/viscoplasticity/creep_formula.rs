@@ -1,0 +1,323 @@
+//! Creep whose rate is written in the job as a formula of the von Mises norm of the stress and the accumulated creep strain.
+//!
+//! ```text
+//! X(s) = 3/2 p' dev s / q,   p' = f(q, p)
+//! ```
+//!
+//! with an `f` that is zero without stress, does not decrease with `q` and does not increase with `p`: dissipative, and with a unique end of
+//! every step. A step of length `k` ends in `s = s* / (1 + x E W)` with `x = dp / q` and `W` as in [`norton`](super::norton); `x` is the
+//! root of `x q(x) - k f(q(x), p + x q(x))`, which increases. In plane stress `X` is the in-plane part of that of the plane's stress in
+//! space. All conditions on `f`, and the fastest rate, which bounds explicit steps, follow from enclosures of the formula.
+
+use super::{
+    flow::{Flow, InPlaces, Parameters},
+    release::{Release, WEIGHT},
+    tangent::{Tangent, add_product, write_isotropic},
+};
+use crate::{
+    laws::{
+        expression::{Enclosure, Formula, Interval, REACH, Unproven, Variable},
+        law::{LawFault, increasing_root},
+        material::{Elastic, Elasticity, Hypothesis, Isotropic},
+    },
+    linear_algebra::tensor::{Mandel, von_mises},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
+
+/// Creep at a rate that is a formula: the equivalent creep strain e grows at this rate, in the direction of the stress deviator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CreepFormula {
+    /// Rate of the equivalent creep strain as a formula of the von Mises norm q of the stress in Pa and the equivalent creep strain e.
+    /// It is zero at q = 0, must not decrease with q nor increase with e, and must not jump.
+    #[schemars(extend("unit" = "1/s", "variables" = "q, e"), example = &"1e-3*sinh(q/20e6)^4")]
+    pub rate: Formula,
+    /// Von Mises norm of the stress up to which explicit_step_bound holds with scheme lagged_euler; implicit schemes do not use it.
+    #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 5e7)]
+    pub reference_stress: f64,
+    #[serde(skip)]
+    bounds: OnceLock<Vec<[f64; 2]>>,
+}
+
+impl<N> InPlaces<N> for CreepFormula {
+    type AtPlace = Self;
+
+    fn with_yield_stress(&self, _: f64) -> Self {
+        self.clone()
+    }
+}
+
+impl Parameters for CreepFormula {
+    type Flow = Elastic<Self>;
+
+    fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Elastic<Self> {
+        Elastic { parameters: self.clone(), elasticity: elasticity.tensor(hypothesis) }
+    }
+
+    fn fault(&self) -> Option<LawFault> {
+        let [message, help] = self.first_fault()?;
+        Some(LawFault::at_value("rate", message, help))
+    }
+
+    fn keeps_volume(&self) -> bool {
+        true
+    }
+}
+
+impl CreepFormula {
+    /// For each level the largest derivative of the rate by the stress, and that of its decrease by the strain, up to this stress.
+    fn bounds(&self) -> &[[f64; 2]] {
+        self.bounds.get_or_init(|| {
+            let strains = (Variable::E, Interval::new(0.0, REACH));
+            let (mut low, mut most) = (0.0, [0.0_f64; 2]);
+            let level = |level: i32| {
+                let high = self.reference_stress * (f64::from(level) / PARTS).exp2();
+                let part = [(Variable::Q, Interval::new(low, high)), strains];
+                let sup = |by, sign: f64| {
+                    let of = move |known: &Enclosure| if sign > 0.0 { known.slope } else { -known.slope };
+                    self.rate.supremum([&part[..]], by, of).map_or(f64::INFINITY, |[bound, _]| bound)
+                };
+                let by_strain = if self.rate.uses(Variable::E) { sup(Variable::E, -1.0) } else { 0.0 };
+                most = [most[0].max(sup(Variable::Q, 1.0)), most[1].max(by_strain)];
+                low = high;
+                most
+            };
+            LEVELS.map(level).collect()
+        })
+    }
+
+    fn first_fault(&self) -> Option<[String; 2]> {
+        let from_zero = Interval::new(0.0, REACH);
+        let (all, unloaded) =
+            ([(Variable::Q, from_zero), (Variable::E, from_zero)], [(Variable::E, from_zero)]);
+        for variable in [Variable::Q, Variable::E] {
+            let name = variable.name();
+            if self.rate.jumps_along(variable) {
+                return Some([
+                    format!(
+                        "the rate may jump with {name}: a comparison, if, step, sign or a rounded number contains {name}"
+                    ),
+                    "write it with min, max, abs or interpolate, which are continuous".into(),
+                ]);
+            }
+        }
+        let sup = |ranges: &[(Variable, Interval)], by, of: fn(&Enclosure) -> Interval| {
+            self.rate.supremum([ranges], by, of)
+        };
+        let bounds = [
+            (
+                sup(&unloaded, Variable::E, |known| known.value.size()),
+                Variable::E,
+                "is not zero without stress",
+                "let it vanish at q = 0",
+            ),
+            (
+                sup(&all, Variable::Q, |known| -known.slope),
+                Variable::Q,
+                "decreases with the stress",
+                "let it grow with q",
+            ),
+            (
+                sup(&all, Variable::E, |known| known.slope),
+                Variable::E,
+                "increases with the creep strain",
+                "let it fall with e, or use [material.damage]",
+            ),
+        ];
+        for (bound, by, wrong, help) in bounds {
+            let name = by.name();
+            match bound {
+                Ok([bound, at]) if bound > 0.0 => {
+                    return Some([format!("the rate {wrong} near {name} = {at}"), help.into()]);
+                }
+                Ok(_) => {}
+                Err(Unproven::Undefined(at) | Unproven::Pieces(at)) => {
+                    let help = "it must have one for every q and e from 0 on";
+                    return Some([format!("the rate has no value near {name} = {at}"), help.into()]);
+                }
+            }
+        }
+        None
+    }
+
+    /// Rate in 1/s, and its derivatives by the von Mises norm and by the accumulated strain.
+    fn at(&self, norm: f64, accumulated: f64) -> [f64; 3] {
+        let at = [(Variable::Q, norm), (Variable::E, accumulated)];
+        let [rate, by_norm] = self.rate.differentiate(&at, Variable::Q);
+        let by_strain =
+            if self.rate.uses(Variable::E) { self.rate.differentiate(&at, Variable::E)[1] } else { 0.0 };
+        [rate, by_norm, by_strain]
+    }
+}
+
+/// Bounds of derivatives are kept for stresses up to `2^(k / PARTS)` times the reference stress, for `k` in this range.
+const PARTS: f64 = 16.0;
+const LEVELS: std::ops::Range<i32> = -160..480;
+
+impl Flow for Elastic<CreepFormula> {
+    #[inline(always)]
+    fn elasticity(&self) -> &Isotropic {
+        &self.elasticity
+    }
+
+    fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
+        let norm = von_mises(s);
+        if norm == 0.0 {
+            return ([0.0; S], 0.0);
+        }
+        let growth = self.parameters.rate.value(&[(Variable::Q, norm), (Variable::E, accumulated)]);
+        (WEIGHT.apply(s).map(|w| growth / norm * w), growth)
+    }
+
+    fn flow_to_end<const S: usize>(
+        &self,
+        trial: &Mandel<S>,
+        length: f64,
+        accumulated: f64,
+        tangent: Option<&mut Tangent<S>>,
+    ) -> Option<(Mandel<S>, f64)> {
+        let norm = von_mises(trial);
+        let fastest = self.parameters.at(norm, accumulated)[0];
+        if norm == 0.0 || fastest == 0.0 {
+            return None;
+        }
+        let release = Release::new(trial, norm, &self.elasticity);
+        // Value and derivative of the equation, and of its terms the derivatives by `q` at this `x`.
+        let equation = |x: f64| {
+            let (norm, fall) = release.at(x);
+            let [rate, by_norm, by_strain] = self.parameters.at(norm, accumulated + x * norm);
+            let by_q = x - length * (by_norm + x * by_strain);
+            let by_x = norm * (1.0 - length * by_strain);
+            [x * norm - length * rate, by_x - by_q * norm * fall / x.max(f64::MIN_POSITIVE), by_q]
+        };
+        // The rate is at most that at the start, and the stress at least what is left after it.
+        let mut high = length * fastest / norm;
+        while equation(high)[0] < 0.0 {
+            high *= 4.0;
+        }
+        let x = increasing_root(0.0, high, high, |x| {
+            let [open, slope, _] = equation(x);
+            [open, slope]
+        });
+        let (left_norm, _) = release.at(x);
+        let growth = x * left_norm;
+        let (left, [a, b]) = release.map::<S>(x);
+        let weighted = WEIGHT.apply(&left.apply(trial));
+        if let Some(tangent) = tangent {
+            // The derivative of q(x) by s* at this x is R W s / q, that of R s* by x is -E W R s.
+            let gradient = left.apply(&weighted);
+            let [_, slope, by_q] = equation(x);
+            write_isotropic(tangent, a, b);
+            add_product(tangent, by_q / (slope * left_norm), &self.elasticity.apply(&gradient), &gradient);
+        }
+        Some((weighted.map(|w| x * w), growth))
+    }
+
+    /// Along the deviator, stress relaxes at the rate `3 G df/dq`, also the largest rate in plane stress, and hardening at `-df/dp`; they
+    /// add up. The derivatives are enclosed.
+    fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64 {
+        let level = (overstress.log2() * PARTS).ceil().max(f64::from(LEVELS.start)) as i32 - LEVELS.start;
+        let [by_stress, by_strain] =
+            self.parameters.bounds().get(level as usize).copied().unwrap_or([f64::INFINITY, 0.0]);
+        1.5 * self.elasticity.shear * by_stress + by_strain
+    }
+
+    fn is_power_law(&self) -> bool {
+        true
+    }
+
+    fn overstress<const S: usize>(&self, s: &Mandel<S>, _accumulated: f64) -> f64 {
+        von_mises(s) / self.parameters.reference_stress
+    }
+
+    fn hardens(&self) -> bool {
+        self.parameters.rate.uses(Variable::E)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Norton;
+    use super::*;
+
+    const BODY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.25 };
+
+    fn written(rate: &str) -> CreepFormula {
+        let rate = Formula::parse(rate, &[Variable::Q, Variable::E]).expect("a formula");
+        CreepFormula { rate, reference_stress: 10.0, bounds: OnceLock::new() }
+    }
+
+    fn check<const S: usize>(hypothesis: Hypothesis) {
+        for (exponent, hardening_strain) in [(1.0, None), (5.0, None), (3.0, Some(0.01))] {
+            let norton = Norton {
+                rate: 0.005,
+                reference_stress: 10.0,
+                exponent,
+                hardening_strain,
+                hardening_exponent: 1.5,
+            };
+            let hardening = if hardening_strain.is_some() { "/(1 + e/0.01)^1.5" } else { "" };
+            let formula = written(&format!("0.005*(q/10)^{exponent}{hardening}"));
+            assert_eq!(formula.fault(), None);
+            let (one, other) = (norton.prepare(&BODY, hypothesis), formula.prepare(&BODY, hypothesis));
+            assert_eq!(one.hardens(), other.hardens());
+            for size in [1e-3, 1.0, 30.0, 1e3] {
+                let trial: Mandel<S> = std::array::from_fn(|i| size * [1.0, -0.4, 0.3, 0.7, -0.2, 0.5][i]);
+                let [mut first, mut second] = [[[0.0; S]; S]; 2];
+                let (flow, growth) = one.flow_to_end(&trial, 0.7, 0.002, Some(&mut first)).expect("flow");
+                let (found, other_growth) =
+                    other.flow_to_end(&trial, 0.7, 0.002, Some(&mut second)).expect("flow");
+                assert!(
+                    (growth / other_growth - 1.0).abs() < 1e-12,
+                    "{exponent} {size}: {growth} {other_growth}"
+                );
+                for i in 0..S {
+                    assert!((flow[i] - found[i]).abs() < 1e-12 * growth, "{flow:?} {found:?}");
+                    assert!(
+                        (0..S).all(|j| (first[i][j] - second[i][j]).abs() < 1e-11),
+                        "{exponent} {size}: {first:?} {second:?}"
+                    );
+                }
+                let [(a, p), (b, r)] = [one.rate(&trial, 0.002), other.rate(&trial, 0.002)];
+                assert!((p / r - 1.0).abs() < 1e-13 && (0..S).all(|i| (a[i] - b[i]).abs() < 1e-13 * p));
+            }
+            for overstress in [0.5, 1.0, 3.0] {
+                let share = other.fastest_rate::<S>(overstress) / one.fastest_rate::<S>(overstress);
+                assert!((1.0 - 1e-9..1.3).contains(&share), "{exponent} {overstress}: {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn nortons_law_written_as_a_formula_has_its_numbers() {
+        check::<3>(Hypothesis::PlaneStress);
+        check::<4>(Hypothesis::PlaneStrain);
+        check::<6>(Hypothesis::Space);
+    }
+
+    #[test]
+    fn below_a_threshold_nothing_creeps() {
+        let law = written("1e-3*max(q/20 - 1, 0)^2").prepare(&BODY, Hypothesis::Space);
+        assert_eq!(law.flow_to_end(&[19.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0, 0.0, None), None);
+        let (_, growth) = law.flow_to_end(&[60.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0, 0.0, None).expect("flow");
+        let q = 60.0 - 1200.0 * growth;
+        assert!((growth - 1e-3 * (q / 20.0 - 1.0).powi(2)).abs() < 1e-16, "{growth}");
+    }
+
+    #[test]
+    fn rates_that_make_no_law_are_refused_with_the_remedy() {
+        for (text, message, help) in [
+            ("1e-3", "not zero without stress", "q = 0"),
+            ("1e-3*q*exp(-q/10)", "decreases with the stress near q = ", "grow"),
+            ("1e-3*q*(1 + e)", "increases with the creep strain", "[material.damage]"),
+            ("1e-3*if(q < 10, 0, q)", "may jump with q", "interpolate"),
+            ("1e-3*q*sqrt(1 - e)", "no value near", "from 0 on"),
+        ] {
+            let fault = written(text).fault().expect(text);
+            assert!(fault.message.contains(message) && fault.help.contains(help), "{text}: {fault:?}");
+        }
+        assert_eq!(written("1e-3*sinh(q/20)^4*exp(-e/0.1)").fault(), None);
+    }
+}
