@@ -1,6 +1,11 @@
 //! The names that an expression may use.
 
+use std::collections::BTreeMap;
+
 use super::program::{Binary, Instruction, Ternary, Unary, Variable};
+
+/// Numbers with names, which expressions may contain beside functions, variables and constants.
+pub type Names = BTreeMap<String, f64>;
 
 /// Meaning of a name.
 #[derive(Clone, Copy)]
@@ -55,6 +60,11 @@ const NAMES: &[(&str, Meaning)] = &[
     ("cosh", Meaning::One(Unary::smooth(f64::cosh))),
     ("tanh", Meaning::One(Unary::smooth(f64::tanh))),
 ];
+
+/// Whether expressions know a name of their own: a function, a variable or a constant.
+pub fn is_known(name: &str) -> bool {
+    meaning(name).is_some()
+}
 
 /// The meaning of `name`.
 pub(super) fn meaning(name: &str) -> Option<Meaning> {

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 pub use breakpoints::Breakpoints;
 pub use compile::Fault;
+pub use functions::{Names, is_known};
 use program::Program;
 pub use program::Variable;
 
@@ -82,6 +83,15 @@ impl Default for Scalar {
     }
 }
 
+/// An expression whose text had names of numbers.
+#[derive(Debug, Clone)]
+pub struct Resolved {
+    /// The expression, whose text contains the numbers in place of the names.
+    pub expression: Expression,
+    /// The names, in the order of the text.
+    pub names: Vec<String>,
+}
+
 /// A compiled expression; clones share the program.
 #[derive(Debug, Clone)]
 pub struct Expression {
@@ -92,7 +102,24 @@ pub struct Expression {
 impl Expression {
     /// Compiles `text`; an error contains its position in the text.
     pub fn parse(text: &str) -> Result<Self, Fault> {
-        Ok(Self { text: text.into(), program: compile::compile(text)? })
+        Ok(Self { text: text.into(), program: compile::compile(text, &Names::new())?.program })
+    }
+
+    /// Compiles `text`, in which these names stand for finite numbers; an error contains its position in the text.
+    pub fn resolve(text: &str, names: &Names) -> Result<Resolved, Fault> {
+        let compile::Compiled { program, named } = compile::compile(text, names)?;
+        let mut with_numbers = String::with_capacity(text.len());
+        let mut end = 0;
+        for (at, number) in &named {
+            // The shortest digits that are read back as the same number.
+            with_numbers.push_str(&format!("{}({number:?})", &text[end..at.start]));
+            end = at.end;
+        }
+        with_numbers.push_str(&text[end..]);
+        let too_long = |fault| Fault { at: 0..text.len(), ..fault };
+        compile::refuse_long(&with_numbers).map_err(too_long)?;
+        let names = named.into_iter().map(|(at, _)| text[at].to_owned()).collect();
+        Ok(Resolved { expression: Self { text: with_numbers.into(), program }, names })
     }
 
     /// The expression as written.
@@ -103,6 +130,11 @@ impl Expression {
     /// Whether it contains `variable`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.program.uses(variable)
+    }
+
+    /// The first variable that it contains.
+    pub fn variable(&self) -> Option<Variable> {
+        [Variable::T, Variable::X, Variable::Y, Variable::Z].into_iter().find(|variable| self.uses(*variable))
     }
 
     /// Value at `time` and `point`; not finite where the expression is undefined, as in sqrt(-1).
