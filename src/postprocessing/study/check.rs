@@ -25,7 +25,7 @@ pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Do
         document.fault(place, format!("the study has {count} runs"), format!("at most {MOST_RUNS}"));
     }
     check_cells(study, base, document);
-    check_sweep(study, document);
+    check_sweep(study, base, document);
     if study.compare.split
         && (base.mesh.source.cells().is_empty() || !matches!(study.reference, Some(Reference::Run(_))))
     {
@@ -73,9 +73,20 @@ pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Do
     }
 }
 
-fn check_sweep(study: &Study, document: &mut Document) {
+fn check_sweep(study: &Study, base: &Job, document: &mut Document) {
     let mut first: Option<(&str, u32)> = None;
     for (key, values) in &study.sweep {
+        if let Some(name) = key.strip_prefix("parameters.")
+            && !base.parameters.contains_key(name)
+        {
+            let known: Vec<&str> = base.parameters.keys().map(String::as_str).collect();
+            let help = match nearest(name, known.iter().copied()) {
+                Some(near) => format!("did you mean `parameters.{near}`?"),
+                None if known.is_empty() => "give numbers names in its table [parameters]".into(),
+                None => format!("parameters: {}", known.join(", ")),
+            };
+            document.fault("sweep", format!("the base job has no parameter `{name}`"), help);
+        }
         let Values::Draws(draws) = values else { continue };
         if draws.from >= draws.to {
             let message = format!("`{key}` has no values from {} to {}", draws.from, draws.to);
