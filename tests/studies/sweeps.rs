@@ -98,7 +98,9 @@ fn parameters_are_swept_like_keys() {
         .replace("-50*pi^2*t", "-a*pi^2*t");
     let job = format!("[parameters]\nrho = 9\na = \"60 - 10\"\n{job}");
     let sweep = "[sweep]\n\"parameters.rho\" = [1.0, 2.0]\n\"parameters.a\" = [50.0, \"rho*40\"]\n\
-                 [[response]]\nof = \"history.kinetic_energy\"\n[[response]]\nof = \"probe.middle.velocity_x\"\n";
+                 [[response]]\nof = \"history.kinetic_energy\"\n[[response]]\nof = \"probe.middle.velocity_x\"\n\
+                 [[response]]\nof = \"probe.middle.mean.velocity_x\"\nfrom = 0.5\n\
+                 [[response]]\nof = \"probe.middle.velocity_x\"\nto = 0.5\n";
     let scene = Scene::new(&job, sweep);
     scene.study(2, &[]).expect(0).says("a-50.0-rho-1.0").says("a-rho_40-rho-2.0");
     let results = scene.results();
@@ -108,6 +110,15 @@ fn parameters_are_swept_like_keys() {
     let ratio = response(1, 0) / response(0, 0);
     assert!((ratio / 2.0 - 1.0).abs() < 1e-3, "{ratio}");
     assert!((0..4).all(|run| (response(run, 1) - 1.0).abs() < 0.1), "{results:#}");
+    // The two steps end at 0.5 s and at 1 s.
+    assert!((response(0, 3) / response(0, 1) - 0.5).abs() < 1e-3, "{results:#}");
+    assert!((response(0, 2) - (response(0, 1) + response(0, 3)) / 2.0).abs() < 1e-12, "{results:#}");
+    let csv = std::fs::read_to_string(scene.path("out/study/responses.csv")).expect("responses.csv");
+    let header = csv.lines().next().unwrap_or_default();
+    assert!(
+        header.ends_with("probe.middle.mean.velocity_x (from 0.5 s),probe.middle.velocity_x (to 0.5 s)"),
+        "{header}"
+    );
     // The same as the key itself.
     let plain = Scene::new(
         super::scene::SQUARE,
