@@ -18,6 +18,7 @@ mod layers;
 mod malformed;
 mod mpirun;
 mod parallel_files;
+mod parameters;
 mod random_changes;
 mod refusals;
 mod results;

@@ -1,6 +1,6 @@
 //! The reference of all keys, generated from the structs.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::schema::{Kind, Schema};
 use crate::error::{Error, Result};
@@ -59,9 +59,27 @@ pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
     Ok(opening + &shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
 }
 
-/// The JSON Schema (draft 2020-12) of a job.
+/// The JSON Schema (draft 2020-12) of a job. Numbers may be strings, because they may be expressions of parameters.
 pub fn describe_json() -> String {
-    format!("{:#}", Kind::job().schema)
+    let mut schema = Kind::job().schema.clone();
+    allow_strings(&mut schema);
+    format!("{schema:#}")
+}
+
+/// Allows a string wherever a number is allowed.
+fn allow_strings(schema: &mut Value) {
+    match schema {
+        Value::Object(object) => {
+            for (keyword, value) in object {
+                match value.as_str().filter(|_| keyword == "type") {
+                    Some(kind @ ("number" | "integer")) => *value = json!([kind, "string"]),
+                    _ => allow_strings(value),
+                }
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(allow_strings),
+        _ => {}
+    }
 }
 
 /// The reference of all keys of a job as a page in Markdown.
@@ -312,6 +330,9 @@ fn kind_in(schema: Schema, variables: &str) -> String {
     if schema.text("format") == Some("expression") {
         let infinite = if schema.may_be_infinite() { ", inf" } else { "" };
         return format!("a number{infinite} or an expression in {variables}");
+    }
+    if schema.text("format") == Some("parameter") {
+        return "a number or an expression of other parameters".into();
     }
     if let Some(items) = schema.items().filter(|_| schema.accepts("array")) {
         let count = match (schema.number("minItems"), schema.number("maxItems")) {

@@ -17,6 +17,7 @@ const NO_PHYSICS: &[&str] = &[
     "mesh.file",
     "mesh.rectangle.partition",
     "output",
+    "parameters",
     "solver.accept",
     "solver.factor_precision",
     "solver.guesses",
@@ -62,11 +63,14 @@ impl Job {
         self.output.folder.as_deref().unwrap_or(Path::new("out"))
     }
 
-    /// The effective job as TOML, with all defaults. Loaded from a file in the output folder, it equals this job.
+    /// The effective job as TOML, with all defaults, and with expressions of parameters as they were written. Loaded from a file in the output folder, it equals this job.
     pub fn to_toml(&self) -> Result<String> {
         let mut job = self.clone();
         job.output.folder = Some(PathBuf::from("."));
-        toml::to_string(&job).map_err(|error| Error::Internal(format!("the job can't be written: {error}")))
+        let refuse =
+            |error: &dyn std::fmt::Display| Error::Internal(format!("the job can't be written: {error}"));
+        let text = toml::to_string(&job).map_err(|error| refuse(&error))?;
+        job.written.restore(text).map_err(|error| refuse(&error))
     }
 
     /// As [`to_toml`](Self::to_toml), with the names of files only, so that it stays the same where folders are moved. Without the
@@ -84,7 +88,7 @@ impl Job {
         job.to_toml()
     }
 
-    /// All keys that affect the results, joined by dots, with their values as TOML.
+    /// All keys that affect the results, joined by dots, with their values as TOML; with numbers in place of parameters.
     pub fn physics(&self) -> Result<BTreeMap<String, String>> {
         let mut job = self.clone();
         job.output.folder = None;

@@ -8,11 +8,13 @@ use serde::de::DeserializeOwned;
 
 use super::check::{check, check_names};
 use super::findings::{Findings, MeshNames, Table};
+use super::parameters::Parameters;
 use super::petsc_options::reaches_beyond_the_run;
 use super::report::{Fault, Place, Texts};
 use super::schema::Kind;
 use super::source::{Node, parse};
-use super::validate;
+use super::validate::{self, Checked};
+use super::written::Written;
 use super::{Job, MeshSource, set, surfaces, tables};
 use crate::error::{Error, Result};
 
@@ -58,6 +60,8 @@ pub(crate) struct Document {
     faults: Vec<Fault>,
     /// The paths of what could not be read.
     unread: Vec<String>,
+    parameters: Parameters,
+    written: Written,
 }
 
 /// Where a document comes from.
@@ -88,10 +92,12 @@ impl Document {
         for (index, text) in overrides.iter().enumerate() {
             faults.extend(set::apply(&mut root, text, index + 1).err());
         }
-        tables::insert(&mut root, folder, &mut faults);
-        let (of_keys, unread) = validate::check(kind, &mut root, text);
+        let mut parameters = Parameters::read(kind, &root, text, &mut faults);
+        tables::insert(&mut root, folder, &mut parameters, &mut faults);
+        let checked = validate::check(kind, &mut root, text, &mut parameters);
+        let Checked { faults: of_keys, unread, written } = checked;
         faults.extend(of_keys);
-        Ok(Self { root, texts, faults, unread })
+        Ok(Self { root, texts, faults, unread, parameters, written })
     }
 
     /// Adds a fault at the value of `path`, or at the innermost existing table on this path.
@@ -119,7 +125,9 @@ impl Loaded {
         check(&job, &mut Table::new(&document.root, &document.unread, &mut findings));
         document.faults.append(&mut findings.faults);
         document.refuse()?;
-        let Document { root, texts, .. } = document;
+        findings.warnings.extend(document.parameters.unused());
+        let Document { root, texts, written, .. } = document;
+        job.written = written;
         job.resolve_paths(folder, Path::new(name));
         let unread = surfaces::read(&mut job)
             .into_iter()

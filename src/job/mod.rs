@@ -1,7 +1,7 @@
 //! The job: a TOML document that defines a run.
 //!
 //! A document is parsed with the position of every key (`source`), changed by overrides (`set`), checked against the schema of the
-//! structs (`validate`), and fills them. The filled [`Job`] is checked for consistency, each table by the file of its struct and
+//! structs (`validate`), where numbers take the places of expressions of parameters (`parameters`), and fills them. The filled [`Job`] is checked for consistency, each table by the file of its struct and
 //! tables that refer to each other in `check`. All faults are reported at once (`report`).
 
 mod check;
@@ -10,6 +10,7 @@ mod document;
 mod effective;
 mod findings;
 mod load;
+mod parameters;
 mod petsc_options;
 mod report;
 mod schema;
@@ -18,6 +19,7 @@ mod source;
 mod surfaces;
 mod tables;
 mod validate;
+mod written;
 
 pub use crate::laws::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
 pub use describe::{describe, describe_json, describe_markdown};
@@ -28,3 +30,4 @@ pub use findings::MeshNames;
 pub use load::Loaded;
 pub(crate) use load::{Document, Origin, by_extension, normal, read};
 pub(crate) use schema::{Kind, Schema, schema_of};
+pub use written::Written;

@@ -44,6 +44,8 @@ before the first and after the last. Expressions have + - * / ^, comparisons < <
 ceil, round, sqrt, cbrt, exp, ln, log10, sin, cos, tan, asin, acos, atan, atan2, hypot, sinh, cosh, tanh, step(x) (1 from 0
 on), pulse(t, start, end) (1 from start to end), pi, e, inf, if(condition, then, otherwise) and interpolate(t, t1, v1, t2, v2, ...).
 
+[parameters] gives numbers names. Where a number is accepted, an expression of such names in quotes is, too: end = \"2*T\".
+
 ";
 
 /// The schema of a whole document; no key may be null, as in TOML.

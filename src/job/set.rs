@@ -58,7 +58,9 @@ fn read_value(text: &str, start: usize, file: usize) -> Result<Node, Fault> {
 
 /// Whether the text is a word, a path or an expression, which need no quotes.
 fn is_bare(first: char, text: &str) -> bool {
-    first.is_alphabetic() || matches!(first, '/' | '.' | '_' | '~') || Expression::parse(text).is_ok()
+    // Names of parameters are not known yet.
+    let is_expression = Expression::parse(text).map_or_else(|fault| fault.is_unknown_name, |_| true);
+    first.is_alphabetic() || matches!(first, '/' | '.' | '_' | '~') || is_expression
 }
 
 fn insert(node: &mut Node, parts: &[&str], value: Node, key: &Place) -> Result<(), Fault> {
@@ -120,6 +122,7 @@ mod tests {
         assert_eq!(set("about.title=\"1\"")["about"]["title"].as_str(), Some("1"));
         assert_eq!(set("output.folder=../out/x")["output"]["folder"].as_str(), Some("../out/x"));
         assert_eq!(set("a.\"b.c=d\".e=1")["a"]["b.c=d"]["e"].as_integer(), Some(1));
+        assert_eq!(set("time.step=2*T/3")["time"]["step"].as_str(), Some("2*T/3"));
         assert_eq!(set("initial.velocity=[0, 'x']")["initial"]["velocity"][1].as_str(), Some("x"));
     }
 

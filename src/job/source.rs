@@ -88,6 +88,17 @@ impl Node {
         node
     }
 
+    /// The place of the bytes `range` of a string with this `content`, in the document whose file has this `text`; the place of the
+    /// whole value where the two differ, as with escape sequences.
+    pub(super) fn place_within(&self, content: &str, range: Range<usize>, text: &str) -> Place {
+        let (start, end) = (self.at.start + 1, self.at.end.saturating_sub(1));
+        if self.at.file == 0 && text.get(start..end) == Some(content) {
+            Place::new(0, start + range.start..start + range.end)
+        } else {
+            self.at.clone()
+        }
+    }
+
     /// The value without positions.
     pub(crate) fn plain(&self) -> toml::Value {
         match &self.value {

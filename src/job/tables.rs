@@ -3,9 +3,11 @@
 //! A table becomes the expression `interpolate(t, ...)` with its points when the job is read, so that the effective job and
 //! checkpoints contain the values themselves.
 
+use super::parameters::Parameters;
 use super::report::Fault;
 use super::source::{Node, Value};
 use crate::error::regular_file;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -14,13 +16,17 @@ const LARGEST: u64 = 1 << 18;
 const FORMAT: &str = "a table has the times in its first column and values in the others, separated by commas, semicolons or blanks; \
                       its first line may be a header without numbers";
 
-/// Replaces the tables below a node by expressions. Relative paths start from `folder`.
-pub(super) fn insert(node: &mut Node, folder: &Path, faults: &mut Vec<Fault>) {
+/// Replaces the tables below a node by expressions. Relative paths start from `folder`; parameters may give columns.
+pub(super) fn insert(node: &mut Node, folder: &Path, parameters: &mut Parameters, faults: &mut Vec<Fault>) {
     let expression = match &mut node.value {
-        Value::Array(items) => return items.iter_mut().for_each(|item| insert(item, folder, faults)),
-        Value::Table(table) => match named(table) {
+        Value::Array(items) => {
+            return items.iter_mut().for_each(|item| insert(item, folder, parameters, faults));
+        }
+        Value::Table(table) => match named(table, parameters) {
             Some((file, column)) => read(&folder.join(file), column),
-            None => return table.values_mut().for_each(|item| insert(item, folder, faults)),
+            None => {
+                return table.values_mut().for_each(|item| insert(item, folder, parameters, faults));
+            }
         },
         _ => return,
     };
@@ -31,11 +37,12 @@ pub(super) fn insert(node: &mut Node, folder: &Path, faults: &mut Vec<Fault>) {
 }
 
 /// The file and the column, if a table has these keys only.
-fn named(table: &std::collections::BTreeMap<String, Node>) -> Option<(&str, usize)> {
+fn named<'a>(table: &'a BTreeMap<String, Node>, parameters: &mut Parameters) -> Option<(&'a str, usize)> {
     let Value::Text(file) = &table.get("table")?.value else { return None };
     let column = match table.get("column").map(|node| &node.value) {
         None => 2,
         Some(Value::Integer(column)) => usize::try_from(*column).ok()?,
+        Some(Value::Text(text)) => usize::try_from(parameters.whole(text)?).ok()?,
         Some(_) => return None,
     };
     (table.len() == 1 + usize::from(table.contains_key("column"))).then_some((file, column))

@@ -1,11 +1,13 @@
 //! Checks every key against the schema: names, types, ranges and choices. All faults are collected.
 
 use super::describe;
+use super::parameters::{Parameters, whole};
 use super::report::{Fault, Place};
 use super::schema::{Kind, Schema};
 use super::source::{Node, Value};
+use super::written::{Plain, Written};
 use crate::laws::{
-    expression::{Expression, Variable},
+    expression::{Resolved, Variable},
     law::header,
     nearest::nearest,
 };
@@ -21,19 +23,30 @@ fn of_formula(variables: &str) -> Vec<Variable> {
     }
 }
 
-/// The faults of single keys, and what could not be read. Where a required key is missing or a value has another type, the document
-/// gets a neutral value, so that it fills its structs; it loses unknown keys.
-pub(super) fn check(kind: Kind, root: &mut Node, text: &str) -> (Vec<Fault>, Vec<String>) {
-    let mut walk = Walk { kind, text, faults: Vec::new(), unread: Vec::new() };
+/// What a check finds.
+#[derive(Debug, Default)]
+pub(super) struct Checked {
+    /// The faults of single keys.
+    pub faults: Vec<Fault>,
+    /// The paths of what could not be read.
+    pub unread: Vec<String>,
+    /// The values that were computed from parameters.
+    pub written: Written,
+}
+
+/// Checks the keys of a document whose file has this `text`. Where a required key is missing or a value has another type, the document
+/// gets a neutral value, so that it fills its structs; it loses unknown keys. Numbers take the places of expressions of parameters.
+pub(super) fn check(kind: Kind, root: &mut Node, text: &str, parameters: &mut Parameters) -> Checked {
+    let mut walk = Walk { kind, text, parameters, checked: Checked::default() };
     walk.value(root, kind.root(), "");
-    (walk.faults, walk.unread)
+    walk.checked
 }
 
 struct Walk<'a> {
     kind: Kind,
     text: &'a str,
-    faults: Vec<Fault>,
-    unread: Vec<String>,
+    parameters: &'a mut Parameters,
+    checked: Checked,
 }
 
 impl Walk<'_> {
@@ -48,14 +61,14 @@ impl Walk<'_> {
         let table = path.rsplit_once('.').map(|(table, _)| table);
         let is_inner =
             |table: &&str| table.split('.').filter(|part| part.parse::<usize>().is_err()).count() > 1;
-        self.unread.push(table.filter(is_inner).unwrap_or(path).to_owned());
+        self.checked.unread.push(table.filter(is_inner).unwrap_or(path).to_owned());
     }
 
     /// An item of a list, or a key with a free name: those beside it do not depend on it.
     fn item(&mut self, node: &mut Node, schema: Schema, path: &str) {
-        let before = self.unread.len();
+        let before = self.checked.unread.len();
         self.value(node, schema, path);
-        let outer = self.unread[before..].iter_mut().filter(|table| table.len() < path.len());
+        let outer = self.checked.unread[before..].iter_mut().filter(|table| table.len() < path.len());
         outer.for_each(|table| *table = path.to_owned());
     }
 
@@ -78,12 +91,15 @@ impl Walk<'_> {
             (_, Some(other)) => return self.value(node, *other, path),
             (Value::Text(word), None) if !words.is_empty() => self.unknown_word(node, word, &words, path),
             (Value::Table(_), None) if !tagged.is_empty() => return self.one_of(node, schema, path),
-            _ => self.wrong_type(node, schema, path),
+            _ => self.checked.faults.push(self.wrong_type(node, schema, path)),
         }
         self.repair(node, schema, path);
     }
 
     fn plain(&mut self, node: &mut Node, schema: Schema, path: &str) {
+        if !self.compute(node, schema, path) {
+            return self.repair(node, schema, path);
+        }
         let fits = match &node.value {
             Value::Table(_) if schema.accepts("object") => return self.table(node, schema, path),
             Value::Array(_) if schema.accepts("array") => return self.list(node, schema, path),
@@ -94,7 +110,7 @@ impl Walk<'_> {
             Value::Float(number) if schema.accepts("number") => self.number(node, *number, schema, path),
             Value::Boolean(_) if schema.accepts("boolean") => true,
             _ => {
-                self.wrong_type(node, schema, path);
+                self.checked.faults.push(self.wrong_type(node, schema, path));
                 false
             }
         };
@@ -141,9 +157,9 @@ impl Walk<'_> {
         match schema.text("key_help").filter(|_| split) {
             Some(help) => {
                 let message = format!("`{path}` is not a complete name");
-                self.faults.push(Fault::new(child.key.clone(), message, "").help(help));
+                self.checked.faults.push(Fault::new(child.key.clone(), message, "").help(help));
                 child.value = neutral(free, &child.at);
-                self.unread.push(path.to_owned());
+                self.checked.unread.push(path.to_owned());
             }
             None => self.item(child, free, path),
         }
@@ -175,13 +191,15 @@ impl Walk<'_> {
         for (child, name) in present.iter().skip(1) {
             let message = format!("`{name}` and `{}` exclude each other", present[0].1);
             let help = format!("give exactly one of {} in {}", list(&choices), header(path));
-            self.faults.push(Fault::new(child.clone(), message, "only one of them is allowed").help(help));
+            self.checked
+                .faults
+                .push(Fault::new(child.clone(), message, "only one of them is allowed").help(help));
         }
         if present.is_empty() && meant.is_none() {
             let lacks = if table.is_empty() { "is empty" } else { "is incomplete" };
             let message = format!("{} {lacks}", header(path));
             let help = format!("give exactly one of {}", list(&choices));
-            self.faults.push(Fault::new(place.clone(), message, "").help(help));
+            self.checked.faults.push(Fault::new(place.clone(), message, "").help(help));
         }
         if present.len() != 1 {
             return self.repair(node, schema, path);
@@ -209,7 +227,7 @@ impl Walk<'_> {
         } else if let Some(elsewhere) = describe::tables_with(self.kind, key) {
             fault = fault.help(format!("`{key}` is a key of {elsewhere}"));
         }
-        self.faults.push(fault.help(format!("allowed: {}", list(known))));
+        self.checked.faults.push(fault.help(format!("allowed: {}", list(known))));
         near
     }
 
@@ -227,7 +245,7 @@ impl Walk<'_> {
             }
             None => {}
         }
-        self.faults.push(fault);
+        self.checked.faults.push(fault);
     }
 
     fn list(&mut self, node: &mut Node, schema: Schema, path: &str) {
@@ -237,7 +255,7 @@ impl Walk<'_> {
         if count < least || most.is_some_and(|most| count > most) {
             let wanted = if most == Some(least) { format!("{least}") } else { format!("at least {least}") };
             let message = format!("`{}` has {count} item{}", path, if count == 1.0 { "" } else { "s" });
-            self.faults.push(Fault::new(at.clone(), message, format!("{wanted} expected")));
+            self.checked.faults.push(Fault::new(at.clone(), message, format!("{wanted} expected")));
         }
         if let Some(inner) = schema.items() {
             for (index, item) in items.iter_mut().enumerate() {
@@ -255,7 +273,9 @@ impl Walk<'_> {
         let may_be = number.is_finite() || (number == f64::INFINITY && schema.may_be_infinite());
         if !may_be {
             let message = format!("`{path}` is not a finite number");
-            self.faults.push(Fault::new(node.at.clone(), message, "not finite").help("give a number"));
+            self.checked
+                .faults
+                .push(Fault::new(node.at.clone(), message, "not finite").help("give a number"));
             return true;
         }
         let most = schema
@@ -269,7 +289,7 @@ impl Walk<'_> {
             let message = format!("`{path}` is out of range");
             let label = format!("found {number}");
             let help = format!("allowed: {}", describe::range(schema));
-            self.faults.push(Fault::new(node.at.clone(), message, label).help(help));
+            self.checked.faults.push(Fault::new(node.at.clone(), message, label).help(help));
         }
         inside || !schema.accepts("integer")
     }
@@ -278,39 +298,98 @@ impl Walk<'_> {
     fn string(&mut self, node: &Node, text: &str, schema: Schema, path: &str) -> bool {
         if text.is_empty() && (schema.number("minLength").is_some() || schema.text("format") == Some("path"))
         {
-            self.faults.push(Fault::new(node.at.clone(), format!("`{path}` is empty"), "a name is expected"));
+            self.checked.faults.push(Fault::new(
+                node.at.clone(),
+                format!("`{path}` is empty"),
+                "a name is expected",
+            ));
         }
-        match schema.text("format") {
-            Some("expression") => {
-                return self.expression(node, text, schema.text("variables").unwrap_or_default(), path);
-            }
-            Some("name") => {
-                let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
-                if text.is_empty() || !text.chars().all(fits) {
-                    let message = format!("`{path}` is not a plain name");
-                    let help = "names are made of the letters a-z and A-Z, digits, _ and -";
-                    self.faults.push(Fault::new(node.at.clone(), message, "").help(help));
-                }
-            }
-            _ => {}
+        let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+        let is_name = !text.is_empty() && text.chars().all(fits);
+        if schema.text("format") == Some("name") && !is_name {
+            let message = format!("`{path}` is not a plain name");
+            let help = "names are made of the letters a-z and A-Z, digits, _ and -";
+            self.checked.faults.push(Fault::new(node.at.clone(), message, "").help(help));
         }
         true
     }
 
-    /// Checks an expression in time and place, or a formula in these variables, if others are among them.
-    fn expression(&mut self, node: &Node, text: &str, variables: &str, path: &str) -> bool {
-        let parsed = Expression::parse_in(text, &of_formula(variables));
-        if let Err(fault) = &parsed {
-            // Within a string without escape sequences the exact position of the fault is known.
-            let (start, end) = (node.at.start + 1, node.at.end.saturating_sub(1));
-            let at = if node.at.file == 0 && self.text.get(start..end) == Some(text) {
-                Place::new(node.at.file, start + fault.at.start..start + fault.at.end)
-            } else {
-                node.at.clone()
-            };
-            self.faults.push(Fault::new(at, format!("in `{path}`: {}", fault.message), "").help(&fault.help));
+    /// Puts numbers in place of parameters, and of texts where a number is expected; `false` if that is a fault.
+    fn compute(&mut self, node: &mut Node, schema: Schema, path: &str) -> bool {
+        let Value::Text(text) = &node.value else { return true };
+        match self.computed(node, text, schema, path) {
+            Ok(None) => true,
+            Ok(Some(value)) => {
+                self.checked.written.add(path, text, value.clone());
+                node.value = match value {
+                    Plain::Integer(number) => Value::Integer(number),
+                    Plain::Float(number) => Value::Float(number),
+                    Plain::Text(text) => Value::Text(text),
+                };
+                true
+            }
+            Err(fault) => {
+                self.checked.faults.extend(fault);
+                false
+            }
         }
-        parsed.is_ok()
+    }
+
+    /// What takes the place of a text; `None` if it stays. An error without a fault is that of a parameter.
+    fn computed(
+        &mut self,
+        node: &Node,
+        text: &str,
+        schema: Schema,
+        path: &str,
+    ) -> Result<Option<Plain>, Option<Fault>> {
+        let is_expression = schema.text("format") == Some("expression");
+        if !is_expression && !self.may_give_number(text, schema) {
+            return Ok(None);
+        }
+        let variables = of_formula(schema.text("variables").unwrap_or_default());
+        let resolved = self.parameters.resolve_in(text, &variables);
+        if resolved.as_ref().is_err_and(|fault| fault.is_unknown_name)
+            && !is_expression
+            && self.parameters.are_none()
+        {
+            return Err(Some(self.wrong_type(node, schema, path)));
+        }
+        let Resolved { expression, names } = resolved.map_err(|fault| {
+            let place = node.place_within(text, fault.at.clone(), self.text);
+            let refused = if is_expression {
+                Fault::new(place, format!("in `{path}`: {}", fault.message), "")
+            } else {
+                Fault::new(place, format!("`{path}` must be {}", describe::kind(schema)), &fault.message)
+            };
+            self.parameters.advice(&fault).iter().fold(refused.help(&fault.help), Fault::help)
+        })?;
+        if self.parameters.have_fault(&names) {
+            return Err(None);
+        }
+        if is_expression && names.is_empty() {
+            return Ok(None);
+        }
+        let value = expression.evaluate(0.0, &[]);
+        match expression.variable() {
+            Some(_) if is_expression => Ok(Some(Plain::Text(expression.text().to_owned()))),
+            Some(variable) => Err(Some(dependent(node, variable, path))),
+            None if schema.accepts("number") => Ok(Some(Plain::Float(value))),
+            None => match whole(value) {
+                Some(number) => Ok(Some(Plain::Integer(number))),
+                None => {
+                    let message = format!("`{path}` must be {}", describe::kind(schema));
+                    let fault = Fault::new(node.at.clone(), message, format!("this is {value}"));
+                    Err(Some(fault.help("round(...), floor(...) and ceil(...) give whole numbers")))
+                }
+            },
+        }
+    }
+
+    /// Whether a text may stand for a number. A number in quotes is more likely a mistake.
+    fn may_give_number(&self, text: &str, schema: Schema) -> bool {
+        let is_number = !schema.accepts("string") && (schema.accepts("number") || schema.accepts("integer"));
+        is_number && self.parameters.is_available() && text.trim().parse::<f64>().is_err()
     }
 
     /// Finds expressions in other variables than these, such as "x, y, z".
@@ -323,17 +402,21 @@ impl Walk<'_> {
                 }
                 return;
             }
-            Value::Text(text) => Expression::parse(text).ok().and_then(|expression| {
-                let mut all = Variable::OF_TIME_AND_PLACE.iter();
-                all.find(|variable| !is_allowed(variable.name()) && expression.uses(**variable))
-            }),
+            Value::Text(text) => {
+                self.parameters.resolve(text).ok().and_then(|Resolved { expression, .. }| {
+                    let mut all = Variable::OF_TIME_AND_PLACE.iter();
+                    all.find(|variable| !is_allowed(variable.name()) && expression.uses(**variable))
+                })
+            }
             // A table of values over time.
             Value::Table(_) => Some(&Variable::T).filter(|time| !is_allowed(time.name())),
             _ => None,
         };
         if let Some(variable) = other {
             let message = format!("`{path}` can't depend on {}", variable.name());
-            self.faults.push(Fault::new(node.at.clone(), message, "").help(format!("use {variables} only")));
+            self.checked
+                .faults
+                .push(Fault::new(node.at.clone(), message, "").help(format!("use {variables} only")));
         }
     }
 
@@ -344,10 +427,10 @@ impl Walk<'_> {
             fault = fault.help(format!("did you mean \"{near}\"?"));
         }
         let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
-        self.faults.push(fault.help(format!("allowed: {}", quoted.join(", "))));
+        self.checked.faults.push(fault.help(format!("allowed: {}", quoted.join(", "))));
     }
 
-    fn wrong_type(&mut self, node: &Node, schema: Schema, path: &str) {
+    fn wrong_type(&self, node: &Node, schema: Schema, path: &str) -> Fault {
         let expected = describe::kind(schema);
         let message = format!("`{path}` must be {expected}");
         let mut fault = Fault::new(node.at.clone(), message, format!("found {}", node.value.kind()));
@@ -369,15 +452,24 @@ impl Walk<'_> {
                 fault = fault.help(format!("write a list: {key} = [\"{text}\"]"));
             }
             Value::Text(_) if schema.accepts("number") || schema.accepts("integer") => {
-                fault = fault.help("write numbers without quotes; this key accepts no expression");
+                let instead = if self.parameters.is_available() { " except of [parameters]" } else { "" };
+                let help = format!("write numbers without quotes; this key accepts no expression{instead}");
+                fault = fault.help(help);
             }
             Value::Float(number) if schema.accepts("integer") && number.fract() == 0.0 => {
                 fault = fault.help(format!("write {number:.0}, without a decimal point"));
             }
             _ => {}
         }
-        self.faults.push(fault);
+        fault
     }
+}
+
+/// The fault of a number that depends on a variable.
+fn dependent(node: &Node, variable: Variable, path: &str) -> Fault {
+    let message = format!("`{path}` can't depend on {}", variable.name());
+    let help = "this key accepts no expression in t, x, y, z: use numbers and parameters only";
+    Fault::new(node.at.clone(), message, "").help(help)
 }
 
 /// A value that the schema allows, apart from its range: the default choice, or the last one.
@@ -429,7 +521,7 @@ mod tests {
 
     fn filled(text: &str) -> (Job, Vec<String>, usize) {
         let mut root = parse(text).expect("TOML");
-        let (faults, unread) = check(Kind::job(), &mut root, text);
+        let Checked { faults, unread, .. } = check(Kind::job(), &mut root, text, &mut Parameters::default());
         (Job::deserialize(root.plain()).expect("a job"), unread, faults.len())
     }
 

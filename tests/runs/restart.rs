@@ -472,6 +472,32 @@ fn a_checkpoint_of_another_problem_is_refused_and_the_key_is_named() {
 }
 
 #[test]
+fn a_changed_parameter_is_refused_by_the_names_of_its_keys_and_numbers_may_take_its_place() {
+    let case = saving()
+        .set("parameters", "{ load = 10.0, T = 1, n = 4 }")
+        .set("traction.0.value", "[0, '-load*t']")
+        .set("material.density", "'load/10'")
+        .set("time.end", "'T'")
+        .set("checkpoint.every", "'n'");
+    interrupt(&case, 1);
+    let refused = case.run_with(1, &["--restart", "--set", "parameters.load=11"]).expect(2);
+    refused.says("belongs to another problem").says("traction.0.value").says("material.density");
+    let plain =
+        ["--restart", "--set", "parameters={}", "--set", "material.density=1", "--set", "checkpoint.every=4"];
+    let plain =
+        [&plain[..], &["--set", "time.end=1", "--set", "traction.0.value=[0, \"-(10.0)*t\"]"]].concat();
+    case.run_with(1, &plain).expect(0).says("checkpoint-8.h5 (step 8, t = 0.5 s)");
+    // The effective job of a run runs again.
+    let (kept, rest) =
+        (saving().set("parameters", "{ load = 2.0 }").set("material.density", "'load/2'"), ["--restart"]);
+    interrupt(&kept, 2);
+    let written = std::fs::read_to_string(kept.results().path("job.toml")).expect("job.toml");
+    assert!(written.contains("load = 2.0") && written.contains("density = \"load/2\""), "{written}");
+    let effective = kept.results().path("job.toml").display().to_string();
+    crate::launch::run(2, &[&["run", &effective, "--set", "time.end=1.0"][..], &rest].concat()).expect(0);
+}
+
+#[test]
 fn what_is_written_and_how_it_is_solved_may_change_on_the_way() {
     for change in [
         "output.fields={interval=0.25}",

@@ -84,7 +84,18 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
             format!("{run}[[response]]\nof = \"profile.left.max.x\"\n"),
             "the base job has no profile along `left`",
         ),
-        (format!("{run}[[response]]\nof = \"history.mean.work\"\n"), "`history.mean.work` is not a quantity"),
+        (
+            format!("{run}[[response]]\nof = \"history.median.work\"\n"),
+            "`history.median.work` is not a quantity",
+        ),
+        (
+            format!("{run}[[response]]\nof = \"max_von_mises\"\nto = 1\n"),
+            "`max_von_mises` has no window of time",
+        ),
+        (
+            format!("{run}[[response]]\nof = \"history.mean.dt\"\nfrom = 0.5\nto = 0.25\n"),
+            "this window of time is empty: it starts at 0.5 s and ends at 0.25 s",
+        ),
         (
             format!("{run}[[response]]\nof = \"history.max.work\"\n"),
             "there is no quantity `history.max.work`",

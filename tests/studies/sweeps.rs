@@ -88,3 +88,51 @@ fn a_value_that_the_job_refuses_is_a_failed_run_and_all_its_faults_are_listed() 
     all.study(1, &[]).expect(2).says("did you mean");
     assert!(!all.path("out/study").exists());
 }
+
+#[test]
+fn parameters_are_swept_like_keys() {
+    let job = super::scene::SQUARE
+        .replace("density = 1", "density = \"rho\"")
+        .replace("volumetric = 25, shear = 50", "volumetric = \"a/2\", shear = \"a\"")
+        .replace("1 + 100*pi^2*t", "rho + 2*a*pi^2*t")
+        .replace("-50*pi^2*t", "-a*pi^2*t");
+    let job = format!("[parameters]\nrho = 9\na = \"60 - 10\"\n{job}");
+    let sweep = "[sweep]\n\"parameters.rho\" = [1.0, 2.0]\n\"parameters.a\" = [50.0, \"rho*40\"]\n\
+                 [[response]]\nof = \"history.kinetic_energy\"\n[[response]]\nof = \"probe.middle.velocity_x\"\n\
+                 [[response]]\nof = \"probe.middle.mean.velocity_x\"\nfrom = 0.5\n\
+                 [[response]]\nof = \"probe.middle.velocity_x\"\nto = 0.5\n";
+    let scene = Scene::new(&job, sweep);
+    scene.study(2, &[]).expect(0).says("a-50.0-rho-1.0").says("a-rho_40-rho-2.0");
+    let results = scene.results();
+    assert_eq!(results["sweep"], serde_json::json!(["parameters.a", "parameters.rho"]));
+    // The velocity is t sin(pi x) sin(pi y) for any of the values, but for the error of the mesh; the energy is proportional to rho.
+    let response = |run: usize, at: usize| number(&results, &format!("/runs/{run}/response/{at}"));
+    let ratio = response(1, 0) / response(0, 0);
+    assert!((ratio / 2.0 - 1.0).abs() < 1e-3, "{ratio}");
+    assert!((0..4).all(|run| (response(run, 1) - 1.0).abs() < 0.1), "{results:#}");
+    // The two steps end at 0.5 s and at 1 s.
+    assert!((response(0, 3) / response(0, 1) - 0.5).abs() < 1e-3, "{results:#}");
+    assert!((response(0, 2) - (response(0, 1) + response(0, 3)) / 2.0).abs() < 1e-12, "{results:#}");
+    let csv = std::fs::read_to_string(scene.path("out/study/responses.csv")).expect("responses.csv");
+    let header = csv.lines().next().unwrap_or_default();
+    assert!(
+        header.ends_with("probe.middle.mean.velocity_x (from 0.5 s),probe.middle.velocity_x (to 0.5 s)"),
+        "{header}"
+    );
+    // The same as the key itself.
+    let plain = Scene::new(
+        super::scene::SQUARE,
+        "[sweep]\n\"material.density\" = [1.0]\n[[response]]\nof = \"probe.middle.velocity_x\"\n",
+    );
+    plain.study(1, &[]).expect(0);
+    assert_eq!(number(&plain.results(), "/runs/0/response/0"), response(0, 1));
+    // A finished run is used again, and its job has the parameters.
+    assert_eq!(scene.study(2, &[]).expect(0).stdout.matches("already finished").count(), 4);
+    let written =
+        std::fs::read_to_string(scene.path("out/study/runs/a-rho_40-rho-2.0/job.toml")).expect("job.toml");
+    for line in ["rho = 2.0", "a = \"rho*40\"", "density = \"rho\"", "shear = \"a\""] {
+        assert!(written.contains(line), "{line} is not in {written}");
+    }
+    let typo = Scene::new(&job, "[sweep]\n\"parameters.roh\" = [1.0, 2.0]\n");
+    typo.study(1, &[]).expect(2).says("no parameter `roh`").says("did you mean `parameters.rho`?");
+}

@@ -9,6 +9,7 @@ mod contact;
 mod material;
 mod mesh;
 mod output;
+mod parameters;
 mod time;
 
 pub use crate::laws::{
@@ -27,12 +28,15 @@ pub use mesh::{
     boundary_of_block, region_of_block,
 };
 pub use output::{Checkpoint, Every, FurtherField, Output, Probe, Profile};
+pub use parameters::Parameter;
 pub use time::{Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Solver, Time};
 
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use super::written::Written;
 
 /// A job: the body, its loads and contacts, the simulated time and the output. An effect whose table is absent is not simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -41,6 +45,15 @@ pub struct Job {
     /// Title, source and authors of the job. They do not affect the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about: Option<About>,
+    /// Numbers with names, for example V = 0.05 and T = "2*pi/V". Wherever a key expects a number, it accepts an expression of them
+    /// in quotes, such as end = "3*T" and cells = ["2*n", "n"]; expressions in t, x, y, z may contain them, too. A parameter may
+    /// depend on others, in any order. A name is made of letters, digits and _ and does not start with a digit; the names of
+    /// functions, variables and constants are not available, and neither are d, g, l, p, q and v.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, Parameter>,
+    /// The values that expressions of parameters give, as the job file has them.
+    #[serde(skip)]
+    pub written: Written,
     /// The mesh of the body or bodies.
     pub mesh: Mesh,
     /// The material of all cells that belong to no `[[region]]`.

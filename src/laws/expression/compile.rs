@@ -6,7 +6,8 @@
 
 use std::ops::Range;
 
-use super::functions::{Meaning, comparison, meaning, names, smooth_of_two};
+use super::evaluate::COUNT;
+use super::functions::{Meaning, Names, comparison, meaning, names, smooth_of_two};
 use super::interval::{Interval, Real};
 use super::program::{Binary, Instruction, Program, Table, Unary, Variable};
 use crate::laws::nearest::nearest;
@@ -51,25 +52,45 @@ pub struct Fault {
     pub message: String,
     /// The remedy.
     pub help: String,
+    /// Whether a name is unknown.
+    pub is_unknown_name: bool,
 }
 
 impl Fault {
     fn new(at: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self { at, message: message.into(), help: help.into() }
+        Self { at, message: message.into(), help: help.into(), is_unknown_name: false }
     }
 }
 
-/// The program that evaluates `text`, an expression in these variables.
-pub(super) fn compile(text: &str, variables: &[Variable]) -> Result<Program, Fault> {
+/// A compiled text.
+pub(super) struct Compiled {
+    /// The program.
+    pub program: Program,
+    /// The places of names of numbers in the text, in ascending order, with the numbers.
+    pub named: Vec<(Range<usize>, f64)>,
+}
+
+/// Refuses a text that is too long.
+pub(super) fn refuse_long(text: &str) -> Result<(), Fault> {
     let longest = LONGEST[usize::from(text.contains("interpolate("))];
-    if text.len() > longest {
-        let message = format!("this expression has {} characters", text.len());
-        return Err(Fault::new(0..text.len(), message, format!("at most {longest} are allowed")));
+    if text.len() <= longest {
+        return Ok(());
     }
-    let mut parser = Parser { text, variables, at: 0, depth: 0, program: Vec::new(), tables: Vec::new() };
+    let message = format!("this expression has {} characters", text.len());
+    Err(Fault::new(0..text.len(), message, format!("at most {longest} are allowed")))
+}
+
+/// The program that evaluates `text`, an expression in these variables, in which these names stand for numbers.
+pub(super) fn compile(text: &str, variables: &[Variable], names: &Names) -> Result<Compiled, Fault> {
+    refuse_long(text)?;
+    let (program, tables, named) = (Vec::new(), Vec::new(), Vec::new());
+    let mut parser = Parser { text, variables, names, at: 0, depth: 0, program, tables, named };
     parser.value()?;
     match parser.peek() {
-        None => Ok(Program::new(parser.program, parser.tables)),
+        None => {
+            let program = Program::new(parser.program, parser.tables);
+            Ok(Compiled { program, named: parser.named })
+        }
         Some(')') => Err(parser.here("this `)` has no matching `(`", "delete it, or add a `(` before it")),
         Some(',') => {
             Err(parser.here("a comma outside of a function", "numbers are written with a point: 0.5"))
@@ -83,13 +104,28 @@ pub(super) fn compile(text: &str, variables: &[Variable]) -> Result<Program, Fau
     }
 }
 
+/// The value of instructions without variables and tables; `None` if they have some, or if the value is not a number.
+fn constant(instructions: &[Instruction]) -> Option<f64> {
+    if let [Instruction::Number(number)] = instructions {
+        return Some(*number);
+    }
+    let varies = |one: &Instruction| matches!(one, Instruction::Variable(_) | Instruction::Interpolate(_));
+    if instructions.iter().any(varies) {
+        return None;
+    }
+    let program = Program::new(instructions.to_vec(), Vec::new());
+    Some(program.evaluate(&[0.0; COUNT])).filter(|value| !value.is_nan())
+}
+
 struct Parser<'a> {
     text: &'a str,
     variables: &'a [Variable],
+    names: &'a Names,
     at: usize,
     depth: usize,
     program: Vec<Instruction>,
     tables: Vec<Table>,
+    named: Vec<(Range<usize>, f64)>,
 }
 
 impl Parser<'_> {
@@ -108,12 +144,18 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn sum(&mut self) -> Result<(), Fault> {
+    /// Enters another level.
+    fn descend(&mut self) -> Result<(), Fault> {
         self.depth += 1;
-        if self.depth > DEEPEST {
-            let message = "this expression is nested too deeply";
-            return Err(self.here(message, format!("at most {DEEPEST} levels are allowed")));
+        if self.depth <= DEEPEST {
+            return Ok(());
         }
+        let message = "this expression is nested too deeply";
+        Err(self.here(message, format!("at most {DEEPEST} levels are allowed")))
+    }
+
+    fn sum(&mut self) -> Result<(), Fault> {
+        self.descend()?;
         self.product()?;
         loop {
             let operator = match self.peek() {
@@ -163,11 +205,7 @@ impl Parser<'_> {
         self.atom()?;
         if self.peek() == Some('^') {
             self.at += 1;
-            self.depth += 1;
-            if self.depth > DEEPEST {
-                let message = "this expression is nested too deeply";
-                return Err(self.here(message, format!("at most {DEEPEST} levels are allowed")));
-            }
+            self.descend()?;
             self.signed()?;
             self.depth -= 1;
             self.program.push(Instruction::Binary(POWER));
@@ -226,20 +264,22 @@ impl Parser<'_> {
         let span = start..self.at;
         let name = &self.text[span.clone()];
         let called = self.peek() == Some('(');
-        match meaning(name, self.variables) {
-            None => {
-                let help = match nearest(name, names(self.variables)) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("known names: {}", names(self.variables).collect::<Vec<_>>().join(", ")),
-                };
-                Err(Fault::new(span, format!("unknown name `{name}` in an expression"), help))
-            }
+        let known = meaning(name, self.variables);
+        let number = self.names.get(name).copied().filter(|_| known.is_none());
+        match known.or(number.map(|number| Meaning::Value(Instruction::Number(number)))) {
+            None => Err(self.unknown(span)),
             Some(Meaning::Value(_)) if called => {
                 let help = format!("a product is written {name}*(...)");
                 Err(Fault::new(span, format!("`{name}` is not a function"), help))
             }
             Some(Meaning::Value(value)) => {
                 self.program.push(value);
+                if let Some(number) = number {
+                    // The number in parentheses takes a level.
+                    self.descend()?;
+                    self.depth -= 1;
+                    self.named.push((span, number));
+                }
                 Ok(())
             }
             Some(_) if !called => {
@@ -271,6 +311,18 @@ impl Parser<'_> {
                 program.push(Instruction::Binary(function));
             }),
         }
+    }
+
+    fn unknown(&self, span: Range<usize>) -> Fault {
+        let name = &self.text[span.clone()];
+        let known: Vec<&str> = names(self.variables).collect();
+        let all = known.iter().copied().chain(self.names.keys().map(String::as_str));
+        let help = match nearest(name, all) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("known names: {}", known.join(", ")),
+        };
+        let message = format!("unknown name `{name}` in an expression");
+        Fault { is_unknown_name: true, ..Fault::new(span, message, help) }
     }
 
     /// A parenthesised list of `least` to `most` arguments; `then` is called after each argument except the first.
@@ -313,18 +365,10 @@ impl Parser<'_> {
         while self.peek() == Some(',') {
             self.at += 1;
             let (start, first) = (self.at, self.program.len());
-            self.signed()?;
-            let number = match self.program[first..] {
-                [Instruction::Number(number)] => number,
-                [Instruction::Number(number), Instruction::Unary(sign)] if sign == NEGATE => -number,
-                _ => {
-                    let message = "the points of a table must be numbers";
-                    return Err(Fault::new(
-                        start..self.at,
-                        message,
-                        "write interpolate(t, t1, v1, t2, v2, ...)",
-                    ));
-                }
+            self.sum()?;
+            let Some(number) = constant(&self.program[first..]) else {
+                let message = "the points of a table must be numbers";
+                return Err(Fault::new(start..self.at, message, "write interpolate(t, t1, v1, t2, v2, ...)"));
             };
             self.program.truncate(first);
             numbers.push(number);

@@ -2,6 +2,10 @@
 
 use super::interval::{Interval, Real};
 use super::program::{Binary, Instruction, Piece, Ternary, Unary, Variable};
+use std::collections::BTreeMap;
+
+/// Numbers with names, which expressions may contain beside functions, variables and constants.
+pub type Names = BTreeMap<String, f64>;
 
 /// Meaning of a name.
 #[derive(Clone, Copy)]
@@ -184,6 +188,11 @@ const HYPOT: Binary = smooth_of_two!(left.length(right), (left, right) => {
     let length = left.length(right);
     [left / length, right / length]
 });
+
+/// Whether expressions in time and place know a name of their own: a function, a variable or a constant.
+pub fn is_known(name: &str) -> bool {
+    meaning(name, Variable::OF_TIME_AND_PLACE).is_some()
+}
 
 /// The meaning of `name`, if it is one of these variables, a constant or a function.
 pub(super) fn meaning(name: &str, variables: &[Variable]) -> Option<Meaning> {

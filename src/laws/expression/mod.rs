@@ -27,6 +27,7 @@ pub use compile::Fault;
 pub use enclosure::Enclosure;
 use evaluate::{Arguments, COUNT};
 pub use formula::Formula;
+pub use functions::{Names, is_known};
 pub use interval::Interval;
 use program::Program;
 pub use program::Variable;
@@ -92,6 +93,15 @@ impl Default for Scalar {
     }
 }
 
+/// An expression whose text had names of numbers.
+#[derive(Debug, Clone)]
+pub struct Resolved {
+    /// The expression, whose text contains the numbers in place of the names.
+    pub expression: Expression,
+    /// The names, in the order of the text.
+    pub names: Vec<String>,
+}
+
 /// A compiled expression; clones share the program.
 #[derive(Debug, Clone)]
 pub struct Expression {
@@ -107,7 +117,25 @@ impl Expression {
 
     /// Compiles `text`, an expression in these variables.
     pub fn parse_in(text: &str, variables: &[Variable]) -> Result<Self, Fault> {
-        Ok(Self { text: text.into(), program: compile::compile(text, variables)? })
+        Ok(Self { text: text.into(), program: compile::compile(text, variables, &Names::new())?.program })
+    }
+
+    /// Compiles `text`, an expression in these variables, in which these names stand for finite numbers; an error contains its position in
+    /// the text.
+    pub fn resolve(text: &str, variables: &[Variable], names: &Names) -> Result<Resolved, Fault> {
+        let compile::Compiled { program, named } = compile::compile(text, variables, names)?;
+        let mut with_numbers = String::with_capacity(text.len());
+        let mut end = 0;
+        for (at, number) in &named {
+            // The shortest digits that are read back as the same number.
+            with_numbers.push_str(&format!("{}({number:?})", &text[end..at.start]));
+            end = at.end;
+        }
+        with_numbers.push_str(&text[end..]);
+        let too_long = |fault| Fault { at: 0..text.len(), ..fault };
+        compile::refuse_long(&with_numbers).map_err(too_long)?;
+        let names = named.into_iter().map(|(at, _)| text[at].to_owned()).collect();
+        Ok(Resolved { expression: Self { text: with_numbers.into(), program }, names })
     }
 
     /// The expression as written.
@@ -118,6 +146,11 @@ impl Expression {
     /// Whether it contains `variable`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.program.uses(variable)
+    }
+
+    /// The first variable that it contains.
+    pub fn variable(&self) -> Option<Variable> {
+        Variable::ALL.iter().copied().find(|variable| self.uses(*variable))
     }
 
     /// Value at `time` and `point`; not finite where the expression is undefined, as in sqrt(-1).

@@ -1,5 +1,5 @@
 use super::evaluate::COUNT;
-use super::{Enclosure, Expression, Formula, Interval, REACH, Scalar, Unproven, Variable};
+use super::{Enclosure, Expression, Formula, Interval, Names, REACH, Resolved, Scalar, Unproven, Variable};
 
 fn value(text: &str) -> f64 {
     Expression::parse(text)
@@ -40,6 +40,7 @@ fn operators_bind_as_in_mathematics() {
         ("pulse(t, 0.5, 1) + 10*pulse(t, 0, 0.5)", 1.0),
         ("2*interpolate(t, 0, -1, 1, 3)", 2.0),
         ("interpolate(x, 0, 1, 1, 3) + interpolate(-x, 0, 10, 1, 3)", 13.0),
+        ("interpolate(x, 0, -(1 + 2), sqrt(4)*2, 2*5 - 1)", 3.0),
     ] {
         assert!((value(text) - expected).abs() < 1e-12, "{text} is {}, not {expected}", value(text));
     }
@@ -63,6 +64,8 @@ fn faults_point_into_the_text() {
         ("interpolate(t, 0, 1, 0.5)", 0..25, "3 numbers", "pairs"),
         ("interpolate(t, 0, 1, 0, 2)", 0..26, "0 is not above 0", "jump"),
         ("interpolate(t, 0, x)", 17..19, "numbers", "v1"),
+        ("interpolate(t, 0, 0/0)", 17..21, "numbers", "v1"),
+        ("interpolate(t, 0, interpolate(1, 0, 1))", 17..38, "numbers", "v1"),
         ("1 + T", 4..5, "unknown name `T`", "did you mean `t`?"),
         ("sine(x)", 0..4, "unknown name `sine`", "did you mean `sin`?"),
         ("temperature", 0..11, "unknown name", "known names: t, x, y, z"),
@@ -295,4 +298,65 @@ fn suprema_are_sharp_to_a_per_cent_and_never_too_small() {
         matches!(sup("1/(1 + v)", -2.0, 2.0, |known| known.slope), Err(Unproven::Undefined(at)) if (at + 1.0).abs() < 1e-9)
     );
     assert!(matches!(sup("ln(v - 2)", 0.0, 4.0, |known| known.value), Err(Unproven::Undefined(_))));
+}
+
+fn resolved(text: &str) -> Result<Resolved, super::Fault> {
+    let names = [("V", 0.1), ("n_2", -3.0), ("t0", 1e-7), ("x", 9.0), ("sine", 7.0)];
+    Expression::resolve(
+        text,
+        Variable::OF_TIME_AND_PLACE,
+        &Names::from(names.map(|(name, value)| (name.to_owned(), value))),
+    )
+}
+
+#[test]
+fn names_of_numbers_are_constants() {
+    for (text, expected, with_numbers) in [
+        ("V", 0.1, "(0.1)"),
+        ("n_2^2 + V*t0", 9.0 + 1e-8, "(-3.0)^2 + (0.1)*(1e-7)"),
+        ("2*V*x", 0.4, "2*(0.1)*x"),
+        ("-n_2*t", 1.5, "-(-3.0)*t"),
+        (
+            "interpolate(t, t0, 2*V, 1 + V, n_2) - pulse(t, V, 1)",
+            0.2 - 3.2 * 0.4999999 / 1.0999999 - 1.0,
+            "interpolate(t, (1e-7), 2*(0.1), 1 + (0.1), (-3.0)) - pulse(t, (0.1), 1)",
+        ),
+    ] {
+        let Resolved { expression, .. } = resolved(text).unwrap_or_else(|fault| panic!("{text}: {fault:?}"));
+        let found = expression.evaluate(0.5, &[2.0, 3.0, 4.0]);
+        assert!((found - expected).abs() < 1e-12, "{text} is {found}, not {expected}");
+        assert_eq!(expression.text(), with_numbers);
+        assert_eq!(value(with_numbers), found, "the text gives the same bits");
+    }
+    assert_eq!(resolved("V + n_2*sin(V)").expect("valid").names, ["V", "n_2", "V"]);
+    // Names of expressions have their own meaning.
+    let own = resolved("x").expect("valid");
+    assert!(own.names.is_empty() && own.expression.text() == "x");
+}
+
+#[test]
+fn faults_of_names_of_numbers_point_into_the_text() {
+    for (text, at, message, help) in [
+        ("1 + W", 4..5, "unknown name `W`", "known names: t, x, y, z"),
+        ("n_3*t", 0..3, "unknown name `n_3`", "did you mean `n_2`?"),
+        ("V(t)", 0..1, "`V` is not a function", "V*("),
+        ("2V", 1..2, "operator is missing", "2*x"),
+        ("pulse(t, 1, V)", 0..5, "ends at 0.1, before its start at 1", "pulse(t, start, end)"),
+    ] {
+        let fault = resolved(text).expect_err(text);
+        assert_eq!(fault.at, at, "{text}: {fault:?}");
+        assert!(fault.message.contains(message) && fault.help.contains(help), "{text}: {fault:?}");
+        assert_eq!(fault.is_unknown_name, message.contains("unknown"));
+    }
+}
+
+#[test]
+fn expressions_with_the_numbers_are_never_longer_or_deeper_than_others() {
+    let long = "V+".repeat(4000) + "V";
+    assert!(resolved(&long).expect_err("long").message.contains("characters"));
+    let nested = |levels: usize| format!("{}V{}", "(".repeat(levels), ")".repeat(levels));
+    let deepest = (0..400).rfind(|levels| resolved(&nested(*levels)).is_ok()).expect("some");
+    let text = resolved(&nested(deepest)).expect("deep").expression.text().to_owned();
+    assert!(Expression::parse(&text).is_ok(), "{deepest} levels");
+    assert!(resolved(&nested(deepest + 1)).expect_err("deeper").message.contains("too deeply"));
 }

@@ -1,7 +1,7 @@
 //! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
 use super::{
-    document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values},
+    document::{Exact, ProbeError, Quantity, Reference, Response, Run, Space, Study, Values},
     quantity::TableQuantity,
 };
 use crate::{
@@ -25,7 +25,7 @@ pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Do
         document.fault(place, format!("the study has {count} runs"), format!("at most {MOST_RUNS}"));
     }
     check_cells(study, base, document);
-    check_sweep(study, document);
+    check_sweep(study, base, document);
     if study.compare.split
         && (base.mesh.source.cells().is_empty() || !matches!(study.reference, Some(Reference::Run(_))))
     {
@@ -73,9 +73,20 @@ pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Do
     }
 }
 
-fn check_sweep(study: &Study, document: &mut Document) {
+fn check_sweep(study: &Study, base: &Job, document: &mut Document) {
     let mut first: Option<(&str, u32)> = None;
     for (key, values) in &study.sweep {
+        if let Some(name) = key.strip_prefix("parameters.")
+            && !base.parameters.contains_key(name)
+        {
+            let known: Vec<&str> = base.parameters.keys().map(String::as_str).collect();
+            let help = match nearest(name, known.iter().copied()) {
+                Some(near) => format!("did you mean `parameters.{near}`?"),
+                None if known.is_empty() => "give numbers names in its table [parameters]".into(),
+                None => format!("parameters: {}", known.join(", ")),
+            };
+            document.fault("sweep", format!("the base job has no parameter `{name}`"), help);
+        }
         let Values::Draws(draws) = values else { continue };
         if draws.from >= draws.to {
             let message = format!("`{key}` has no values from {} to {}", draws.from, draws.to);
@@ -188,16 +199,17 @@ fn known_columns(parts: &[&str], base: &Job) -> Vec<String> {
 
 /// Checks that the quantity is one of a known form, that the base job has its probe or profile, and that it is a column of its table.
 fn check_response(study: &Study, base: &Job, index: usize, document: &mut Document) {
-    let name = &study.response[index].of;
+    let response = &study.response[index];
+    let name = &response.of;
     let path = format!("response.{index}.of");
     let quantity = TableQuantity::parse(name);
     let parts: Vec<&str> = name.split('.').collect();
     let has_form = match &quantity {
         Some(TableQuantity { table, of, side, .. }) => {
-            let sides = if table.word == "profile" {
-                [Some("max"), Some("min"), Some("first")]
+            let sides: &[Option<&str>] = if table.word == "profile" {
+                &[Some("max"), Some("min"), Some("first")]
             } else {
-                [None, Some("max"), Some("min")]
+                &[None, Some("max"), Some("min"), Some("mean"), Some("amplitude")]
             };
             sides.contains(side) && *of != Some("")
         }
@@ -234,11 +246,31 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
     if !has_form {
         let help = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
                     resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also history.max.COLUMN and \
-                    resultant.SOURCE.max.COLUMN; .min. in place of .max., of profiles also .first.)";
+                    resultant.SOURCE.max.COLUMN; .min., .mean. or .amplitude. in place of .max., of profiles .min. or .first.)";
         document.fault(&path, format!("`{name}` is not a quantity"), help);
     }
-    if study.response[..index].iter().any(|other| other.of == *name) {
+    if study.response[..index].iter().any(|other| other.name() == response.name()) {
         document.fault(&path, format!("`{name}` is given twice"), "delete one of them");
+    }
+    if has_form && !response.window().is_whole() {
+        check_window(response, base, &format!("response.{index}"), document);
+    }
+}
+
+/// A window of time belongs to a quantity of all steps, and contains steps.
+fn check_window(response: &Response, base: &Job, path: &str, document: &mut Document) {
+    let table = TableQuantity::parse(&response.of).map(|quantity| quantity.table.word);
+    let end = if response.from.is_some() { "from" } else { "to" };
+    if table.is_none_or(|table| table == "profile") {
+        let message = format!("`{}` has no window of time", response.of);
+        let help = "histories, probes and resultants have one: delete `from` and `to`";
+        return document.fault(&format!("{path}.{end}"), message, help);
+    }
+    let (from, to) = (response.from.unwrap_or(0.0), response.to.unwrap_or(base.time.end));
+    if from >= to {
+        let message = format!("this window of time is empty: it starts at {from} s and ends at {to} s");
+        let help = format!("`from` is below `to`, which is at most the end of the run, {} s", base.time.end);
+        document.fault(&format!("{path}.{end}"), message, help);
     }
 }
 

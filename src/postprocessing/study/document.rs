@@ -1,6 +1,6 @@
 //! The study as plain structs: the single source of the name, meaning, unit, range and default of each key.
 
-use super::quantity::TableQuantity;
+use super::quantity::{TableQuantity, Window};
 use crate::{
     io::output::{
         field_list::{DISPLACEMENT, STRESS, VELOCITY},
@@ -187,12 +187,34 @@ pub struct Response {
     /// A quantity named as in [check] of a job: a number of summary.json such as "max_von_mises", or history.COLUMN,
     /// probe.NAME.COLUMN or resultant.SOURCE.COLUMN at the end; history.max.COLUMN, probe.NAME.max.COLUMN or
     /// resultant.SOURCE.max.COLUMN over all steps; profile.BOUNDARY.max.COLUMN over the boundary at the end. .min. and, of profiles,
-    /// .first. in place of .max. Probes and profiles are those of the base job.
+    /// .first. in place of .max. Also, of histories, probes and resultants, .mean. over time and .amplitude., half of the difference
+    /// between maximum and minimum. Probes and profiles are those of the base job.
     #[schemars(length(min = 1), example = "probe.tip.displacement_y")]
     pub of: String,
+    /// Start of a window of time: only steps that end in it count. Of histories, probes and resultants. Absent: the start of the run.
+    #[schemars(extend("unit" = "s", "minimum" = 0), example = 0.5)]
+    pub from: Option<f64>,
+    /// End of the window. A value at the end is then that of the last step in the window. Absent: the end of the run.
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1.0)]
+    pub to: Option<f64>,
 }
 
 impl Response {
+    /// Its name in tables and pictures: the quantity, and the window if there is one.
+    pub fn name(&self) -> String {
+        match (self.from, self.to) {
+            (None, None) => self.of.clone(),
+            (Some(from), None) => format!("{} (from {from} s)", self.of),
+            (None, Some(to)) => format!("{} (to {to} s)", self.of),
+            (Some(from), Some(to)) => format!("{} (from {from} s to {to} s)", self.of),
+        }
+    }
+
+    /// The window of time.
+    pub(super) fn window(&self) -> Window {
+        Window { from: self.from, to: self.to }
+    }
+
     /// Whether the quantity is of the profile along this boundary.
     pub fn is_on(&self, boundary: &str) -> bool {
         TableQuantity::parse(&self.of)

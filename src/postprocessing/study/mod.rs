@@ -154,7 +154,7 @@ fn assembled(
         notes: study.about.notes.clone(),
         reference: None,
         sweep: study.sweep.keys().cloned().collect(),
-        response: study.response.iter().map(|response| response.of.clone()).collect(),
+        response: study.response.iter().map(document::Response::name).collect(),
         norms: table::norms(study),
         runs: plan.runs.iter().zip(ran).map(|(planned, ran)| result(planned, ran, take)).collect(),
         tolerances: Vec::new(),

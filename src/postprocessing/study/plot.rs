@@ -219,6 +219,8 @@ fn response(
 
 /// The unit of a response of bodies of this dimension; empty for numbers without one.
 fn unit_of_response(name: &str, dimension: usize) -> &'static str {
+    // Without a window of time.
+    let name = name.split(" (").next().unwrap_or(name);
     let (source, column) = (name.split('.').next(), name.rsplit('.').next().unwrap_or(name));
     if let Some(table) = source.and_then(RunTable::of) {
         return table.unit(column, dimension);

@@ -6,13 +6,37 @@ use crate::{
 };
 use std::path::Path;
 
+/// Relative distance of a time to the bounds of a window at which it is still inside, because ends of steps are rounded.
+const ROUNDING: f64 = 1e-9;
+
+/// A window of simulated time in s; an absent bound is that of the run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Window {
+    /// The first time.
+    pub from: Option<f64>,
+    /// The last time.
+    pub to: Option<f64>,
+}
+
+impl Window {
+    /// Whether it is all of the run.
+    pub(super) fn is_whole(self) -> bool {
+        self == Self::default()
+    }
+
+    fn contains(self, time: f64) -> bool {
+        let slack = ROUNDING * time.abs();
+        self.from.is_none_or(|from| time >= from - slack) && self.to.is_none_or(|to| time <= to + slack)
+    }
+}
+
 /// A quantity of a table, by its name.
 pub(super) struct TableQuantity<'a> {
     /// The table.
     pub table: &'static RunTable,
     /// The probe, source or boundary, which may contain dots; absent for a table without names.
     pub of: Option<&'a str>,
-    /// The extremum, or `first`.
+    /// The extremum, `mean`, `amplitude` or `first`.
     pub side: Option<&'a str>,
     /// The column.
     pub column: &'a str,
@@ -26,7 +50,7 @@ impl<'a> TableQuantity<'a> {
         let (before, column) = rest.rsplit_once('.').unwrap_or(("", rest));
         let (of, side) = match before.rsplit_once('.') {
             _ if table.keys.is_empty() => (None, Some(before).filter(|side| !side.is_empty())),
-            Some((of, side @ ("max" | "min" | "first"))) => (Some(of), Some(side)),
+            Some((of, side @ ("max" | "min" | "mean" | "amplitude" | "first"))) => (Some(of), Some(side)),
             _ => (Some(before), None),
         };
         Some(Self { table, of, side, column })
@@ -37,8 +61,14 @@ impl<'a> TableQuantity<'a> {
 ///
 /// A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table: `history.COLUMN`,
 /// `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN`, `.min.` or `.first.` over the
-/// boundary or at its first point, at the last output. With `.max.` or `.min.` before the column, the others are over all steps.
+/// boundary or at its first point, at the last output. With `.max.`, `.min.`, `.mean.` or `.amplitude.` before the column, the others
+/// are over all steps.
 pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
+    quantity_in(folder, name, Window::default())
+}
+
+/// As [`quantity`], of the steps in a window of time. Only histories, probes and resultants have values there.
+pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<f64> {
     let Some(TableQuantity { table, of, side, column: field }) = TableQuantity::parse(name) else {
         let text = std::fs::read_to_string(folder.join("summary.json")).ok()?;
         let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
@@ -46,16 +76,37 @@ pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
     };
     let filter = table.keys.last().copied().zip(of);
     let numbers = |name: &str| column(folder, table.file, filter, name);
-    match (side, table.keys.first() == Some(&"time")) {
-        (Some(side), true) => {
-            let times = numbers("time")?;
-            let rows = times.iter().zip(numbers(field)?).filter(|(time, _)| Some(*time) == times.last());
-            extreme(side, rows.map(|(_, value)| value))
-        }
-        (Some(side), false) => extreme(side, numbers(field)?.into_iter()),
-        (None, false) => numbers(field)?.pop(),
-        (None, true) => None,
+    if table.keys.first() == Some(&"time") {
+        let times = numbers("time")?;
+        let rows = times.iter().zip(numbers(field)?).filter(|(time, _)| Some(*time) == times.last());
+        return extreme(side?, rows.map(|(_, value)| value));
     }
+    if window.is_whole() && side != Some("mean") {
+        return over_steps(side, &numbers(field)?);
+    }
+    let rows = numbers("time")?.into_iter().zip(numbers(field)?).filter(|(time, _)| window.contains(*time));
+    let (times, values): (Vec<f64>, Vec<f64>) = rows.unzip();
+    if side == Some("mean") { mean(&times, &values) } else { over_steps(side, &values) }
+}
+
+/// The last value, an extremum or the amplitude.
+fn over_steps(side: Option<&str>, values: &[f64]) -> Option<f64> {
+    let side_of = |side: &str| extreme(side, values.iter().copied());
+    match side {
+        None => values.last().copied(),
+        Some("amplitude") => Some((side_of("max")? - side_of("min")?) / 2.0),
+        Some(side) => side_of(side),
+    }
+}
+
+/// The mean over time of values that are linear between the times.
+fn mean(times: &[f64], values: &[f64]) -> Option<f64> {
+    let (first, last) = (times.first()?, times.last()?);
+    if first == last {
+        return values.last().copied();
+    }
+    let pairs = times.windows(2).zip(values.windows(2));
+    Some(pairs.map(|(t, v)| (t[1] - t[0]) * (v[0] + v[1]) / 2.0).sum::<f64>() / (last - first))
 }
 
 /// The numbers of a column in the rows in which another column contains this word (in all rows without a filter).
@@ -124,6 +175,37 @@ mod tests {
         ];
         for (name, value) in cases {
             assert_eq!(quantity(folder.path(), name), Some(value), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_window_contains_the_steps_between_its_times() {
+        let folder = tempfile::tempdir().expect("folder");
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
+        write("history.csv", "step,time,work\n1,0.1,4\n2,0.3,8\n3,0.30000000000000004,6\n4,0.5,-2\n");
+        write(
+            "probes.csv",
+            "step,time,probe,velocity_y\n1,1,a,1\n1,1,b,9\n2,2,a,3\n2,2,b,9\n3,4,a,7\n3,4,b,9\n",
+        );
+        let value = |name: &str, from: Option<f64>, to: Option<f64>| {
+            quantity_in(folder.path(), name, Window { from, to })
+        };
+        for (name, from, to, expected) in [
+            ("history.work", None, Some(0.3), Some(6.0)),
+            ("history.max.work", Some(0.35), None, Some(-2.0)),
+            ("history.min.work", None, Some(0.2), Some(4.0)),
+            ("history.amplitude.work", None, None, Some(5.0)),
+            ("history.amplitude.work", Some(0.3), None, Some(5.0)),
+            ("history.amplitude.work", Some(0.1), Some(0.1), Some(0.0)),
+            // (1 x 2 + 2 x 5) / 3, and of the last two steps alone.
+            ("probe.a.mean.velocity_y", None, None, Some(4.0)),
+            ("probe.a.mean.velocity_y", Some(1.5), Some(9.0), Some(5.0)),
+            ("probe.a.mean.velocity_y", Some(4.0), None, Some(7.0)),
+            ("probe.b.mean.velocity_y", None, None, Some(9.0)),
+            ("probe.a.mean.velocity_y", Some(2.5), Some(3.5), None),
+            ("probe.a.max.velocity_y", Some(5.0), None, None),
+        ] {
+            assert_eq!(value(name, from, to), expected, "{name} from {from:?} to {to:?}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Responses: quantities of the finished runs.
 
-use super::{plan::Plan, quantity::quantity, results::Results};
+use super::{document::Response, plan::Plan, quantity::quantity_in, results::Results};
 use crate::{
     io::output::{columns::RunTable, csv::records},
     laws::nearest::nearest,
@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Adds the responses of the completed runs; a quantity that a run does not have is an error of this run. Collective.
 pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
-    let names = results.response.clone();
+    let names: &[Response] = &plan.study.response;
     // For each response of each run, whether it exists and its value; zeros on all ranks but the first.
     let mut found = vec![0.0; 2 * names.len() * results.runs.len()];
     let place = |run: usize, name: usize| 2 * (run * names.len() + name);
@@ -18,7 +18,9 @@ pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
     for (at, run) in results.runs.iter().enumerate() {
         for (name, response) in names.iter().enumerate() {
             let here = session.is_first() && run.status == "completed";
-            if let Some(value) = here.then(|| quantity(folders[at], response)).flatten() {
+            if let Some(value) =
+                here.then(|| quantity_in(folders[at], &response.of, response.window())).flatten()
+            {
                 found[place(at, name)] = 1.0;
                 found[place(at, name) + 1] = value;
             }
@@ -29,10 +31,10 @@ pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
         let value = |name: usize| (found[place(at, name)] > 0.0).then(|| found[place(at, name) + 1]);
         run.response = (0..names.len()).map(value).collect();
         let missing = names.iter().zip(&run.response).find(|(_, value)| value.is_none());
-        if let Some((name, _)) = missing.filter(|_| run.status == "completed" && run.error.is_none()) {
-            let help =
-                near(folders[at], name).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            run.error = Some(format!("it has no quantity `{name}`{help}"));
+        if let Some((response, _)) = missing.filter(|_| run.status == "completed" && run.error.is_none()) {
+            let near = near(folders[at], &response.of).filter(|near| *near != response.of);
+            let help = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            run.error = Some(format!("it has no quantity `{}`{help}", response.name()));
         }
     }
 }
