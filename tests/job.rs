@@ -379,8 +379,18 @@ fn every_key_is_described() {
     assert!(one.contains("[contact.friction.tresca]") && !one.contains("breakpoints"), "{one}");
     let unknown = describe(Some("contat")).expect_err("unknown").to_string();
     assert!(unknown.contains("did you mean `contact`?"), "{unknown}");
-    let key = describe(Some("youngs_modulus")).expect_err("a key").to_string();
-    assert!(key.contains("[material.elasticity]"), "{key}");
+    for (word, first) in [
+        ("youngs_modulus", "material.elasticity.youngs_modulus: "),
+        ("coulomb", "contact.friction.coulomb: Coulomb friction."),
+        ("friction", "contact.friction: "),
+    ] {
+        let found = describe(Some(word)).expect(word);
+        let line = found.lines().nth(2).unwrap_or_default();
+        assert!(
+            found.starts_with(&format!("`{word}` occurs in")) && line.starts_with(&format!("  {first}")),
+            "{found}"
+        );
+    }
 }
 
 #[test]

@@ -25,8 +25,8 @@ struct Key {
     is_required: bool,
 }
 
-/// Meaning, unit, range, default and example of all keys of `table` and the tables below it (of all tables if `None`), or of the
-/// single key that `table` names.
+/// Meaning, unit, range, default and example of all keys of `table` and the tables below it (of all tables if `None`, after a list of
+/// them), or of the single key that `table` names; where neither has this name, the tables and keys in which the word occurs.
 pub fn describe(table: Option<&str>) -> Result<String> {
     describe_kind(Kind::job(), table)
 }
@@ -52,10 +52,19 @@ pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
         })
         .collect();
     if shown.is_empty() {
-        return Err(unknown_table(kind, wanted, &all));
+        return occurrences(&all, wanted).ok_or_else(|| unknown_table(kind, wanted, &all));
     }
-    let paragraphs = kind.opening.split("\n\n").filter(|_| wanted.is_empty());
-    let opening: String = paragraphs.map(|text| lines(text, 0) + "\n").collect();
+    let mut opening = String::new();
+    if wanted.is_empty() {
+        kind.opening.split("\n\n").for_each(|text| opening += &(lines(text, 0) + "\n"));
+        let list = |table: &&DescribedTable| entry(&table.path, &table.meaning);
+        let tables: String =
+            all.iter().filter(|table| !table.path.contains('.')).map(|table| list(&table)).collect();
+        opening += &format!(
+            "Tables (solver describe {}TABLE shows one, also by any word):\n\n{tables}\n",
+            kind.prefix
+        );
+    }
     Ok(opening + &shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
 }
 
@@ -102,19 +111,49 @@ pub(crate) fn markdown_of(kind: Kind) -> String {
     page
 }
 
+/// A line with the first sentence of the meaning.
+fn entry(path: &str, meaning: &str) -> String {
+    let sentence = meaning.split(". ").next().unwrap_or_default().trim_end_matches('.');
+    lines(&format!("{path}: {sentence}."), 2)
+}
+
+/// The tables and keys whose name or meaning contains a word, those with the name first; `None` if there are none.
+fn occurrences(all: &[DescribedTable], word: &str) -> Option<String> {
+    let wanted = word.to_lowercase();
+    if wanted.len() < 3 {
+        return None;
+    }
+    let mut found: Vec<(usize, String, String)> = Vec::new();
+    let mut add = |name: &str, path: String, meaning: String| {
+        let rank = match name.to_lowercase() {
+            name if name == wanted => 0,
+            name if name.contains(&wanted) => 1,
+            _ if meaning.to_lowercase().contains(&wanted) => 2,
+            _ => return,
+        };
+        found.push((rank, path, meaning));
+    };
+    // Materials of regions have the keys of `material`.
+    for table in all.iter().filter(|table| !table.path.starts_with("region.material")) {
+        add(table.path.rsplit('.').next().unwrap_or_default(), table.path.clone(), table.meaning.clone());
+        for key in &table.keys {
+            let choices: String =
+                key.choices().iter().map(|(word, text)| format!(" \"{word}\": {text}")).collect();
+            add(key.name, format!("{}.{}", table.path, key.name), key.meaning() + &choices);
+        }
+    }
+    found.sort_by_key(|(rank, ..)| *rank);
+    let list: String = found.iter().map(|(_, path, meaning)| entry(path, meaning)).collect();
+    (!found.is_empty()).then(|| format!("`{word}` occurs in\n\n{list}"))
+}
+
 fn unknown_table(kind: Kind, wanted: &str, all: &[DescribedTable]) -> Error {
     let help = match nearest(wanted, all.iter().map(|table| table.path.as_str())) {
         Some(near) => format!("did you mean `{near}`?"),
-        None => match tables_with(kind, wanted) {
-            Some(elsewhere) => {
-                let table = elsewhere.split(']').next().unwrap_or_default().trim_start_matches('[');
-                format!("it is a key of {elsewhere}: try solver describe {}{table}.{wanted}", kind.prefix)
-            }
-            None => {
-                let names: Vec<&str> = all.iter().map(|table| table.path.as_str()).collect();
-                format!("tables: {}", names.join(", "))
-            }
-        },
+        None => {
+            let names: Vec<&str> = all.iter().map(|table| table.path.as_str()).collect();
+            format!("tables: {}", names.join(", "))
+        }
     };
     Error::Refused(format!("no table of a {} is called `{wanted}`; {help}", kind.name))
 }
