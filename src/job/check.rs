@@ -45,6 +45,7 @@ pub(super) fn check(job: &Job, table: &mut Table<'_>) {
     job.solver.check(&mut table.table("solver"));
     job.output.check(&mut table.table("output"), job.time.end);
     check_expected(job, table);
+    job.mesh.check_placement(&mut table.table("mesh"));
     if let Some(dimension) = job.dimension() {
         job.mesh.check(&mut table.table("mesh"));
         let names = job.mesh.names();
