@@ -21,7 +21,7 @@ export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 for target in "${targets[@]}"; do
     more=()
     [[ $target == job ]] && more=(../tests/refusals ../jobs)
-    [[ $target == mesh ]] && more=(../tests/meshes ../tests/meshes/bad)
+    [[ $target == mesh ]] && more=(../tests/meshes)
     mkdir -p "target/corpus/$target"
     found=0
     # Memory stays bounded: no input may make a reader take more.

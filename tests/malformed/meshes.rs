@@ -17,6 +17,12 @@ use Job::{Dynamic, Quasistatic, Space};
 
 /// The files of tests/meshes/bad, without the ending .msh, and the required parts of their messages.
 const MESHES: &[(&str, Job, &[&str])] = &[
+    (
+        "abaqus_include.inp",
+        Dynamic,
+        &["abaqus_include.inp: line 7: *INCLUDE", "put the contents of the file"],
+    ),
+    ("abaqus_without_cells.inp", Dynamic, &["abaqus_without_cells.inp: the file has no cells"]),
     ("another_format", Dynamic, &["another_format.msh: not a mesh file of a known format", "solid cube"]),
     (
         "binary_countless_blocks",

@@ -1,6 +1,7 @@
 //! Assembles a mesh from the contents of a file.
 
 use super::document::{Block, Document};
+use super::node_sets::name_node_sets;
 use super::points::name_points;
 use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::{Vector, add_scaled, norm};
@@ -20,8 +21,8 @@ const STRAIGHT: f64 = 1e-9;
 /// Largest number of physical groups of an entity; each copies the facets of the entity in memory.
 const MOST_GROUPS: usize = 64;
 
-/// The mesh of the document's simplices of dimension `D`, validated.
-pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh<D>> {
+/// The mesh of the document's simplices of dimension `D`, validated; adds notes to those of the document.
+pub(super) fn assemble<const D: usize>(document: &mut Document) -> Result<GlobalMesh<D>> {
     let positions = Positions::new(&document.node_tags)?;
     let mut mesh = GlobalMesh::<D>::default();
     let mut tags = Tags::default();
@@ -74,6 +75,9 @@ pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh
         |tag, element| Ok(Some(id(tag, element)?).filter(|&id| id != UNUSED)),
         |tag, element, ends| Ok(side(ends, &document.points[positions.find(tag, element)? as usize]).0),
     )?;
+    let corner = |tag| Ok(Some(id(tag, 0)?).filter(|&id| id != UNUSED));
+    let notes = name_node_sets(&mut mesh, document, corner)?;
+    document.notes.extend(notes);
     check::nodes(&mesh, &tags)?;
     Ok(mesh)
 }

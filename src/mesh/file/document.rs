@@ -13,6 +13,8 @@ pub(super) struct Document {
     pub(super) node_tags: Vec<u64>,
     pub(super) points: Vec<[f64; 3]>,
     pub(super) blocks: Vec<Block>,
+    /// Names of sets of nodes, with the tags of the nodes.
+    pub(super) node_sets: Vec<(String, Vec<u64>)>,
     /// What the user should know about the way in which the file was read; without its name.
     pub(super) notes: Vec<String>,
 }

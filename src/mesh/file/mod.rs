@@ -1,9 +1,11 @@
 //! Meshes in files: triangles in the plane or tetrahedra in space, of order 1 or 2, and cells that are divided into these.
 
+mod abaqus;
 mod assemble;
 mod document;
 mod gmsh;
 mod inspect;
+mod node_sets;
 mod placement;
 mod points;
 mod subdivide;
@@ -64,8 +66,8 @@ pub fn parse(bytes: &[u8], placement: &Placement) -> Result<MeshFile> {
     let dimension = document.dimension()?;
     placement.apply(dimension, &mut document.points)?;
     let mesh = match dimension {
-        2 => assemble::assemble(&document).map(AnyMesh::Two)?,
-        _ => assemble::assemble(&document).map(AnyMesh::Three)?,
+        2 => assemble::assemble(&mut document).map(AnyMesh::Two)?,
+        _ => assemble::assemble(&mut document).map(AnyMesh::Three)?,
     };
     Ok(MeshFile { mesh, notes: document.notes })
 }
@@ -75,6 +77,7 @@ fn content(bytes: &[u8]) -> Result<Document> {
     match bytes.trim_ascii_start() {
         [] => Err(Error::Refused("the file is empty".into())),
         [b'$', ..] => gmsh::parse(bytes),
+        [b'*', ..] => abaqus::parse(bytes),
         other => {
             let start = String::from_utf8_lossy(&other[..other.len().min(160)]);
             let start: String = start.lines().next().unwrap_or_default().chars().take(40).collect();
@@ -87,7 +90,8 @@ fn content(bytes: &[u8]) -> Result<Document> {
 }
 
 /// The formats that are read.
-const FORMATS: &str = "Gmsh files of the versions 2, 4.0 and 4.1 (.msh), and the .h5 files of `solver partition`";
+const FORMATS: &str = "Gmsh files of the versions 2, 4.0 and 4.1 (.msh), input files of Abaqus and CalculiX (.inp), and the .h5 files of \
+                       `solver partition`";
 
 #[cfg(test)]
 mod tests;

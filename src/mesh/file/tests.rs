@@ -1,5 +1,6 @@
 use super::*;
 
+mod abaqus;
 mod files;
 mod older;
 mod refusals;
