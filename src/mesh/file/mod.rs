@@ -9,6 +9,7 @@ mod node_sets;
 mod placement;
 mod points;
 mod subdivide;
+mod vtu;
 
 use super::GlobalMesh;
 use crate::error::{Error, Result, regular_file};
@@ -78,6 +79,7 @@ fn content(bytes: &[u8]) -> Result<Document> {
         [] => Err(Error::Refused("the file is empty".into())),
         [b'$', ..] => gmsh::parse(bytes),
         [b'*', ..] => abaqus::parse(bytes),
+        [b'<', ..] => vtu::parse(bytes),
         other => {
             let start = String::from_utf8_lossy(&other[..other.len().min(160)]);
             let start: String = start.lines().next().unwrap_or_default().chars().take(40).collect();
@@ -90,7 +92,7 @@ fn content(bytes: &[u8]) -> Result<Document> {
 }
 
 /// The formats that are read.
-const FORMATS: &str = "Gmsh files of the versions 2, 4.0 and 4.1 (.msh), input files of Abaqus and CalculiX (.inp), and the .h5 files of \
+const FORMATS: &str = "Gmsh files of the versions 2, 4.0 and 4.1 (.msh), input files of Abaqus and CalculiX (.inp), VTK files of unstructured grids (.vtu), and the .h5 files of \
                        `solver partition`";
 
 #[cfg(test)]

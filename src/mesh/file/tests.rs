@@ -7,6 +7,7 @@ mod refusals;
 mod samples;
 mod second_order;
 mod subdivision;
+mod vtu;
 
 /// The mesh of a file, as it is in the file.
 fn parse(bytes: &[u8]) -> Result<AnyMesh> {
