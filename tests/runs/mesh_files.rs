@@ -77,3 +77,28 @@ fn a_mesh_in_millimetres_is_scaled_when_it_is_partitioned() {
         .expect(2)
         .says("a number above 0 is expected");
 }
+
+#[test]
+fn a_boundary_without_a_name_is_named_by_its_number() {
+    let mesh = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/meshes/bad/names_missing.msh");
+    let case = |left: &str, bottom: &str| {
+        Case::square(4)
+            .without("mesh.rectangle")
+            .set("mesh.file", &format!("'{}'", mesh.display()))
+            .set("support.0.on", &format!("['{left}']"))
+            .set("traction.0.on", "['4']")
+            .set("contact.0.on", &format!("['{bottom}']"))
+            .set("output.profile", &format!("[{{ on = '{bottom}' }}]"))
+    };
+    let bare = case("1", "3").run_and_keep(2);
+    let numbered = case("group 1", "group 3").run_and_keep(2);
+    let [one, other] = [bare.results(), numbered.results()];
+    assert_eq!(one.summary()["inventory"], other.summary()["inventory"]);
+    assert!(one.number("final_von_mises") > 0.0);
+    assert_eq!(one.number("final_von_mises"), other.number("final_von_mises"));
+    assert_eq!(
+        one.table("profiles.csv").numbers("contact_pressure"),
+        other.table("profiles.csv").numbers("contact_pressure")
+    );
+    case("group 9", "3").run_with(1, &[]).expect(2).says("no boundary \"group 9\"");
+}
