@@ -69,6 +69,14 @@ fn a_mesh_in_millimetres_is_scaled_when_it_is_partitioned() {
     let whole = bar(&bar_file()).run_and_keep(1);
     let in_parts = bar(&parts).without("mesh.scale").run_and_keep(2);
     assert_same_answer(&whole.results(), &in_parts.results(), 1e-8, "in parts");
+    // A checkpoint goes from the scaled mesh to its parts, but not to a mesh of another size.
+    let case = bar(&bar_file()).set("checkpoint.every", "10");
+    case.run_with(1, &["--set", "time.end=0.2"]).expect(0);
+    case.run_with(1, &["--set", "mesh.scale=2e-3"]).expect(2).says("different keys: mesh.scale");
+    case.run_with(1, &["--restart", "--set", "mesh.scale=2e-3"]).expect(2).says("the mesh has changed since");
+    let in_parts = case.set("mesh.file", &format!("'{target}'")).without("mesh.scale");
+    in_parts.run_with(2, &["--restart"]).expect(0);
+    assert_same_answer(&whole.results(), &in_parts.results(), 1e-8, "restarted in parts");
     bar(&parts).run_with(2, &[]).expect(2).says("do not move a partitioned mesh").says("--scale 1e-3");
     run_alone(&["partition", &target, "-n", "2", "-o", "x.h5", "--scale", "2"])
         .expect(2)
