@@ -8,7 +8,7 @@ use crate::{
     },
     job::{self, Job, Loaded},
     laws::{lines::wrapped, nearest::nearest},
-    mesh::gmsh,
+    mesh::file::{self, Placement},
     parallel::{
         agreement::Agreed,
         session::{Mpi, Session},
@@ -21,7 +21,7 @@ use clap_complete::Shell;
 use mpi::traits::CommunicatorCollectives;
 use std::{
     borrow::Cow,
-    ffi::OsString,
+    ffi::{OsStr, OsString},
     io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
@@ -98,7 +98,7 @@ enum Command {
     },
     /// Split a mesh into parts, of which each rank reads its own (`[mesh] file = "FILE.h5"`).
     Partition {
-        /// The mesh: a Gmsh file (.msh) or a partitioned mesh (.h5).
+        /// The mesh: a mesh file such as .msh, or a partitioned mesh (.h5).
         mesh: PathBuf,
         /// Number of parts, which is the largest number of ranks that can use the mesh.
         #[arg(short = 'n', value_name = "RANKS")]
@@ -106,6 +106,9 @@ enum Command {
         /// The file to write.
         #[arg(short = 'o', value_name = "FILE.h5")]
         output: PathBuf,
+        /// Factor of the coordinates: 1e-3 for a mesh in millimetres.
+        #[arg(long, value_name = "FACTOR", value_parser = factor, default_value = "1", hide_default_value = true)]
+        scale: f64,
         /// Overwrite the file if it exists.
         #[arg(long)]
         force: bool,
@@ -222,14 +225,14 @@ fn dispatch(cli: Cli) -> Result<Exit> {
             describe(table.as_deref(), form.into_iter().find(|(chosen, _)| *chosen).map(|(_, form)| form))
         }
         Some(Command::Inspect { file }) if partitioned::is_one(&file) => say(&partitioned::inspect(&file)?),
-        Some(Command::Inspect { file }) if is_mesh(&file) => say(&gmsh::inspect(&file)?),
+        Some(Command::Inspect { file }) if is_mesh(&file) => say(&file::inspect(&file)?),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
-        Some(Command::Partition { mesh, parts, output, force }) => {
+        Some(Command::Partition { mesh, parts, output, scale, force }) => {
             if !force && output.symlink_metadata().is_ok() {
                 let remedy = "name another file with -o, or overwrite it with --force";
                 return Err(Error::Refused(format!("{} exists; {remedy}", output.display())));
             }
-            partition(&mesh, parts, &output)
+            partition((&mesh, scale), parts, &output)
         }
         Some(Command::Study { study, overrides, ablate, part }) => {
             run_study(&study, &overrides, ablate, part)
@@ -307,7 +310,8 @@ fn command_first(command: &str) -> String {
 }
 
 fn is_mesh(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "msh")
+    let extension = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+    extension.is_some_and(|extension| ["msh", "inp", "vtu"].contains(&&*extension))
 }
 
 fn is_job(path: &Path) -> bool {
@@ -440,12 +444,20 @@ fn on_one_process(work: impl FnOnce() -> Result<Exit>) -> Result<Exit> {
 }
 
 /// Splits a mesh, on one process.
-fn partition(mesh: &Path, parts: usize, output: &Path) -> Result<Exit> {
+/// A factor on the command line.
+fn factor(word: &str) -> Result<f64, String> {
+    let factor = word.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0);
+    factor.ok_or_else(|| "a number above 0 is expected".into())
+}
+
+fn partition((mesh, scale): (&Path, f64), parts: usize, output: &Path) -> Result<Exit> {
     in_session(|session, _| {
         let alone =
             || Error::Refused("solver partition works on one process: start it without mpirun".into());
         session.agree((session.ranks() == 1).then_some(()).ok_or_else(alone))?;
-        let header = partitioned::make(mesh, parts, output)?;
+        let placement = Placement { scale, ..Placement::default() };
+        let (header, notes) = partitioned::make((mesh, &placement), parts, output)?;
+        notes.iter().for_each(|note| print(&format!("note: {note}")));
         print(&format!(
             "{}: {} cells in {parts} parts, imbalance {:.3}, {} facets between them; run it with [mesh] file = {output:?} on 1 to \
              {parts} ranks",

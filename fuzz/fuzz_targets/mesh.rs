@@ -1,13 +1,13 @@
-//! Any bytes as a Gmsh file: refused in words, or a mesh whose numbers fit together.
+//! Any bytes as a mesh file: refused in words, or a mesh whose numbers fit together.
 #![no_main]
 
 use clarke::{error::Exit, mesh::{
         GlobalMesh,
-        gmsh::{AnyMesh, parse},
+        file::{AnyMesh, Placement, parse},
     }};
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| match parse(bytes) {
+fuzz_target!(|bytes: &[u8]| match parse(bytes, &Placement::default()).map(|file| file.mesh) {
     Ok(AnyMesh::Two(mesh)) => check(&mesh),
     Ok(AnyMesh::Three(mesh)) => check(&mesh),
     Err(error) => {

@@ -3,7 +3,7 @@
 use super::document::{
     Contact, Job, Method, check_contact, check_contact_names, check_material, check_material_in_body,
 };
-use super::findings::{MeshNames, Table};
+use super::findings::{MeshNames, Table, number_of_group};
 use crate::laws::law::header;
 use crate::laws::material::Material;
 
@@ -45,6 +45,7 @@ pub(super) fn check(job: &Job, table: &mut Table<'_>) {
     job.solver.check(&mut table.table("solver"));
     job.output.check(&mut table.table("output"), job.time.end);
     check_expected(job, table);
+    job.mesh.check_placement(&mut table.table("mesh"));
     if let Some(dimension) = job.dimension() {
         job.mesh.check(&mut table.table("mesh"));
         let names = job.mesh.names();
@@ -242,9 +243,10 @@ fn warn_of_inner_facets(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>) {
     let profiles = job.output.profile.iter().map(|profile| &profile.on);
     let named: Vec<&String> = lists.flatten().chain(profiles).collect();
     for [name, place] in mesh.inner {
-        if mesh.points.contains(name) || !named.iter().any(|other| other == name) {
+        let is_named = |other: &&String| *other == name || number_of_group(other) == Some(name);
+        if mesh.points.contains(name) || !named.iter().any(is_named) {
             table.warn(format!(
-                "the physical group \"{name}\" has facets inside the body, for example around {place}: it is not a boundary, and is ignored"
+                "the group \"{name}\" has facets inside the body, for example around {place}: it is not a boundary, and is ignored"
             ));
         }
     }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::{Blocks, Job, MeshSource};
 use crate::error::{Error, Result};
 
-/// Keys that, like all keys below them, do not affect the results, without positions in lists. The files of a mesh and of a start state are among them, because
-/// several files may have the same contents: the code that reads them compares these.
+/// Keys that, like all keys below them, do not affect the results, without positions in lists. The file of a mesh, its place and the
+/// file of a start state are among them, because several files may have the same contents: the code that reads them compares these.
 const NO_PHYSICS: &[&str] = &[
     "about",
     "check",
@@ -16,6 +16,9 @@ const NO_PHYSICS: &[&str] = &[
     "mesh.box.partition",
     "mesh.file",
     "mesh.rectangle.partition",
+    "mesh.rotate",
+    "mesh.scale",
+    "mesh.translate",
     "output",
     "parameters",
     "solver.accept",

@@ -21,6 +21,11 @@ pub struct MeshNames<'a> {
     pub inner: &'a [[&'a str; 2]],
 }
 
+/// The name of a physical group without a name of its own, which is its number: `3` for "group 3".
+pub fn number_of_group(name: &str) -> Option<&str> {
+    name.strip_prefix("group ").filter(|number| number.parse::<u32>().is_ok())
+}
+
 /// Faults and warnings found so far.
 #[derive(Debug, Default)]
 pub(crate) struct Findings {
@@ -147,7 +152,8 @@ impl<'a> Table<'a> {
 
     /// A name must be one of those in the mesh.
     pub(super) fn check_name(&mut self, key: &str, name: &str, known: &[&str], what: &str) {
-        if known.contains(&name) || name.is_empty() {
+        let number = number_of_group(name).filter(|_| what.starts_with("boundary"));
+        if known.contains(&name) || number.is_some_and(|number| known.contains(&number)) || name.is_empty() {
             return;
         }
         let mut help = match known {
@@ -162,7 +168,9 @@ impl<'a> Table<'a> {
 
     /// A name must be one of a boundary or of these points and curves; facets inside of the body are no boundary.
     pub(super) fn check_place(&mut self, key: &str, name: &str, mesh: MeshNames<'_>, points: &[&str]) {
-        if let Some([_, place]) = mesh.inner.iter().find(|[inner, _]| *inner == name) {
+        if let Some([_, place]) =
+            mesh.inner.iter().find(|[inner, _]| *inner == name || Some(*inner) == number_of_group(name))
+        {
             let message = format!(
                 "\"{name}\" has facets inside the body, for example around {place}: no table can act there"
             );

@@ -244,6 +244,7 @@ pub(crate) fn by_extension(path: &Path) -> Option<&'static str> {
         "stl" => Some(
             "a triangulated surface: name it in a job, [contact.obstacle.shape] surface = { file = \"FILE.stl\" }",
         ),
+        "msh" | "inp" | "vtu" => Some("a mesh, not a job: name it in a job, [mesh] file = \"FILE\""),
         "csv" => Some("a table of numbers"),
         "toml" => Some("a text, a job or a study: solver check FILE or solver study FILE reads it"),
         _ => None,

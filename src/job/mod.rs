@@ -26,7 +26,7 @@ pub use describe::{describe, describe_json, describe_markdown};
 pub(crate) use describe::{describe_kind, markdown_of};
 pub use document::*;
 pub use effective::differing_keys;
-pub use findings::MeshNames;
+pub use findings::{MeshNames, number_of_group};
 pub use load::Loaded;
 pub(crate) use load::{Document, Origin, by_extension, normal, read};
 pub(crate) use schema::{Kind, Schema, schema_of};

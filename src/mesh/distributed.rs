@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    job::number_of_group,
     linear_algebra::tensor::Vector,
     parallel::{
         agreement::Agreed,
@@ -135,9 +136,10 @@ impl<const D: usize> Mesh<D> {
         self.node_starts.partition_point(|&start| start <= global as usize) - 1
     }
 
-    /// The facets of a named boundary on this rank.
+    /// The facets of a named boundary on this rank. "group 3" also names the boundary 3, a physical group without a name.
     pub fn boundary(&self, name: &str) -> Option<&Boundary> {
-        self.boundaries.iter().find(|b| b.name == name)
+        let named = |name: &str| self.boundaries.iter().find(|boundary| boundary.name == name);
+        named(name).or_else(|| named(number_of_group(name)?))
     }
 
     /// The owned nodes of the points and curves with these names, ascending.

@@ -6,6 +6,7 @@ use super::{
     tags::place,
 };
 use crate::error::{Error, Result};
+use crate::job::number_of_group;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// The name of the boundary on the other side of a fault.
@@ -42,7 +43,8 @@ impl<const D: usize> GlobalMesh<D> {
     /// inside the body, where cells stay joined. The sides become two boundaries: one with this name, and [`other_side`]. Refused where
     /// the surface branches, meets another fault, has one side only, or has no node that can become two.
     pub fn split_along(&mut self, name: &str) -> Result<()> {
-        let Some(at) = self.inner_groups.iter().position(|group| group.name == name) else { return Ok(()) };
+        let named = |name: &str| self.inner_groups.iter().position(|group| group.name == name);
+        let Some(at) = named(name).or_else(|| named(number_of_group(name)?)) else { return Ok(()) };
         let facets = self.inner_facets[at].clone();
         if facets.is_empty() {
             let place = &self.inner_groups[at].place;

@@ -203,8 +203,11 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     }
     let mut differing = differing_keys(&there.physics()?, &job.physics()?);
     let file_name = |job: &Job| job.mesh_file().and_then(Path::file_name).map(std::ffi::OsStr::to_owned);
-    if file_name(&there) != file_name(job) && !is_restart {
-        differing.insert(0, "mesh.file".into());
+    if !is_restart {
+        if file_name(&there) != file_name(job) {
+            differing.insert(0, "mesh.file".into());
+        }
+        differing.extend(moved_keys(&there, job));
     }
     let start_name = |job: &Job| {
         let from = job.initial.as_ref().and_then(|initial| initial.from.as_deref());
@@ -226,6 +229,17 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
         "the folder contains the results of another job; different keys: {}{more}",
         differing.join(", ")
     ))
+}
+
+/// Keys that place the mesh of a file and differ between two jobs.
+fn moved_keys(one: &Job, other: &Job) -> impl Iterator<Item = String> {
+    let (one, other) = (&one.mesh, &other.mesh);
+    let keys = [
+        ("mesh.scale", one.scale != other.scale),
+        ("mesh.rotate", one.rotate != other.rotate),
+        ("mesh.translate", one.translate != other.translate),
+    ];
+    keys.into_iter().filter(|(_, differs)| *differs).map(|(key, _)| key.to_owned())
 }
 
 /// Refuses a folder without a run but with files that a run would overwrite.

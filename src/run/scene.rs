@@ -9,8 +9,8 @@ use crate::{
     linear_algebra::tensor::norm,
     mesh::{
         GlobalMesh, Mesh, distribute,
+        file::{self, AnyMesh, MeshFile, Placement, Rotation},
         generate::{Blocks, Cuboid, Grading, Grid, Rectangle, Toward},
-        gmsh::{self, AnyMesh},
         other_side,
         partition::{Method, divide_with_pairs},
         shape::facet_normal,
@@ -46,7 +46,8 @@ impl Scene {
             MeshSource::Box(of) => generated(session, blocks(of, cuboid), &loaded.job).map(Self::Three)?,
             MeshSource::File(path) => {
                 session.on_first(|| refuse_missing(path, loaded))?;
-                let (scene, is_second_order) = from_file(session, path, &loaded.job)?;
+                let (scene, is_second_order, notes) = from_file(session, path, loaded)?;
+                loaded.warnings.extend(notes);
                 if is_second_order && order == 1 {
                     loaded.warnings.push(
                         "the cells of the mesh file are of second order, but the run uses only their corners, joined by straight \
@@ -153,30 +154,33 @@ fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
     })
 }
 
-/// The mesh of a file, split along boundaries of contacts that are inside the body, and whether the file has cells of second order.
-fn from_file(session: &Session, path: &Path, job: &Job) -> Result<(Scene, bool), Agreed> {
+/// The mesh of a file, split along boundaries of contacts that are inside the body, whether the file has cells of second order, and what
+/// the user should know about it.
+fn from_file(session: &Session, path: &Path, loaded: &Loaded) -> Result<(Scene, bool, Vec<String>), Agreed> {
+    let job = &loaded.job;
     let order = usize::from(job.mesh.order);
     let mut in_parts = session.is_first() && partitioned::is_meant(path);
     session.world().process_at_rank(0).broadcast_into(&mut in_parts);
     if in_parts {
+        session.agree(refuse_to_move_parts(loaded))?;
         let file = PartitionedFile::open(path, session.world())?;
         let scene = match file.header.dimension {
             2 => file.mesh(session, order).map(Scene::Two)?,
             _ => file.mesh(session, order).map(Scene::Three)?,
         };
-        return Ok((scene, file.header.curved));
+        return Ok((scene, file.header.curved, Vec::new()));
     }
-    let read = || -> Result<AnyMesh> {
-        let mut mesh = gmsh::read(path)?;
+    let read = || -> Result<MeshFile> {
+        let mut file = file::read(path, &placement(&job.mesh))?;
         let named = |error| Error::Refused(format!("{}: {error}", path.display()));
         let faults = job.contact.iter().filter(|contact| contact.against.is_empty());
         faults
             .flat_map(|contact| &contact.on)
-            .try_for_each(|fault| mesh.split_along(fault))
+            .try_for_each(|fault| file.mesh.split_along(fault))
             .map_err(named)?;
-        Ok(mesh)
+        Ok(file)
     };
-    let whole = session.on_first(read)?;
+    let (whole, notes) = session.on_first(read)?.map(|file| (file.mesh, file.notes)).unzip();
     let mut facts = match &whole {
         Some(AnyMesh::Two(mesh)) => [2, u8::from(mesh.is_second_order)],
         Some(AnyMesh::Three(mesh)) => [3, u8::from(mesh.is_second_order)],
@@ -190,7 +194,24 @@ fn from_file(session: &Session, path: &Path, job: &Job) -> Result<(Scene, bool),
         (2, None) => Scene::Two(split(session, None, job)?),
         (_, None) => Scene::Three(split(session, None, job)?),
     };
-    Ok((scene, is_second_order == 1))
+    Ok((scene, is_second_order == 1, notes.unwrap_or_default()))
+}
+
+fn placement(of: &job::Mesh) -> Placement {
+    let rotation = of.rotate.as_ref().map(|rotate| Rotation { angle: rotate.angle, axis: rotate.axis });
+    Placement { scale: of.scale, rotation, translation: of.translate.clone() }
+}
+
+/// Each rank reads its own part of a partitioned mesh, as it is.
+fn refuse_to_move_parts(loaded: &Loaded) -> Result<()> {
+    if !loaded.job.mesh.is_moved() {
+        return Ok(());
+    }
+    Err(loaded.fault(
+        "mesh",
+        "`scale`, `rotate` and `translate` do not move a partitioned mesh (.h5)",
+        "move the mesh when it is partitioned: solver partition MESH --scale 1e-3 -n RANKS -o FILE.h5; or name the original file",
+    ))
 }
 
 fn rectangle(of: &job::Rectangle) -> (Option<&String>, Result<Rectangle>) {

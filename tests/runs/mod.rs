@@ -17,6 +17,7 @@ mod indicator;
 mod iterations;
 mod landings;
 mod materials;
+mod mesh_files;
 mod obstacles;
 mod outputs;
 mod pairs;

@@ -132,7 +132,7 @@ fn a_group_inside_the_body_is_noted_and_no_table_may_name_it() {
                 .without("contact")
         };
         let outcome = case().run_with(ranks, &["--force"]).expect(0);
-        outcome.says("physical group \"fault\" has facets inside the body, for example around (1, 0.5)");
+        outcome.says("the group \"fault\" has facets inside the body, for example around (1, 0.5)");
         let named = case().set("traction", "[{on = ['bottom', 'fault'], value = [0, -1]}]");
         let outcome = named.run_with(ranks, &["--force"]).expect(2);
         outcome.says("\"fault\" has facets inside the body").says("name a boundary");

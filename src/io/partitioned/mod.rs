@@ -41,7 +41,7 @@ const MESH: Kind = Kind {
     magic: b"ClarkePartedMesh",
     version: 1,
     noun: "partitioned mesh",
-    remedy: "Make it again from the mesh of Gmsh: solver partition MESH.msh -n RANKS -o FILE.h5",
+    remedy: "Make it again from the original mesh: solver partition MESH.msh -n RANKS -o FILE.h5",
 };
 
 /// Tables of a part, in the order of `counts`.
@@ -90,7 +90,7 @@ impl Header {
     }
 }
 
-/// Whether a file is a partitioned mesh, or was meant to be one according to its name or first bytes, rather than a Gmsh file.
+/// Whether a file is a partitioned mesh, or was meant to be one according to its name or first bytes, rather than a mesh file of another format.
 pub fn is_meant(path: &Path) -> bool {
     let known = |extension: &std::ffi::OsStr| extension == "h5" || extension == "hdf5";
     let named = path.extension().is_some_and(known);

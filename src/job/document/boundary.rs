@@ -14,7 +14,7 @@ use crate::laws::material::Hypothesis;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
-    /// The names of the boundaries; with `fix` also of points and, in 3D, curves: Gmsh's physical points and curves that have a name.
+    /// The names of the boundaries; with `fix` also of points and, in 3D, curves that have a name in the mesh file.
     #[schemars(length(min = 1), example = ["left"])]
     pub on: Vec<String>,
     /// The part of these boundaries to which the support applies: with `fix` the nodes at which this expression in x, y, z is not

@@ -13,7 +13,7 @@ use crate::laws::material::{Hypothesis, Material};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
-    /// The name of the physical group of the mesh file that contains the cells of the region, or of a generated block.
+    /// The name of the group or set of the mesh file that contains the cells of the region, or of a generated block.
     #[schemars(length(min = 1), example = &"core")]
     pub name: String,
     /// The material of the region. The hypothesis applies to the whole body and is allowed in the table `[material]` only.

@@ -17,9 +17,43 @@ pub struct Mesh {
     #[serde(default = "linear", skip_serializing_if = "is_linear")]
     #[schemars(range(min = 1, max = 2))]
     pub order: u8,
+    /// Factor of the coordinates in a mesh file, such as 1e-3 for a mesh in millimetres. A file is first scaled, then rotated about
+    /// the origin, then translated: x = R (scale X) + translate. All else in the job refers to the moved mesh. Absent: 1.
+    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scale: f64,
+    /// Rotation of the mesh of a file about the origin, after `scale` and before `translate`. Absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(example = Rotation { angle: 90.0, axis: Some([1.0, 0.0, 0.0]) })]
+    pub rotate: Option<Rotation>,
+    /// Translation of the mesh of a file, after `scale` and `rotate`: one number an axis. Absent: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("unit" = "m"), example = [0.0, 0.0, 0.1])]
+    pub translate: Vec<f64>,
     /// Where the cells come from.
     #[serde(flatten)]
     pub source: MeshSource,
+}
+
+/// A rotation of a mesh about an axis through the origin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rotation {
+    /// Angle of the rotation, by the right-hand rule: in 2D, a positive angle turns the x axis toward the y axis.
+    #[schemars(extend("unit" = "degrees"), example = 90.0)]
+    pub angle: f64,
+    /// Direction of the axis, of any length; in 3D only. Absent: the z axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(example = [0.0, 0.0, 1.0])]
+    pub axis: Option<[f64; 3]>,
+}
+
+fn unscaled() -> f64 {
+    1.0
+}
+
+fn is_unscaled(scale: &f64) -> bool {
+    *scale == unscaled()
 }
 
 fn linear() -> u8 {
@@ -44,8 +78,10 @@ pub enum MeshSource {
     /// A box, divided into tetrahedra. Its boundaries are left and right (x), front and back (y), bottom and top (z). A list
     /// `[[mesh.box]]` gives several bodies.
     Box(Blocks<Cuboid>),
-    /// A mesh file, relative to the job file: a Gmsh 4.1 file (ASCII or binary), or the .h5 file that `solver partition` made from
-    /// one. The physical groups of the mesh name its boundaries and regions.
+    /// A mesh file, relative to the job file: of Gmsh (.msh of version 2 or 4), of Abaqus or CalculiX (.inp), of VTK (.vtu), or the .h5
+    /// file that `solver partition` made from one. Physical groups, sets and surfaces, or numbers of cells, name its boundaries and
+    /// regions; the boundary that has only the number 3 is "3" or "group 3". Quadrilaterals are split into triangles; hexahedra, wedges
+    /// and pyramids into tetrahedra.
     File(#[schemars(extend("format" = "path"), example = "../../meshes/block.msh")] PathBuf),
 }
 
@@ -363,6 +399,31 @@ impl Mesh {
     pub(in crate::job) fn is_crossed(&self) -> bool {
         let blocks = self.blocks();
         !blocks.is_empty() && blocks.iter().all(|block| block.is_crossed)
+    }
+
+    /// Whether a mesh of a file is moved.
+    pub fn is_moved(&self) -> bool {
+        !is_unscaled(&self.scale) || self.rotate.is_some() || !self.translate.is_empty()
+    }
+
+    /// Refuses to move the blocks of a generated mesh, and axes without a direction.
+    pub(in crate::job) fn check_placement(&self, table: &mut Table<'_>) {
+        if !matches!(self.source, MeshSource::File(_)) {
+            for key in ["scale", "rotate", "translate"] {
+                if table.has(key) {
+                    let message =
+                        format!("`{}` moves the mesh of a file, but this mesh is generated", table.path(key));
+                    table.fault_at_key(
+                        key,
+                        message,
+                        "delete it, and give the block its `corner` and its `size`",
+                    );
+                }
+            }
+        }
+        if self.rotate.as_ref().and_then(|rotate| rotate.axis) == Some([0.0; 3]) {
+            table.fault("rotate.axis", "the axis has no direction", "for example: axis = [0, 0, 1]");
+        }
     }
 
     /// Checks the blocks of a generated mesh.

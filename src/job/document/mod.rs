@@ -25,7 +25,7 @@ pub use material::Region;
 pub(super) use material::{check_in_body as check_material_in_body, check_material};
 pub use mesh::{
     Blocks, Cuboid, CuboidGrading, Diagonal, Mesh, MeshSource, Partition, Rectangle, RectangleGrading,
-    boundary_of_block, region_of_block,
+    Rotation, boundary_of_block, region_of_block,
 };
 pub use output::{Checkpoint, Every, FurtherField, Output, Probe, Profile};
 pub use parameters::Parameter;
@@ -58,7 +58,7 @@ pub struct Job {
     pub mesh: Mesh,
     /// The material of all cells that belong to no `[[region]]`.
     pub material: Material,
-    /// Regions of the body with their own material, named by the physical groups of the mesh file, or by the names of generated blocks.
+    /// Regions of the body with their own material, named by the groups or sets of the mesh file, or by the names of generated blocks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub region: Vec<Region>,
     /// Boundaries on which components of the displacement are held or moved, or which rest on springs and dashpots.

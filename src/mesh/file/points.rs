@@ -17,8 +17,8 @@ pub(super) fn name_points<const D: usize>(
     middle: impl Fn(u64, u64, [&Vector<D>; 2]) -> Result<Vector<D>>,
 ) -> Result<()> {
     let mut sets: BTreeMap<&str, Vec<[f64; 3]>> = BTreeMap::new();
-    for block in document.blocks.iter().filter(|block| block.corners < D) {
-        let dimension = block.corners - 1;
+    for block in document.blocks.iter().filter(|block| block.shape.dimension() < D - 1) {
+        let dimension = block.shape.dimension();
         let groups = document.groups.get(&(dimension, block.entity)).into_iter().flatten();
         let names: Vec<&String> =
             groups.filter_map(|&group| document.names.get(&(dimension, group))).collect();
@@ -27,7 +27,7 @@ pub(super) fn name_points<const D: usize>(
         }
         let mut places = Vec::new();
         for (element, tags) in block.elements() {
-            let corners = tags[..block.corners].iter().map(|&tag| node(tag, element));
+            let corners = tags[..=dimension].iter().map(|&tag| node(tag, element));
             let corners: Option<Vec<u32>> = corners.collect::<Result<_>>()?;
             let Some(corners) = corners else { continue };
             let corners: Vec<&Vector<D>> = corners.iter().map(|&node| &mesh.nodes[node as usize]).collect();

@@ -148,9 +148,41 @@ impl<'a> Cursor<'a> {
         }
     }
 
+    /// A C `int` that is not negative.
+    #[inline]
+    pub(super) fn natural(&mut self, what: &str) -> Result<u64> {
+        let value = self.int(what)?;
+        u64::try_from(value).map_err(|_| {
+            self.refuse(format_args!("`{value}` where {what}, a non-negative integer, is expected"))
+        })
+    }
+
+    /// Three coordinates.
+    #[inline]
+    pub(super) fn point(&mut self) -> Result<[f64; 3]> {
+        let mut point = [0.0; 3];
+        for x in &mut point {
+            *x = self.double("a coordinate")?;
+        }
+        Ok(point)
+    }
+
+    /// The dimension of an entity.
+    pub(super) fn dimension(&mut self) -> Result<usize> {
+        match self.int("a dimension")? {
+            dimension @ 0..=3 => Ok(dimension as usize),
+            other => Err(self.refuse(format_args!("dimension {other}: 0, 1, 2 or 3 is expected"))),
+        }
+    }
+
     /// A number of following items; refused if the rest of the file is too short for them.
     pub(super) fn count(&mut self, what: &str, each: Least) -> Result<usize> {
         let count = self.size(what)?;
+        self.refuse_count_above_rest(what, count, each)
+    }
+
+    /// The number of following items, unless the rest of the file is too short for them.
+    pub(super) fn refuse_count_above_rest(&self, what: &str, count: u64, each: Least) -> Result<usize> {
         let least = match self.encoding {
             Encoding::Ascii => 2 * (each.ints + each.sizes + each.doubles),
             Encoding::Binary { wide_sizes, .. } => {
@@ -160,7 +192,7 @@ impl<'a> Cursor<'a> {
         // The last word of an ASCII file may have no white space after it.
         let rest = self.bytes.len() - self.at + 1;
         match usize::try_from(count) {
-            Ok(count) if count <= rest / least => Ok(count),
+            Ok(count) if count <= rest / least.max(1) => Ok(count),
             _ => Err(self.refuse(format_args!(
                 "{what} is {count}, more than the {rest} bytes left in the file can contain: the file is truncated or damaged"
             ))),

@@ -1,6 +1,6 @@
 //! Description of a mesh file.
 
-use super::{AnyMesh, read};
+use super::{AnyMesh, Placement, read};
 use crate::{
     error::Result,
     linear_algebra::tensor::norm,
@@ -11,11 +11,13 @@ use std::path::Path;
 
 /// Describes a mesh: cells by region, nodes, extent and boundaries. An invalid mesh is refused with the reason.
 pub fn inspect(path: &Path) -> Result<String> {
-    let words = match read(path)? {
-        AnyMesh::Two(mesh) => words(&mesh),
-        AnyMesh::Three(mesh) => words(&mesh),
+    let file = read(path, &Placement::default())?;
+    let words = match &file.mesh {
+        AnyMesh::Two(mesh) => words(mesh),
+        AnyMesh::Three(mesh) => words(mesh),
     };
-    Ok(format!("{}: a valid mesh\n\n{words}", path.display()))
+    let notes: String = file.notes.iter().map(|note| format!("\n\nnote: {note}")).collect();
+    Ok(format!("{}: a valid mesh\n\n{words}{notes}", path.display()))
 }
 
 fn words<const D: usize>(mesh: &GlobalMesh<D>) -> String {

@@ -1,6 +1,7 @@
-//! Assembles a mesh from the sections of a file.
+//! Assembles a mesh from the contents of a file.
 
 use super::document::{Block, Document};
+use super::node_sets::name_node_sets;
 use super::points::name_points;
 use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::{Vector, add_scaled, norm};
@@ -20,14 +21,14 @@ const STRAIGHT: f64 = 1e-9;
 /// Largest number of physical groups of an entity; each copies the facets of the entity in memory.
 const MOST_GROUPS: usize = 64;
 
-/// The mesh of the document's cells of dimension `D`, validated.
-pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh<D>> {
+/// The mesh of the document's simplices of dimension `D`, validated; adds notes to those of the document.
+pub(super) fn assemble<const D: usize>(document: &mut Document) -> Result<GlobalMesh<D>> {
     let positions = Positions::new(&document.node_tags)?;
     let mut mesh = GlobalMesh::<D>::default();
     let mut tags = Tags::default();
     let mut ids = vec![UNUSED; document.points.len()];
     let mut midsides = Vec::new();
-    for block in blocks(document, D + 1) {
+    for block in blocks(document, D) {
         for (element, nodes) in block.elements() {
             for &tag in &nodes[..=D] {
                 let position = positions.find(tag, element)?;
@@ -74,11 +75,14 @@ pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh
         |tag, element| Ok(Some(id(tag, element)?).filter(|&id| id != UNUSED)),
         |tag, element, ends| Ok(side(ends, &document.points[positions.find(tag, element)? as usize]).0),
     )?;
+    let corner = |tag| Ok(Some(id(tag, 0)?).filter(|&id| id != UNUSED));
+    let notes = name_node_sets(&mut mesh, document, corner)?;
+    document.notes.extend(notes);
     check::nodes(&mesh, &tags)?;
     Ok(mesh)
 }
 
-/// Keeps the nodes on edges, given by their positions in the file, cell by cell in Gmsh's order, if edges are curved. `reversed` are the
+/// Keeps the nodes on edges, given by their positions in the file, cell by cell in the order of a block, if edges are curved. `reversed` are the
 /// cells whose last two corners were swapped. Refuses cells that are folded or that have different nodes on an edge.
 fn curve<const D: usize>(
     mesh: &mut GlobalMesh<D>,
@@ -89,7 +93,7 @@ fn curve<const D: usize>(
 ) -> Result<()> {
     let edges = edges_of_cell::<D>();
     for nodes in midsides.chunks_exact_mut(edges.len()).filter(|_| D == 3) {
-        // Gmsh: edges 01, 12, 20, 03, 23, 13.
+        // In a block: edges 01, 12, 20, 03, 23, 13.
         nodes.swap(4, 5);
     }
     for cell in reversed.iter().cloned().flatten() {
@@ -138,15 +142,8 @@ fn side<const D: usize>([a, b]: [&Vector<D>; 2], at: &[f64; 3]) -> (Vector<D>, b
     (if is_straight { straight } else { at }, is_straight)
 }
 
-fn blocks(document: &Document, corners: usize) -> impl Iterator<Item = &Block> {
-    document.blocks.iter().filter(move |block| block.corners == corners)
-}
-
-impl Block {
-    /// The tag and the node tags of each element.
-    pub(super) fn elements(&self) -> impl Iterator<Item = (u64, &[u64])> {
-        self.tags.iter().copied().zip(self.nodes.chunks_exact(self.nodes_per_element))
-    }
+fn blocks(document: &Document, dimension: usize) -> impl Iterator<Item = &Block> {
+    document.blocks.iter().filter(move |block| block.shape.dimension() == dimension)
 }
 
 /// The index of the node with a tag in the file.
@@ -166,7 +163,7 @@ impl Positions {
                 i32::MAX
             )));
         }
-        let twice = |tag| Err(Error::Refused(format!("section $Nodes: two nodes have the tag {tag}")));
+        let twice = |tag| Err(Error::Refused(format!("two nodes have the tag {tag}")));
         let smallest = tags.iter().copied().min().unwrap_or(0);
         let span = tags.iter().copied().max().unwrap_or(0) - smallest;
         if span < 4 * tags.len() as u64 + 1024 {
@@ -198,9 +195,7 @@ impl Positions {
             }
         };
         found.ok_or_else(|| {
-            Error::Refused(format!(
-                "section $Elements: element {element} has the node {tag}, which $Nodes does not contain"
-            ))
+            Error::Refused(format!("element {element} has the node {tag}, which the file does not contain"))
         })
     }
 }
@@ -246,7 +241,7 @@ fn group_names(document: &Document, dimension: usize, entity: i32) -> Vec<String
 
 fn name_regions<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -> Result<()> {
     let entity_kind = if D == 2 { "surface" } else { "volume" };
-    let blocks: Vec<&Block> = blocks(document, D + 1).filter(|block| !block.tags.is_empty()).collect();
+    let blocks: Vec<&Block> = blocks(document, D).filter(|block| !block.tags.is_empty()).collect();
     let mut used: Vec<(u32, i32)> = Vec::new();
     for block in &blocks {
         let groups = document.groups.get(&(D, block.entity)).into_iter().flatten();
@@ -300,7 +295,7 @@ fn name_regions<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -
 /// opposite direction. Gives the cells whose last two corners were swapped.
 fn reorient<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -> Vec<Range<usize>> {
     let (mut first, mut reversed) = (0, Vec::new());
-    for block in blocks(document, D + 1) {
+    for block in blocks(document, D) {
         let cells = first..first + block.tags.len();
         first = cells.end;
         if cells.clone().all(|cell| mesh.measure(cell) < 0.0) {
@@ -325,7 +320,7 @@ fn name_boundaries<const D: usize>(
     surface.sort_unstable();
     // Boundaries are in the order of the numbers of their groups.
     let mut groups_of_facets: BTreeMap<u32, Group<D>> = BTreeMap::new();
-    for block in blocks(document, D) {
+    for block in blocks(document, D - 1) {
         let groups = document.groups.get(&(D - 1, block.entity)).map_or(&[][..], Vec::as_slice);
         if groups.is_empty() {
             continue;

@@ -1,6 +1,0 @@
-use super::*;
-
-mod files;
-mod refusals;
-mod samples;
-mod second_order;
