@@ -4,8 +4,9 @@ use super::interval::{Interval, Real};
 use std::fmt;
 use std::sync::Arc;
 
-/// Largest stack that is evaluated without allocation.
-const SMALL: usize = 32;
+/// Sizes of stacks that are evaluated without allocation.
+const SMALL: usize = 6;
+const LARGE: usize = 32;
 
 /// The variables of an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,10 +97,11 @@ impl Program {
     /// The result on this machine.
     pub(super) fn run<M: Machine>(&self, machine: &mut M) -> M::Entry {
         let zero = machine.number(0.0);
-        if self.depth <= SMALL {
-            self.run_on(machine, &mut [zero; SMALL])
-        } else {
-            self.run_on(machine, &mut vec![zero; self.depth])
+        match self.depth {
+            // Most formulas need few entries, and clearing more of them takes as long as the formula.
+            ..=SMALL => self.run_on(machine, &mut [zero; SMALL]),
+            ..=LARGE => self.run_on(machine, &mut [zero; LARGE]),
+            depth => self.run_on(machine, &mut vec![zero; depth]),
         }
     }
 
