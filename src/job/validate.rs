@@ -394,6 +394,9 @@ impl Walk<'_> {
 
     /// Finds expressions in other variables than these, such as "x, y, z".
     fn variables(&mut self, node: &Node, variables: &str, path: &str) {
+        if of_formula(variables) != Variable::OF_TIME_AND_PLACE {
+            return;
+        }
         let is_allowed = |name: &str| variables.split(", ").any(|allowed| allowed == name);
         let other = match &node.value {
             Value::Array(items) => {

@@ -4,6 +4,7 @@ use crate::{
     job::{Every, Job, Scalar},
     solver::stepping::{Adaptive, Breakpoint, Landings, StepRange, TIME_TOLERANCE},
 };
+use std::borrow::Cow;
 
 /// Steps end at the kinks of a table if at most this number lies within steps, or one in every ten steps.
 const MOST_KINKS: usize = 100;
@@ -43,10 +44,10 @@ struct TimeDependent<'a> {
     name: &'static str,
     /// Its place in the job.
     key: String,
-    value: &'a Scalar,
+    value: Cow<'a, Scalar>,
 }
 
-/// The loads, motions of supports and obstacles, and gaps that depend on time.
+/// The loads, motions of supports and obstacles, gaps and friction coefficients that depend on time.
 fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
     let mut all: Vec<(&'static str, String, &[Scalar])> = Vec::new();
     for (at, support) in job.support.iter().enumerate() {
@@ -81,7 +82,21 @@ fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
     let mut found = Vec::new();
     for (name, key, values) in all {
         let values = values.iter().filter(|value| value.depends_on_time());
-        found.extend(values.map(|value| TimeDependent { name, key: key.clone(), value }));
+        found.extend(values.map(|value| TimeDependent {
+            name,
+            key: key.clone(),
+            value: Cow::Borrowed(value),
+        }));
+    }
+    for (at, contact) in job.contact.iter().enumerate() {
+        let coefficient =
+            contact.friction.as_ref().and_then(|friction| Some((friction.table(), friction.in_time()?)));
+        let value = coefficient.filter(|(_, value)| value.depends_on_time());
+        found.extend(value.map(|(table, value)| TimeDependent {
+            name: "a friction coefficient",
+            key: format!("contact.{at}.{table}"),
+            value: Cow::Owned(value),
+        }));
     }
     found
 }
@@ -108,7 +123,7 @@ pub(super) fn warnings(job: &Job) -> Vec<String> {
     }
     let length = job.time.step;
     let dense = |found: TimeDependent<'_>| {
-        let within = kinks(job, found.value).err()?;
+        let within = kinks(job, &found.value).err()?;
         Some(format!(
             "{}: {within} kinks of a table lie within steps of {length} s (more than {MOST_KINKS}, and more than one in \
              {STEPS_A_KINK} steps): the steps do not end at these kinks and use only the values of the table at their own ends; \
@@ -125,7 +140,7 @@ pub(super) fn warnings(job: &Job) -> Vec<String> {
 fn breakpoints(job: &Job) -> Vec<Breakpoint> {
     let mut found = Vec::new();
     for TimeDependent { name, value, .. } in time_dependent(job) {
-        let kinks = kinks(job, value).unwrap_or_default();
+        let kinks = kinks(job, &value).unwrap_or_default();
         found.extend(kinks.into_iter().map(|time| Breakpoint { time, is_jump: false, name }));
         let switches = value.breakpoints().switches;
         if switches.is_empty() {
@@ -134,7 +149,7 @@ fn breakpoints(job: &Job) -> Vec<Breakpoint> {
         let times = (0..=SAMPLES).map(|at| job.time.end * f64::from(at) / f64::from(SAMPLES));
         let values = times.map(|time| value.evaluate(time, &[]).abs()).filter(|size| size.is_finite());
         let largest = values.fold(0.0, f64::max);
-        found.extend(switches.into_iter().map(|time| switch(value, time, largest, name)));
+        found.extend(switches.into_iter().map(|time| switch(&value, time, largest, name)));
     }
     let near = TIME_TOLERANCE * shortest_step(job);
     found.retain(|breakpoint| breakpoint.time > near && job.time.end - breakpoint.time > near);

@@ -14,7 +14,7 @@ use clarke::{
             Gap, Graph, NormalLaw, NormalResponse, ObstacleLoad, Plane, PressureFormula, SlipWeakening,
             Sphere, Symmetry, Tresca, Unilateral,
         },
-        expression::{Formula, Variable},
+        expression::Formula,
         material::{ByMaterial, Isotropic},
     },
     linear_algebra::petsc::{Matrix, NonlinearProblem, ProjectedKsp},
@@ -50,13 +50,13 @@ fn laws() -> Vec<NormalResponse> {
 }
 
 fn written(pressure: &str) -> NormalLaw {
-    let pressure = Formula::parse(pressure, Variable::ALL).expect("a formula");
-    NormalLaw::PressureFormula(PressureFormula { pressure, gap: None })
+    let pressure = Formula::parse(pressure).expect("a formula");
+    NormalLaw::PressureFormula(PressureFormula::new(pressure, None))
 }
 
 fn friction_laws() -> [Option<FrictionLaw>; 5] {
     let formula = "0.3 + 0.2*exp(-v/0.4) + 0.1*exp(-p/20) + 0.2*exp(-l/0.01) + 0.05*sin(3*x)";
-    let formula = Formula::parse(formula, Variable::ALL).expect("a formula");
+    let formula = Formula::parse(formula).expect("a formula");
     [
         None,
         Some(FrictionLaw::Tresca(Tresca { bound: 60.0 })),

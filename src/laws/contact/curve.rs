@@ -11,14 +11,14 @@ mod storing;
 pub(super) use storing::StoringCurve;
 
 use super::normal_law::{NodeContext, Resolved, Response};
-use crate::laws::expression::{Enclosure, Formula, Interval, REACH, Unproven, Variable};
+use crate::laws::expression::{Enclosure, Formula, Interval, OfMotion, REACH, Unproven, Variable, short};
 use crate::laws::law::increasing_root;
 use facts::{Facts, Search};
 
 /// A pressure in Pa as a formula of a velocity in m/s or a penetration in m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    formula: Formula,
+    formula: Formula<OfMotion>,
     variable: Variable,
     corners: Vec<[f64; 2]>,
     /// For each branch the first and the last number at which the formula has its value; one number for a vertical branch.
@@ -30,10 +30,10 @@ pub struct Curve {
 
 impl Curve {
     /// The graph of `formula` over `variable`, in Pa; otherwise message and advice.
-    pub fn new(formula: Formula, variable: Variable) -> Result<Self, [String; 2]> {
+    pub fn new(formula: Formula<OfMotion>, variable: Variable) -> Result<Self, [String; 2]> {
         let name = variable.name();
         let borders = formula.borders(&[(variable, Interval::new(-REACH, REACH))], variable);
-        let borders = borders.map_err(|unproven| explain(unproven, name))?;
+        let borders = borders.map_err(|unproven| explain(&formula, unproven))?;
         let (mut corners, mut branches) = (Vec::new(), Vec::new());
         let mut first = -REACH;
         for [before, after] in borders {
@@ -48,11 +48,8 @@ impl Curve {
             let [from, to] = [before, after].map(|at| formula.value(&[(variable, at)]));
             if low.value.low > high.value.high + slack {
                 return Err([
-                    format!(
-                        "at {name} = {at} the pressure falls from {from} to {to}: a downward jump has no relaxed monotonicity constant"
-                    ),
-                    "no step is short enough to have a unique solution: replace the jump by a steep slope"
-                        .into(),
+                    format!("at {name} = {} the pressure falls from {} to {}: a downward jump has no relaxed monotonicity constant", short(at), short(from), short(to)),
+                    "no step is short enough to have a unique solution: replace the jump by a slope, and check the theta of a step".into(),
                 ]);
             }
             if high.value.low > low.value.high + slack {
@@ -63,14 +60,14 @@ impl Curve {
         }
         branches.push([first, REACH]);
         let search = Search { formula: &formula, variable };
-        let facts = search.facts(&branches, &corners).map_err(|unproven| explain(unproven, name))?;
-        if facts.fall == f64::INFINITY {
-            let near = facts.steepest;
+        let facts = search.facts(&branches, &corners).map_err(|unproven| explain(&formula, unproven))?;
+        if let Some(place) = facts.falls_without_bound {
             return Err([
                 format!(
-                    "the pressure falls without bound near {name} = {near}, so that no step is short enough to have a unique solution"
+                    "the pressure falls without bound near {}, so that no step is short enough to have a unique solution",
+                    formula.at(&place)
                 ),
-                format!("bound the decrease, for example by max({name}, -1) in place of {name}"),
+                format!("bound the decrease, for example by max(min({name}, 1), -1) in place of {name}"),
             ]);
         }
         if corners.is_empty() {
@@ -96,7 +93,7 @@ impl Curve {
 }
 
 /// What is known at one number.
-fn point(formula: &Formula, variable: Variable, at: f64) -> Enclosure {
+fn point(formula: &Formula<OfMotion>, variable: Variable, at: f64) -> Enclosure {
     formula.enclose(&[(variable, Interval::from(at))], variable)
 }
 
@@ -107,14 +104,16 @@ fn roundest(before: f64, after: f64) -> f64 {
     numbers.min_by_key(|number| format!("{number:e}").len()).unwrap_or(after)
 }
 
-fn explain(unproven: Unproven, name: &str) -> [String; 2] {
+fn explain(formula: &Formula<OfMotion>, unproven: Unproven) -> [String; 2] {
     match unproven {
-        Unproven::Undefined(at) => [
-            format!("the formula has no value near {name} = {at}"),
-            format!("it must have one for every {name}: use max({name}, 0) in place of {name}, or if({name} < 0, ..., ...)"),
+        Unproven::Undefined(place) => [
+            format!("the formula has no value near {}", formula.at(&place)),
+            "it must have one from -1e30 to 1e30: bound the arguments of roots, logarithms and powers, as in sqrt(max(v, 0)), and \
+             keep denominators away from 0, as in 1/(abs(v) + 1e-6)"
+                .into(),
         ],
-        Unproven::Pieces(at) => [
-            format!("the formula has too many pieces, or they cannot be told apart, near {name} = {at}"),
+        Unproven::Pieces(place) => [
+            format!("the formula has too many pieces, or they cannot be told apart, near {}", formula.at(&place)),
             "it may have at most 1000 kinks and jumps in all: floor, ceil and round have one at every whole number".into(),
         ],
     }
@@ -174,8 +173,9 @@ impl Response for Curve {
         beside.min(off / height)
     }
 
+    /// Infinite slopes, as that of a root, count as vertical.
     fn has_vertical_parts(&self) -> bool {
-        (0..self.branches.len()).any(|branch| self.is_vertical(branch))
+        self.facts.is_steep || (0..self.branches.len()).any(|branch| self.is_vertical(branch))
     }
 
     fn monotonicity_constant(&self, _step_length: f64) -> f64 {

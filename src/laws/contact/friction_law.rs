@@ -7,6 +7,7 @@
 //! `s`, velocity and traction have the same direction.
 
 use crate::laws::{
+    expression::Scalar,
     law::LawFault,
     step::{Blend, Quantity},
 };
@@ -108,6 +109,11 @@ pub trait FrictionBound {
 
     /// The history of a point on which the bound depends, if it depends on one.
     fn history(&self) -> Option<FrictionHistory> {
+        None
+    }
+
+    /// The coefficient at rest in time and place, for laws whose coefficient is a formula.
+    fn in_time(&self) -> Option<Scalar> {
         None
     }
 
@@ -266,6 +272,7 @@ macro_rules! friction_laws {
                 corner_velocity(at: SlidingContext) -> f64;
                 history() -> Option<FrictionHistory>;
                 is_same_everywhere() -> bool;
+                in_time() -> Option<Scalar>;
                 context(histories: [f64; 2], blend: Blend) -> SlidingContext;
                 history_after(histories: [f64; 2], blend: Blend, speed: f64) -> f64;
                 history_measure(history: f64) -> f64;

@@ -22,22 +22,31 @@ const MOST_ENCLOSURES: usize = 40_000;
 /// A bound is sharp if it exceeds a value that is taken by at most this share.
 const SHARP: f64 = 0.01;
 
-/// A bound, and a value within its part, below this multiple of the width of the enclosure at one number are rounding.
-const ROUNDING: f64 = 16.0;
-
 /// A piece of at most this number of adjacent numbers is part of the border beside it.
 const NARROW: u64 = 16;
 
 /// Numbers, nearly adjacent, between which another piece begins.
 pub type Border = [f64; 2];
 
+/// Values of all variables, in their order.
+pub type Place = [f64; COUNT];
+
+/// A bound from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Supremum {
+    /// The bound.
+    pub bound: f64,
+    /// About where it is taken.
+    pub place: Place,
+}
+
 /// Why nothing is proven.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Unproven {
-    /// The formula has no value near this number.
-    Undefined(f64),
-    /// There are too many pieces, or they cannot be told apart, near this number.
-    Pieces(f64),
+    /// The formula has no value near this place.
+    Undefined(Place),
+    /// There are too many pieces, or they cannot be told apart, near this place.
+    Pieces(Place),
 }
 
 impl Program {
@@ -54,8 +63,8 @@ impl Program {
                 continue;
             }
             let middle = middle(low, high);
-            if count > MOST_ENCLOSURES || found.len() > MOST_PIECES || low == high {
-                return Err(Unproven::Pieces(middle));
+            if count > MOST_PIECES * 2 * u64::BITS as usize || found.len() > MOST_PIECES || low == high {
+                return Err(Unproven::Pieces(part.map(centre)));
             }
             if middle == low {
                 // Adjacent numbers. One of them may itself be a piece, as 0 is for `sign`.
@@ -74,66 +83,61 @@ impl Program {
         Ok(found)
     }
 
-    /// The largest value of a part of the enclosures in these ranges, from above, and about where it is taken along the variable; 0 if
-    /// it is smaller than rounding. A derivative is meant within the pieces.
+    /// The largest value of a part of the enclosures in these ranges, from above, and about where it is taken. A derivative is meant within
+    /// the pieces.
     pub(super) fn supremum(
         &self,
         ranges: &[Ranges],
         by: Variable,
         of: impl Fn(&Enclosure) -> Interval,
-    ) -> Result<[f64; 2], Unproven> {
+    ) -> Result<Supremum, Unproven> {
         let axes: Vec<usize> = (0..COUNT).filter(|axis| self.uses_number(*axis)).collect();
-        let (mut heap, mut taken) = (BinaryHeap::new(), f64::NEG_INFINITY);
         let part = |ranges: Ranges| {
-            let middles = ranges.map(|range| Interval::from(middle(range.low, range.high)));
-            let (there, known) = (of(&self.enclose(&middles, by)), self.enclose(&ranges, by));
-            let is_defined = known.value.is_defined;
-            Part {
-                bound: of(&known).high,
-                taken: there.low,
-                rounding: there.high - there.low,
-                is_defined,
-                ranges,
-            }
+            let there = of(&self.enclose(&ranges.map(|range| Interval::from(centre(range))), by));
+            let known = self.enclose(&ranges, by);
+            let taken = Some(there.low).filter(|low| low.is_finite()).unwrap_or(f64::NEG_INFINITY);
+            Part { bound: of(&known).high, taken, is_defined: known.value.is_defined, ranges }
         };
-        let mut add = |heap: &mut BinaryHeap<Part>, ranges: Ranges| {
-            let part = part(ranges);
-            taken = if part.taken.is_finite() { taken.max(part.taken) } else { taken };
-            heap.push(part);
-            taken
-        };
-        let mut known = f64::NEG_INFINITY;
-        for part in ranges {
-            known = add(&mut heap, *part);
-        }
+        let mut heap: BinaryHeap<Part> = ranges.iter().map(|ranges| part(*ranges)).collect();
+        let mut taken = heap.iter().fold(f64::NEG_INFINITY, |taken, part| taken.max(part.taken));
         let mut count = 0;
-        while let Some(Part { bound, taken, rounding, is_defined, ranges }) = heap.pop() {
-            count += 1;
-            let is_rounding = rounding.is_finite() && bound.abs().max(taken.abs()) <= ROUNDING * rounding;
-            let is_sharp = bound <= known + SHARP * known.abs() || is_rounding;
-            let widest =
-                axes.iter().copied().max_by_key(|&axis| steps_between(ranges[axis].low, ranges[axis].high));
-            let widest =
-                widest.filter(|&axis| middle(ranges[axis].low, ranges[axis].high) != ranges[axis].low);
-            let place = middle(ranges[by as usize].low, ranges[by as usize].high);
-            match widest {
-                _ if is_sharp && is_defined => {
-                    return Ok([if is_rounding { 0.0 } else { bound }, place]);
+        while let Some(Part { bound, is_defined, ranges, .. }) = heap.pop() {
+            let place = ranges.map(centre);
+            if is_defined && (bound <= taken + SHARP * taken.abs() || count > MOST_ENCLOSURES) {
+                return Ok(Supremum { bound, place });
+            }
+            // The axis whose halves exceed what is taken by the fewest orders; without a difference the widest one.
+            let halved = |axis: usize| {
+                let Interval { low, high, .. } = ranges[axis];
+                let middle = middle(low, high);
+                let half = |ends: [f64; 2]| {
+                    let mut half = ranges;
+                    half[axis] = Interval::new(ends[0], ends[1]);
+                    part(half)
+                };
+                (middle != low).then(|| [half([low, middle]), half([middle, high])])
+            };
+            let halves = axes.iter().filter_map(|&axis| Some((axis, halved(axis)?)));
+            let measure = |axis: usize, halves: &[Part; 2]| {
+                let excess: f64 = halves.iter().map(|half| half.excess(taken)).sum();
+                let undefined = halves.iter().filter(|half| !half.is_defined).count();
+                (undefined, excess, steps_between(ranges[axis].low, ranges[axis].high))
+            };
+            let best = halves.min_by(|(a, one), (b, other)| {
+                let ((p, q, r), (s, t, u)) = (measure(*a, one), measure(*b, other));
+                p.cmp(&s).then(q.total_cmp(&t)).then(u.cmp(&r))
+            });
+            match best {
+                Some((_, halves)) if count <= MOST_ENCLOSURES => {
+                    count += 2 * axes.len();
+                    taken = halves.iter().fold(taken, |taken, half| taken.max(half.taken));
+                    heap.extend(halves);
                 }
-                Some(axis) if count < MOST_ENCLOSURES => {
-                    let Interval { low, high, .. } = ranges[axis];
-                    let middle = middle(low, high);
-                    for half in [[low, middle], [middle, high]] {
-                        let mut part = ranges;
-                        part[axis] = Interval::new(half[0], half[1]);
-                        known = add(&mut heap, part);
-                    }
-                }
-                _ if is_defined => return Ok([bound, place]),
+                _ if is_defined => return Ok(Supremum { bound, place }),
                 _ => return Err(Unproven::Undefined(place)),
             }
         }
-        Ok([f64::NEG_INFINITY, 0.0])
+        Ok(Supremum { bound: f64::NEG_INFINITY, place: [0.0; COUNT] })
     }
 
     fn uses_number(&self, number: usize) -> bool {
@@ -148,10 +152,17 @@ struct Part {
     bound: f64,
     /// A value that is taken, from below.
     taken: f64,
-    /// The width of the enclosure of this value.
-    rounding: f64,
     is_defined: bool,
     ranges: Ranges,
+}
+
+impl Part {
+    /// The logarithm of the share by which the bound exceeds a value that is taken.
+    fn excess(&self, taken: f64) -> f64 {
+        let scale = taken.abs().clamp(f64::MIN_POSITIVE, f64::MAX);
+        let share = (self.bound.min(f64::MAX) - taken.max(-f64::MAX)) / scale;
+        share.clamp(SHARP, f64::MAX).ln()
+    }
 }
 
 impl PartialEq for Part {
@@ -182,6 +193,10 @@ fn position(number: f64) -> i64 {
 
 fn steps_between(low: f64, high: f64) -> u64 {
     position(high).abs_diff(position(low))
+}
+
+fn centre(range: Interval) -> f64 {
+    middle(range.low, range.high)
 }
 
 /// The number in the middle of all numbers between two: of the order of both, if their orders differ.

@@ -26,9 +26,16 @@ const MULTIPLY: Binary = smooth_of_two!(left * right, (left, right) => [right, l
 const DIVIDE: Binary =
     smooth_of_two!(left / right, (left, right) => [R::from(1.0) / right, -left / right.square()])
         .linear(|[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]));
-const POWER: Binary = smooth_of_two!(left.power(right), (left, right) => {
-    [right * left.power(right - R::from(1.0)), left.power(right) * left.ln()]
-});
+const POWER: Binary = {
+    fn slopes<R: Real>(base: R, exponent: R) -> [R; 2] {
+        [exponent * base.power(exponent - R::from(1.0)), base.power(exponent) * base.ln()]
+    }
+    fn slopes_of_numbers(base: f64, exponent: f64) -> [f64; 2] {
+        let [by_base, by_exponent] = slopes(base, exponent);
+        [if exponent == 0.0 { 0.0 } else { by_base }, by_exponent]
+    }
+    Binary::smooth((f64::powf, slopes_of_numbers), (Interval::power, slopes))
+};
 const BELOW: Binary = comparison!(<);
 const AT_MOST: Binary = comparison!(<=);
 const ABOVE: Binary = comparison!(>);
@@ -57,7 +64,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    fn new(at: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> Self {
+    pub(super) fn new(at: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> Self {
         Self { at, message: message.into(), help: help.into(), is_unknown_name: false }
     }
 }

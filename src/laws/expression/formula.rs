@@ -1,74 +1,136 @@
 //! Laws written in the job: formulas in variables of their own, with derivatives and proven bounds.
 
-use super::analysis::{Border, Unproven};
+use super::analysis::{Border, Place, Supremum, Unproven};
 use super::enclosure::{Enclosure, Ranges};
 use super::evaluate::{Arguments, COUNT};
 use super::interval::Interval;
 use super::program::Variable;
-use super::{Expression, Fault};
+use super::{Expression, Fault, Scalar};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 use std::borrow::Cow;
 use std::fmt;
+use std::marker::PhantomData;
 
-/// A formula of a law. The schema of its key lists its variables.
+/// The variables of a family of formulas.
+pub trait Scope: fmt::Debug + Copy + PartialEq {
+    /// The variables.
+    const VARIABLES: &'static [Variable];
+}
+
+/// Declares scopes with their variables.
+macro_rules! scopes {
+    ($($(#[$about:meta])* $scope:ident: $($variable:ident)*;)*) => {
+        $(
+            $(#[$about])*
+            #[derive(Debug, Clone, Copy, PartialEq)]
+            pub struct $scope;
+
+            impl Scope for $scope {
+                const VARIABLES: &'static [Variable] = &[$(Variable::$variable),*];
+            }
+        )*
+    };
+}
+
+scopes! {
+    /// Formulas of a normal velocity or a penetration.
+    OfMotion: V D;
+    /// Formulas of a sliding velocity, a slip distance, a pressure, time and place.
+    OfSliding: V L P T X Y Z;
+    /// Formulas of the von Mises stress and the accumulated viscoplastic strain.
+    OfCreep: Q E;
+}
+
+/// A formula of a law, in the variables of its scope.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Formula(pub(super) Expression);
+pub struct Formula<S> {
+    pub(super) expression: Expression,
+    scope: PhantomData<S>,
+}
 
-impl Formula {
-    /// Compiles `text`, which may contain these variables.
-    pub fn parse(text: &str, variables: &[Variable]) -> Result<Self, Fault> {
-        Expression::parse_in(text, variables).map(Self)
+impl<S: Scope> Formula<S> {
+    /// Compiles `text`.
+    pub fn parse(text: &str) -> Result<Self, Fault> {
+        let expression = Expression::parse_in(text, S::VARIABLES)?;
+        if !expression.program.is_finite() {
+            let message = "an infinite number in a law";
+            return Err(Fault::new(
+                0..text.len(),
+                message,
+                "write a large number, or the law of a rigid obstacle",
+            ));
+        }
+        Ok(Self { expression, scope: PhantomData })
     }
 
     /// The formula as written.
     pub fn text(&self) -> &str {
-        self.0.text()
+        self.expression.text()
+    }
+
+    /// The formula of time and place where its other variables are 0.
+    pub fn as_scalar(&self) -> Scalar {
+        Scalar::Expression(self.expression.clone())
     }
 
     /// Whether it contains `variable`.
     pub fn uses(&self, variable: Variable) -> bool {
-        self.0.uses(variable)
+        self.expression.uses(variable)
     }
 
     /// Its value where the variables have these values, and all others are 0.
     pub fn value(&self, at: &[(Variable, f64)]) -> f64 {
-        self.0.program.evaluate(&arguments(at))
+        self.expression.program.evaluate(&arguments(at))
     }
 
     /// Its value there, and its derivative by one variable.
     pub fn differentiate(&self, at: &[(Variable, f64)], by: Variable) -> [f64; 2] {
-        self.0.program.differentiate(&arguments(at), by)
+        self.expression.program.differentiate(&arguments(at), by)
     }
 
     /// What is known of its values, and of its derivatives by one variable, in these ranges.
     pub fn enclose(&self, ranges: &[(Variable, Interval)], by: Variable) -> Enclosure {
-        self.0.program.enclose(&whole(ranges), by)
+        self.expression.program.enclose(&whole(ranges), by)
     }
 
     /// The borders between its pieces along one variable, for all values of the others in these ranges.
     pub fn borders(&self, ranges: &[(Variable, Interval)], along: Variable) -> Result<Vec<Border>, Unproven> {
-        self.0.program.borders(&whole(ranges), along)
+        self.expression.program.borders(&whole(ranges), along)
     }
 
     /// Whether a function that jumps depends on this variable: it may or may not jump with it.
     pub fn jumps_along(&self, variable: Variable) -> bool {
         let all = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
-        self.0.program.enclose(&[all; COUNT], variable).may_jump
+        self.expression.program.enclose(&[all; COUNT], variable).may_jump
     }
 
     /// The largest value of a part of its enclosures, such as its values or its derivatives by one variable, in any of these ranges, from
-    /// above, and about where it is taken along the variable.
+    /// above, and about where it is taken.
     pub fn supremum<'a>(
         &self,
         ranges: impl IntoIterator<Item = &'a [(Variable, Interval)]>,
         by: Variable,
         of: impl Fn(&Enclosure) -> Interval,
-    ) -> Result<[f64; 2], Unproven> {
+    ) -> Result<Supremum, Unproven> {
         let ranges: Vec<Ranges> = ranges.into_iter().map(whole).collect();
-        self.0.program.supremum(&ranges, by, of)
+        self.expression.program.supremum(&ranges, by, of)
     }
+
+    /// A place in words: the values of the variables that the formula contains.
+    pub fn at(&self, place: &Place) -> String {
+        let used = S::VARIABLES.iter().filter(|variable| self.uses(**variable));
+        let named =
+            used.map(|variable| format!("{} = {}", variable.name(), short(place[*variable as usize])));
+        named.collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// A number in a few digits.
+pub fn short(number: f64) -> String {
+    let plain = number == 0.0 || (1e-3..1e6).contains(&number.abs());
+    if plain { format!("{}", (number * 1e6).round() / 1e6) } else { format!("{number:.3e}") }
 }
 
 fn arguments(at: &[(Variable, f64)]) -> Arguments {
@@ -83,41 +145,41 @@ fn whole(ranges: &[(Variable, Interval)]) -> Ranges {
     all
 }
 
-impl Serialize for Formula {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+impl<S: Scope> Serialize for Formula<S> {
+    fn serialize<T: Serializer>(&self, serializer: T) -> Result<T::Ok, T::Error> {
         serializer.serialize_str(self.text())
     }
 }
 
-impl<'de> Deserialize<'de> for Formula {
+impl<'de, S: Scope> Deserialize<'de> for Formula<S> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(FormulaVisitor)
+        deserializer.deserialize_any(FormulaVisitor(PhantomData))
     }
 }
 
-struct FormulaVisitor;
+struct FormulaVisitor<S>(PhantomData<S>);
 
-impl Visitor<'_> for FormulaVisitor {
-    type Value = Formula;
+impl<S: Scope> Visitor<'_> for FormulaVisitor<S> {
+    type Value = Formula<S>;
 
     fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str("a number or a formula")
     }
 
-    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Formula, E> {
+    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Formula<S>, E> {
         self.visit_str(&format!("{number:?}"))
     }
 
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Formula, E> {
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Formula<S>, E> {
         self.visit_str(&number.to_string())
     }
 
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Formula, E> {
-        Formula::parse(text, Variable::ALL).map_err(|fault| E::custom(fault.message))
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Formula<S>, E> {
+        Formula::parse(text).map_err(|fault| E::custom(fault.message))
     }
 }
 
-impl JsonSchema for Formula {
+impl<S: Scope> JsonSchema for Formula<S> {
     fn inline_schema() -> bool {
         true
     }
@@ -127,6 +189,7 @@ impl JsonSchema for Formula {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": ["number", "string"], "format": "expression" })
+        let names: Vec<&str> = S::VARIABLES.iter().map(|variable| variable.name()).collect();
+        json_schema!({ "type": ["number", "string"], "format": "expression", "variables": names.join(", ") })
     }
 }

@@ -140,6 +140,9 @@ impl Interval {
 
     /// Its power with a whole exponent that is not negative.
     fn whole_power(self, exponent: f64) -> Self {
+        if exponent == 0.0 {
+            return Self { low: 1.0, high: 1.0, ..self };
+        }
         let [a, b] = [self.low, self.high].map(|end| end.powf(exponent));
         if exponent % 2.0 != 0.0 {
             return self.outward(a, b, 4);

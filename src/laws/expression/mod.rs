@@ -21,12 +21,12 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
-pub use analysis::{Border, REACH, Unproven};
+pub use analysis::{Border, Place, REACH, Supremum, Unproven};
 pub use breakpoints::Breakpoints;
 pub use compile::Fault;
 pub use enclosure::Enclosure;
 use evaluate::{Arguments, COUNT};
-pub use formula::Formula;
+pub use formula::{Formula, OfCreep, OfMotion, OfSliding, Scope, short};
 pub use functions::{Names, is_known};
 pub use interval::Interval;
 use program::Program;

@@ -1,5 +1,8 @@
 use super::evaluate::COUNT;
-use super::{Enclosure, Expression, Formula, Interval, Names, REACH, Resolved, Scalar, Unproven, Variable};
+use super::{
+    Enclosure, Expression, Formula, Interval, Names, OfCreep, OfMotion, REACH, Resolved, Scalar, Unproven,
+    Variable,
+};
 
 fn value(text: &str) -> f64 {
     Expression::parse(text)
@@ -166,21 +169,28 @@ fn breakpoints_follow_from_arguments_that_are_linear_in_time() {
     }
 }
 
-const VELOCITY: &[Variable] = &[Variable::V];
-
-fn formula(text: &str) -> Formula {
-    Formula::parse(text, VELOCITY).unwrap_or_else(|fault| panic!("{text}: {fault:?}"))
+fn formula(text: &str) -> Formula<OfMotion> {
+    Formula::parse(text).unwrap_or_else(|fault| panic!("{text}: {fault:?}"))
 }
 
 #[test]
 fn formulas_have_their_own_variables() {
     assert_eq!(formula("2*v + 1").value(&[(Variable::V, 3.0)]), 7.0);
-    let fault = Formula::parse("v + t", VELOCITY).expect_err("time");
+    let fault = Formula::<OfMotion>::parse("v + t").expect_err("time");
     assert!(
-        fault.message.contains("unknown name `t`") && fault.help.contains("known names: v, pi"),
+        fault.message.contains("unknown name `t`") && fault.help.contains("known names: v, d, pi"),
         "{fault:?}"
     );
     assert!(Expression::parse("v").is_err());
+    // Euler's number, where the creep strain is not meant.
+    assert_eq!(formula("e").value(&[]), std::f64::consts::E);
+    assert_eq!(Formula::<OfCreep>::parse("e").unwrap().value(&[(Variable::E, 3.0)]), 3.0);
+    let read: Formula<OfMotion> = serde::Deserialize::deserialize(serde::de::value::StrDeserializer::<
+        serde::de::value::Error,
+    >::new("e*v"))
+    .unwrap();
+    assert_eq!(read.value(&[(Variable::V, 1.0)]), std::f64::consts::E);
+    assert!(Formula::<OfMotion>::parse("v*inf").expect_err("inf").message.contains("infinite"));
 }
 
 /// A formula of every function, its derivative by differences and enclosures that contain both.
@@ -224,7 +234,7 @@ fn derivatives_agree_with_differences_and_enclosures_contain_all() {
     ];
     for text in texts {
         let formula = formula(text);
-        let program = &formula.0.program;
+        let program = &formula.expression.program;
         for step in -30..30 {
             let (low, width) = (f64::from(step) * 0.0937 + 0.001, 0.05);
             let mut ranges = [Interval::from(0.0); COUNT];
@@ -275,7 +285,7 @@ fn suprema_are_sharp_to_a_per_cent_and_never_too_small() {
     let sup = |text: &str, low: f64, high: f64, of: fn(&Enclosure) -> Interval| {
         formula(text).supremum([&[(Variable::V, Interval::new(low, high))][..]], Variable::V, of)
     };
-    let fall = |text: &str, low: f64| sup(text, low, REACH, |known| -known.slope).unwrap()[0];
+    let fall = |text: &str, low: f64| sup(text, low, REACH, |known| -known.slope).unwrap().bound;
     // The steepest decrease of v exp(-v / w) is exp(-2), at 2 w.
     for width in [1e-6, 0.02, 3.0, 1e6] {
         let found = fall(&format!("4e3*v*exp(-v/{width})"), 0.0) / 4e3;
@@ -284,18 +294,30 @@ fn suprema_are_sharp_to_a_per_cent_and_never_too_small() {
     for increasing in
         ["tanh(v/0.1)", "v^3", "v - tanh(v)", "v", "sqrt(v)", "v + 0.5*sin(v)", "1 - exp(-v/0.02)"]
     {
-        assert!(fall(increasing, 0.0) <= 0.0, "{increasing}: {}", fall(increasing, 0.0));
+        assert!(fall(increasing, 0.0) <= 1e-14, "{increasing}: {}", fall(increasing, 0.0));
     }
+    let waves = [
+        ("sin(v)", 1.0),
+        ("50*v + 30*sin(v/0.0005)", 59950.0),
+        ("100*cos(v/0.01)", 1e4),
+        ("-sin(v)", 1.0),
+        ("-2000*v^1", 2000.0),
+    ];
+    for (wave, steepest) in waves {
+        let share = fall(wave, -REACH) / steepest;
+        assert!((1.0..1.011).contains(&share), "{wave}: {share}");
+    }
+    assert_eq!(formula("10*v^0").differentiate(&[(Variable::V, 0.0)], Variable::V), [10.0, 0.0]);
     assert!((fall("v^3 + 0.1*sin(20*v)", 0.0) / 2.0 - 0.97).abs() < 0.04, "beside slopes of 1e60");
     assert!((fall("2*exp(-v/0.5)", 0.0) / 4.0 - 1.0).abs() < 0.011);
     assert_eq!(fall("-sqrt(v)", 0.0), f64::INFINITY, "a vertical tangent");
-    let top = sup("v*exp(-v)", 0.0, REACH, |known| known.value).unwrap()[0] * 1.0_f64.exp();
+    let top = sup("v*exp(-v)", 0.0, REACH, |known| known.value).unwrap().bound * 1.0_f64.exp();
     assert!((1.0..1.011).contains(&top), "{top}");
     assert!(
-        matches!(sup("sqrt(v)", -1.0, 1.0, |known| known.value), Err(Unproven::Undefined(at)) if at <= 0.0)
+        matches!(sup("sqrt(v)", -1.0, 1.0, |known| known.value), Err(Unproven::Undefined(at)) if at[Variable::V as usize] <= 0.0)
     );
     assert!(
-        matches!(sup("1/(1 + v)", -2.0, 2.0, |known| known.slope), Err(Unproven::Undefined(at)) if (at + 1.0).abs() < 1e-9)
+        matches!(sup("1/(1 + v)", -2.0, 2.0, |known| known.slope), Err(Unproven::Undefined(at)) if (at[Variable::V as usize] + 1.0).abs() < 1e-9)
     );
     assert!(matches!(sup("ln(v - 2)", 0.0, 4.0, |known| known.value), Err(Unproven::Undefined(_))));
 }

@@ -14,8 +14,10 @@ const GAUSS: [[f64; 2]; 5] = [
     [0.973_906_528_517_171_7, 0.066_671_344_308_688_14],
 ];
 
-/// Integrals are exact up to this share of that of the absolute value.
-const EXACT: f64 = 1e-14;
+/// Integrals are exact up to this share of that of the absolute value, about the rounding of values.
+const EXACT: f64 = 1e-13;
+/// Halvings of a part.
+const DEPTH: usize = 10;
 
 /// The integral of a smooth function from `a` to `b`, and that of its absolute value, by ten points.
 fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
@@ -47,7 +49,7 @@ fn integral(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
     while from != b {
         let is_last = reach >= (b - a).abs();
         let to = if is_last { b } else { a + reach.copysign(b - a) };
-        sum += adaptive(function, [from, to], gauss(function, from, to), 12);
+        sum += adaptive(function, [from, to], gauss(function, from, to), DEPTH);
         from = to;
         reach *= 8.0;
     }
@@ -60,6 +62,8 @@ pub struct StoringCurve {
     curve: Curve,
     /// The potential in J/m² at minus infinity.
     apart: f64,
+    /// The potential at each corner.
+    potentials: Vec<f64>,
 }
 
 impl StoringCurve {
@@ -74,8 +78,14 @@ impl StoringCurve {
                 "let it vanish where the gap is open, for example by max(d, 0) in place of d".into(),
             ]);
         }
-        let mut storing = Self { curve, apart: 0.0 };
-        storing.apart = storing.potential(-REACH);
+        let mut storing = Self { curve, apart: 0.0, potentials: Vec::new() };
+        storing.apart = storing.work(0.0, -REACH);
+        let mut from = [0.0, 0.0];
+        for corner in storing.curve.corners.clone() {
+            let potential = from[1] + storing.work(from[0], corner[0]);
+            storing.potentials.push(potential);
+            from = [corner[0], potential];
+        }
         Ok(storing)
     }
 
@@ -115,7 +125,11 @@ impl StoringGraph for StoringCurve {
     }
 
     fn potential(&self, penetration: f64) -> f64 {
-        if penetration == f64::NEG_INFINITY { self.apart } else { self.work(0.0, penetration) }
+        if penetration == f64::NEG_INFINITY {
+            return self.apart;
+        }
+        let before = self.curve.branch(penetration, NodeContext::AT_THE_GAP).saturating_sub(1);
+        self.potentials[before] + self.work(self.curve.corners[before][0], penetration)
     }
 
     fn mean(&self, before: f64, after: f64) -> [f64; 2] {
@@ -124,14 +138,14 @@ impl StoringGraph for StoringCurve {
         let end = self.curve.corners.get(branch).map_or(f64::INFINITY, |corner| corner[0]);
         let advance = after - before;
         if end < high {
-            let mean = self.work(low, high) / (high - low);
+            let mean = (self.potential(high) - self.potential(low)) / (high - low);
             let own = self.curve.pressure(after, NodeContext::AT_THE_GAP);
             return [mean, (own - mean) / advance];
         }
         // On one branch the derivative is an integral, too, without the rounding of a difference.
         let at = |share: f64| self.curve.on_branch(branch, before + share * advance);
         let mean =
-            |function: &dyn Fn(f64) -> f64| adaptive(function, [0.0, 1.0], gauss(function, 0.0, 1.0), 12);
+            |function: &dyn Fn(f64) -> f64| adaptive(function, [0.0, 1.0], gauss(function, 0.0, 1.0), DEPTH);
         [mean(&|share| at(share)[0]), mean(&|share| share * at(share)[1])]
     }
 }

@@ -7,7 +7,7 @@
 
 use crate::laws::{
     contact::friction_law::{FrictionBound, FrictionHistory, STICKS, SlidingContext, Slip},
-    expression::{Enclosure, Formula, Interval, REACH, Unproven, Variable},
+    expression::{Enclosure, Formula, Interval, OfSliding, REACH, Scalar, Supremum, Unproven, Variable},
     law::{LawFault, increasing_root},
     step::{Blend, quantity},
 };
@@ -23,8 +23,8 @@ pub struct CoefficientFormula {
     /// the contact pressure p in Pa, the time t in s and the undeformed coordinates x, y, z in m. It must not be negative for any v, l, p
     /// and t from 0 on and any place, and not jump with v, l or p. Where it contains l, field files and checkpoints contain the slip as
     /// `slip`.
-    #[schemars(extend("variables" = "v, l, p, t, x, y, z"), example = &"0.3 + 0.2*exp(-v/0.1)")]
-    pub coefficient: Formula,
+    #[schemars(example = &"0.3 + 0.2*exp(-v/0.1)")]
+    pub coefficient: Formula<OfSliding>,
     #[serde(skip)]
     facts: OnceLock<Facts>,
 }
@@ -56,7 +56,7 @@ fn ranges() -> [(Variable, Interval); 7] {
 
 impl CoefficientFormula {
     /// With this formula.
-    pub fn new(coefficient: Formula) -> Self {
+    pub fn new(coefficient: Formula<OfSliding>) -> Self {
         Self { coefficient, facts: OnceLock::new() }
     }
 
@@ -68,7 +68,7 @@ impl CoefficientFormula {
                 }
                 self.coefficient
                     .supremum([&ranges()[..]], by, of)
-                    .map_or(f64::INFINITY, |[bound, _]| bound.max(0.0))
+                    .map_or(f64::INFINITY, |found| found.bound.max(0.0))
             };
             Facts {
                 fall_with_velocity: steepest(Variable::V, |known| -known.slope),
@@ -104,7 +104,6 @@ impl CoefficientFormula {
     }
 
     fn fault(&self) -> Option<[String; 2]> {
-        let near = |[_, at]: [f64; 2], name: &str| format!("near {name} = {at}");
         let formula = &self.coefficient;
         for variable in [Variable::V, Variable::L, Variable::P] {
             let name = variable.name();
@@ -116,40 +115,44 @@ impl CoefficientFormula {
                     "write it with min, max, abs or interpolate, which are continuous".into(),
                 ]);
             }
-            if !formula.uses(variable) {
-                continue;
-            }
+            let falls =
+                |Supremum { bound, .. }: &Supremum| *bound == f64::INFINITY && variable != Variable::P;
             match formula.supremum([&ranges()[..]], variable, |known| -known.slope) {
-                Ok([bound, at]) if bound == f64::INFINITY && variable != Variable::P => {
+                Ok(found) if falls(&found) => {
                     return Some([
                         format!(
-                            "the coefficient falls without bound {}, so that no step is short enough to have a unique solution",
-                            near([bound, at], name)
+                            "the coefficient falls without bound near {}, so that no step is short enough to have a unique solution",
+                            formula.at(&found.place)
                         ),
                         format!("bound the decrease, for example by {name} + 1e-6 in place of {name}"),
                     ]);
                 }
                 Ok(_) => {}
-                Err(unproven) => return Some(explain(unproven, name)),
+                Err(unproven) => return Some(self.explain(unproven)),
             }
         }
-        let by = [Variable::V, Variable::L, Variable::P].into_iter().find(|variable| formula.uses(*variable));
-        let by = by.unwrap_or(Variable::T);
-        match formula.supremum([&ranges()[..]], by, |known| -known.value) {
-            Ok([least, at]) if least > 0.0 => Some([
-                format!("the coefficient may be negative {}", near([least, at], by.name())),
-                "write max(..., 0) around it".into(),
-            ]),
+        match formula.supremum([&ranges()[..]], Variable::V, |known| -known.value) {
+            Ok(Supremum { bound, place }) if bound > 0.0 => {
+                let place = formula.at(&place);
+                let near = if place.is_empty() { String::new() } else { format!(" near {place}") };
+                Some([
+                    format!("the coefficient may be negative{near}"),
+                    "for every v, l, p and t from 0 on and every place, also outside of the body, it must not be: write max(..., 0) around it, \
+                     and 1/(1 + v) in place of 1 - v/(1 + v)"
+                        .into(),
+                ])
+            }
             Ok(_) => None,
-            Err(unproven) => Some(explain(unproven, by.name())),
+            Err(unproven) => Some(self.explain(unproven)),
         }
     }
-}
 
-fn explain(unproven: Unproven, name: &str) -> [String; 2] {
-    let (Unproven::Undefined(at) | Unproven::Pieces(at)) = unproven;
-    let help = "it must have one for every v, l, p and t from 0 on and every place: for example max(x, 0) in place of x";
-    [format!("the coefficient has no value near {name} = {at}"), help.into()]
+    fn explain(&self, unproven: Unproven) -> [String; 2] {
+        let (Unproven::Undefined(place) | Unproven::Pieces(place)) = unproven;
+        let help = "for every v, l, p and t from 0 on and every place, also outside of the body, it must have one: bound the arguments of \
+                    roots, logarithms and powers, as in sqrt(max(x, 0)), and keep denominators away from 0";
+        [format!("the coefficient has no value near {}", self.coefficient.at(&place)), help.into()]
+    }
 }
 
 impl FrictionBound for CoefficientFormula {
@@ -191,6 +194,10 @@ impl FrictionBound for CoefficientFormula {
             initial: 0.0,
             share: 1.0,
         })
+    }
+
+    fn in_time(&self) -> Option<Scalar> {
+        Some(self.coefficient.as_scalar())
     }
 
     fn is_same_everywhere(&self) -> bool {
@@ -240,8 +247,7 @@ mod tests {
     use crate::laws::contact::{Coulomb, Decay, DistanceWeakening, FrictionLaw, SlipWeakening};
 
     fn written(text: &str) -> FrictionLaw {
-        let variables = ranges().map(|(variable, _)| variable);
-        FrictionLaw::CoefficientFormula(CoefficientFormula::new(Formula::parse(text, &variables).unwrap()))
+        FrictionLaw::CoefficientFormula(CoefficientFormula::new(Formula::parse(text).unwrap()))
     }
 
     #[test]
@@ -317,12 +323,12 @@ mod tests {
     fn coefficients_without_a_certificate_are_refused_with_the_remedy() {
         for (text, message, help) in [
             ("0.3 - 0.1*v", "may be negative", "max("),
-            ("0.3 + 0.01*x", "may be negative", "max("),
+            ("0.3 + 0.01*x", "may be negative near x = -", "outside of the body"),
             ("if(v < 0.1, 0.3, 0.2)", "may jump with v", "interpolate"),
             ("0.3 + 0.1*floor(l)", "may jump with l", "interpolate"),
             ("max(0.5 - sqrt(v), 0.1)", "falls without bound near v", "v + 1e-6"),
-            ("1/v", "no value near v = 0", "max(x, 0)"),
-            ("0.2 + sqrt(x)", "no value near", "max(x, 0)"),
+            ("1/v", "no value near v = ", "denominators away from 0"),
+            ("0.2 + sqrt(x)", "no value near x = -", "sqrt(max(x, 0))"),
         ] {
             let faults = written(text).own_faults();
             assert!(faults.len() == 1 && faults[0].key == "coefficient", "{text}: {faults:?}");
