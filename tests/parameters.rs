@@ -287,6 +287,15 @@ friction.rate_and_state = { reference = 0.6, velocity = 1e-6, direct = 0.02, evo
 [[contact]]
 on = ["left"]
 normal.displacement_graph = { points = [[0, 0], [1, 2]], gap = 0.1 }
+[[contact]]
+on = ["right"]
+where = "y < 1"
+normal.expression = { pressure = 4 }
+[[contact]]
+on = ["right"]
+where = "y > 1"
+normal.expression = { pressure = "1e3*max(d, 0)", gap = 0.1 }
+friction.expression = { coefficient = 0.3 }
 [time]
 end = 1
 step = 0.25

@@ -1,5 +1,7 @@
 //! Shared by all families of laws: faults of their keys, a root finder for scalar equations, and the dispatch to the chosen law.
 
+use std::sync::OnceLock;
+
 /// A fault of a key of a law, or of another table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LawFault {
@@ -28,6 +30,29 @@ impl LawFault {
     pub fn within(self, table: &str) -> Self {
         let key = if self.key.is_empty() { table.to_owned() } else { format!("{table}.{}", self.key) };
         Self { key, ..self }
+    }
+}
+
+/// What follows from the parameters of a law, found once: parameters are equal whether it was found or not.
+#[derive(Debug, Clone)]
+pub(crate) struct Derived<T>(OnceLock<T>);
+
+impl<T> Derived<T> {
+    /// The value, found by `find` if it is asked for the first time.
+    pub(crate) fn get(&self, find: impl FnOnce() -> T) -> &T {
+        self.0.get_or_init(find)
+    }
+}
+
+impl<T> Default for Derived<T> {
+    fn default() -> Self {
+        Self(OnceLock::new())
+    }
+}
+
+impl<T> PartialEq for Derived<T> {
+    fn eq(&self, _: &Self) -> bool {
+        true
     }
 }
 

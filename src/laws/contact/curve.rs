@@ -101,7 +101,8 @@ fn point(formula: &Formula<OfMotion>, variable: Variable, at: f64) -> Enclosure 
 fn roundest(before: f64, after: f64) -> f64 {
     let numbers =
         std::iter::successors(Some(before), |number| Some(number.next_up()).filter(|next| *next <= after));
-    numbers.min_by_key(|number| format!("{number:e}").len()).unwrap_or(after)
+    // Without the sign of a negative zero.
+    numbers.min_by_key(|number| format!("{number:e}").len()).unwrap_or(after) + 0.0
 }
 
 fn explain(formula: &Formula<OfMotion>, unproven: Unproven) -> [String; 2] {

@@ -171,7 +171,7 @@ impl<S: Scope> Visitor<'_> for FormulaVisitor<S> {
     }
 
     fn visit_i64<E: de::Error>(self, number: i64) -> Result<Formula<S>, E> {
-        self.visit_str(&number.to_string())
+        self.visit_f64(number as f64)
     }
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<Formula<S>, E> {

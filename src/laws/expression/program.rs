@@ -102,11 +102,13 @@ impl Program {
     /// The result on this machine.
     pub(super) fn run<M: Machine>(&self, machine: &mut M) -> M::Entry {
         let zero = machine.number(0.0);
-        match self.depth {
-            // Most formulas need few entries, and clearing more of them takes as long as the formula.
-            ..=SMALL => self.run_on(machine, &mut [zero; SMALL]),
-            ..=LARGE => self.run_on(machine, &mut [zero; LARGE]),
-            depth => self.run_on(machine, &mut vec![zero; depth]),
+        // Most formulas need few entries, and clearing more of them takes as long as the formula.
+        if self.depth <= SMALL {
+            self.run_on(machine, &mut [zero; SMALL])
+        } else if self.depth <= LARGE {
+            self.run_on(machine, &mut [zero; LARGE])
+        } else {
+            self.run_on(machine, &mut vec![zero; self.depth])
         }
     }
 

@@ -748,7 +748,7 @@ fn obstacle<const D: usize>(draw: &mut Draw<D>) {
 
 /// Whether a law with this parameter is written as a formula: one in three.
 fn is_written(parameter: f64) -> bool {
-    (parameter * 1e6) as u64 % 3 == 0
+    ((parameter * 1e6) as u64).is_multiple_of(3)
 }
 
 fn friction<const D: usize>(draw: &mut Draw<D>) {

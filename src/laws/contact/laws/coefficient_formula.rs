@@ -8,12 +8,11 @@
 use crate::laws::{
     contact::friction_law::{FrictionBound, FrictionHistory, STICKS, SlidingContext, Slip},
     expression::{Enclosure, Formula, Interval, OfSliding, REACH, Scalar, Supremum, Unproven, Variable},
-    law::{LawFault, increasing_root},
+    law::{Derived, LawFault, increasing_root},
     step::{Blend, quantity},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::sync::OnceLock;
 
 /// Friction whose coefficient is a formula.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,7 +25,7 @@ pub struct CoefficientFormula {
     #[schemars(example = &"0.3 + 0.2*exp(-v/0.1)")]
     pub coefficient: Formula<OfSliding>,
     #[serde(skip)]
-    facts: OnceLock<Facts>,
+    facts: Derived<Facts>,
 }
 
 /// What is proven of a coefficient.
@@ -57,11 +56,11 @@ fn ranges() -> [(Variable, Interval); 7] {
 impl CoefficientFormula {
     /// With this formula.
     pub fn new(coefficient: Formula<OfSliding>) -> Self {
-        Self { coefficient, facts: OnceLock::new() }
+        Self { coefficient, facts: Derived::default() }
     }
 
     fn facts(&self) -> Facts {
-        *self.facts.get_or_init(|| {
+        *self.facts.get(|| {
             let steepest = |by: Variable, of: fn(&Enclosure) -> Interval| {
                 if !self.coefficient.uses(by) {
                     return 0.0;

@@ -13,12 +13,11 @@ use crate::{
     error::{Error, Result},
     laws::{
         expression::{Formula, OfMotion, Scalar, Variable},
-        law::{LawFault, calls},
+        law::{Derived, LawFault, calls},
     },
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::sync::OnceLock;
 
 /// Contact pressure as a formula of the normal velocity v or of the penetration d.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -36,16 +35,16 @@ pub struct PressureFormula {
     #[schemars(extend("infinite" = true, "unit" = "m"), example = "0.01 - 0.1*t")]
     pub gap: Option<Scalar>,
     #[serde(skip)]
-    law: OnceLock<Result<FormulaLaw, [String; 2]>>,
+    law: Derived<Result<FormulaLaw, [String; 2]>>,
 }
 
 /// The evaluation of a [`PressureFormula`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum FormulaLaw {
     /// Of the normal velocity.
-    Velocity(Curve),
+    Velocity(Box<Curve>),
     /// Of the penetration.
-    Penetration(PenetrationLaw<StoringCurve>),
+    Penetration(Box<PenetrationLaw<StoringCurve>>),
 }
 
 impl PressureFormula {
@@ -55,11 +54,11 @@ impl PressureFormula {
 
     /// With this formula.
     pub fn new(pressure: Formula<OfMotion>, gap: Option<Scalar>) -> Self {
-        Self { pressure, gap, law: OnceLock::new() }
+        Self { pressure, gap, law: Derived::default() }
     }
 
     fn law(&self) -> Result<FormulaLaw, [String; 2]> {
-        self.law.get_or_init(|| self.find_law()).clone()
+        self.law.get(|| self.find_law()).clone()
     }
 
     fn find_law(&self) -> Result<FormulaLaw, [String; 2]> {
@@ -67,9 +66,11 @@ impl PressureFormula {
             (true, true) => Err(["the pressure depends on v and on d".into(), "use one of them".into()]),
             (_, true) => {
                 let curve = Curve::new(self.pressure.clone(), Variable::D)?;
-                Ok(FormulaLaw::Penetration(PenetrationLaw(StoringCurve::new(curve)?)))
+                Ok(FormulaLaw::Penetration(Box::new(PenetrationLaw(StoringCurve::new(curve)?))))
             }
-            (_, false) => Curve::new(self.pressure.clone(), Variable::V).map(FormulaLaw::Velocity),
+            (_, false) => {
+                Curve::new(self.pressure.clone(), Variable::V).map(Box::new).map(FormulaLaw::Velocity)
+            }
         }
     }
 }
@@ -112,8 +113,14 @@ impl NormalParameters for PressureFormula {
 macro_rules! each_form {
     ($family:ident, $chosen:expr, $bound:ident => $what:expr) => {
         match $chosen {
-            $family::Velocity($bound) => $what,
-            $family::Penetration($bound) => $what,
+            $family::Velocity(law) => {
+                let $bound = &**law;
+                $what
+            }
+            $family::Penetration(law) => {
+                let $bound = &**law;
+                $what
+            }
         }
     };
 }

@@ -17,14 +17,13 @@ use super::{
 use crate::{
     laws::{
         expression::{Enclosure, Formula, Interval, OfCreep, REACH, Supremum, Unproven, Variable},
-        law::{LawFault, increasing_root},
+        law::{Derived, LawFault, increasing_root},
         material::{Elastic, Elasticity, Hypothesis, Isotropic},
     },
     linear_algebra::tensor::{Mandel, von_mises},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::sync::OnceLock;
 
 /// Creep at a rate that is a formula: the equivalent creep strain e grows at this rate, in the direction of the stress deviator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,7 +37,7 @@ pub struct CreepFormula {
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 5e7)]
     pub reference_stress: f64,
     #[serde(skip)]
-    bounds: OnceLock<Vec<[f64; 2]>>,
+    bounds: Derived<Vec<[f64; 2]>>,
 }
 
 impl<N> InPlaces<N> for CreepFormula {
@@ -69,7 +68,7 @@ impl Parameters for CreepFormula {
 impl CreepFormula {
     /// For each level the largest derivative of the rate by the stress, and that of its decrease by the strain, up to this stress.
     fn bounds(&self) -> &[[f64; 2]] {
-        self.bounds.get_or_init(|| {
+        self.bounds.get(|| {
             let strains = (Variable::E, Interval::new(0.0, REACH));
             let (mut low, mut most) = (0.0, [0.0_f64; 2]);
             let level = |level: i32| {
@@ -264,7 +263,7 @@ mod tests {
 
     fn written(rate: &str) -> CreepFormula {
         let rate = Formula::parse(rate).expect("a formula");
-        CreepFormula { rate, reference_stress: 10.0, bounds: OnceLock::new() }
+        CreepFormula { rate, reference_stress: 10.0, bounds: Derived::default() }
     }
 
     fn check<const S: usize>(hypothesis: Hypothesis) {
