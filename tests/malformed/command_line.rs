@@ -51,7 +51,7 @@ const REFUSED: &[(&[&str], &[&str])] = &[
     (&["check", "JOB", "--set", "mesh={file='/dev/zero'}"], &["/dev/zero: it is a device or a pipe"]),
     (&["check", "nowhere.toml", "--json"], &["cannot read nowhere.toml"]),
     (&["describe", "contat"], &["did you mean `contact`?"]),
-    (&["describe", "poisson_ratio"], &["try solver describe material.elasticity.poisson_ratio"]),
+    (&["describe", "viscoscity"], &["no table of a job is called `viscoscity`"]),
     (&["describe", "--json", "--markdown"], &["cannot be used with"]),
     (&["describe", "time", "--markdown"], &["print all keys"]),
     (&["describe", "study.norm", "--json"], &["print all keys"]),

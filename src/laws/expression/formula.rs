@@ -147,7 +147,10 @@ fn whole(ranges: &[(Variable, Interval)]) -> Ranges {
 
 impl<S: Scope> Serialize for Formula<S> {
     fn serialize<T: Serializer>(&self, serializer: T) -> Result<T::Ok, T::Error> {
-        serializer.serialize_str(self.text())
+        match self.text().parse::<f64>() {
+            Ok(number) => serializer.serialize_f64(number),
+            Err(_) => serializer.serialize_str(self.text()),
+        }
     }
 }
 
