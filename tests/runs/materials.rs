@@ -20,7 +20,10 @@ const LAWS: [(&str, &str); 8] = [
         "{ norton = { rate = 0.01, reference_stress = 9, exponent = 3, hardening_strain = 0.02, \
          hardening_exponent = 2 } }",
     ),
-    ("hardening creep by a formula", "{ expression = { rate = '0.01*(q/9)^3/(1 + e/0.02)', reference_stress = 9 } }"),
+    (
+        "hardening creep by a formula",
+        "{ expression = { rate = '0.01*(q/9)^3/(1 + e/0.02)', reference_stress = 9 } }",
+    ),
     ("maxwell", "{ maxwell = { relaxation_time = 0.4, volumetric_relaxation_time = 3 } }"),
     ("drucker prager", "{ drucker_prager = { relaxation = 100, friction_coefficient = 0.5, cohesion = 4 } }"),
 ];

@@ -16,6 +16,9 @@ const GAUSS: [[f64; 2]; 5] = [
 
 /// Integrals are exact up to this share of that of the absolute value, about the rounding of values.
 const EXACT: f64 = 1e-13;
+/// Length of the first part in m, and ratio of the lengths of parts.
+const NEAREST: f64 = 1e-12;
+const GROWTH: f64 = 4.0;
 /// Halvings of a part.
 const DEPTH: usize = 10;
 
@@ -29,31 +32,35 @@ fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
     [sum[0] * half, sum[1] * half.abs()]
 }
 
-/// The same by halves, until they agree.
-fn adaptive(function: &dyn Fn(f64) -> f64, [a, b]: [f64; 2], whole: [f64; 2], depth: usize) -> f64 {
+/// The integral over a part with this integral by ten points, by halves until they agree within `slack`.
+fn adaptive(
+    function: &dyn Fn(f64) -> f64,
+    [a, b]: [f64; 2],
+    whole: f64,
+    (slack, depth): (f64, usize),
+) -> f64 {
     let middle = 0.5 * (a + b);
-    let halves = [gauss(function, a, middle), gauss(function, middle, b)];
-    let sum = halves[0][0] + halves[1][0];
-    if depth == 0 || (sum - whole[0]).abs() <= EXACT * (halves[0][1] + halves[1][1]) {
+    let halves = [gauss(function, a, middle), gauss(function, middle, b)].map(|[sum, _]| sum);
+    let sum = halves[0] + halves[1];
+    if depth == 0 || (sum - whole).abs() <= slack {
         return sum;
     }
-    adaptive(function, [a, middle], halves[0], depth - 1)
-        + adaptive(function, [middle, b], halves[1], depth - 1)
+    let next = (slack, depth - 1);
+    adaptive(function, [a, middle], halves[0], next) + adaptive(function, [middle, b], halves[1], next)
 }
 
 /// The integral from `a` to `b` in parts that grow with the distance from `a`, so that no scale is missed.
 fn integral(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
-    const NEAREST: f64 = 1e-12;
-    let (mut sum, mut from) = (0.0, a);
-    let mut reach = NEAREST.max(f64::EPSILON * a.abs());
-    while from != b {
-        let is_last = reach >= (b - a).abs();
-        let to = if is_last { b } else { a + reach.copysign(b - a) };
-        sum += adaptive(function, [from, to], gauss(function, from, to), DEPTH);
+    let nearest = NEAREST.max(f64::EPSILON * a.abs());
+    let ends = std::iter::successors(Some(nearest), |reach| Some(GROWTH * reach));
+    let inner = ends.take_while(|reach| *reach < (b - a).abs()).map(|reach| a + reach.copysign(b - a));
+    let (mut from, mut parts) = (a, Vec::new());
+    for to in inner.chain([b]) {
+        parts.push(([from, to], gauss(function, from, to)));
         from = to;
-        reach *= 8.0;
     }
-    sum
+    let slack = EXACT * parts.iter().map(|(_, [_, size])| size).sum::<f64>();
+    parts.into_iter().map(|(part, [sum, _])| adaptive(function, part, sum, (slack, DEPTH))).sum()
 }
 
 /// A curve over the penetration in m, with its potential.
@@ -144,8 +151,10 @@ impl StoringGraph for StoringCurve {
         }
         // On one branch the derivative is an integral, too, without the rounding of a difference.
         let at = |share: f64| self.curve.on_branch(branch, before + share * advance);
-        let mean =
-            |function: &dyn Fn(f64) -> f64| adaptive(function, [0.0, 1.0], gauss(function, 0.0, 1.0), DEPTH);
+        let mean = |function: &dyn Fn(f64) -> f64| {
+            let [sum, size] = gauss(function, 0.0, 1.0);
+            adaptive(function, [0.0, 1.0], sum, (EXACT * size, DEPTH))
+        };
         [mean(&|share| at(share)[0]), mean(&|share| share * at(share)[1])]
     }
 }
