@@ -210,7 +210,7 @@ fn numbers(root: &serde_json::Value, schema: &serde_json::Value, path: &str, key
 }
 
 /// Jobs with the keys of numbers that no job of the repository has.
-const RARE: [&str; 3] = [
+const RARE: [&str; 4] = [
     r#"
 [mesh.box]
 corner = [1, 2, 3]
@@ -321,6 +321,20 @@ step = 0.25
 [output]
 profile = [{ on = "top" }]
 profiles = { at = [0.5] }
+"#,
+    r#"
+[mesh]
+file = "any.msh"
+scale = 0.5
+rotate = { angle = 30, axis = [0, 1, 2] }
+translate = [1, 2, 3]
+[material]
+density = 1
+elasticity = { youngs_modulus = 2, poisson_ratio = 0.25 }
+viscoplasticity.expression = { rate = 0, reference_stress = 5 }
+[time]
+end = 1
+step = 0.25
 "#,
 ];
 
