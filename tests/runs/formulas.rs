@@ -72,3 +72,28 @@ fn nortons_law_written_as_a_formula_gives_the_same_answer_under_every_scheme() {
         assert_same_answer(&wanted.results(), &found.results(), 1e-9, scheme);
     }
 }
+
+#[test]
+fn steps_end_where_a_coefficient_switches() {
+    let case = Case::of("viscous_brake")
+        .set("contact.0.friction", "{ expression = { coefficient = '0.2 + 0.3*step(t - 0.0503)' } }")
+        .set("time.step", "0.01");
+    let results = case.run(1);
+    let times = results.table("history.csv").numbers("time");
+    assert!(times.iter().any(|time| (time - 0.0503).abs() < 1e-12), "{times:?}");
+    let velocity = results.table("probes.csv").last("velocity_x");
+    let expected = 1.0 - 9.81 * (0.2 * 0.0503 + 0.5 * (0.2 - 0.0503));
+    assert!((velocity / expected - 1.0).abs() < 2e-3, "{velocity} instead of {expected}");
+}
+
+#[test]
+fn a_pressure_with_an_infinite_slope_brakes_a_column() {
+    let case = Case::of("thinning_foundation")
+        .set("contact.0.normal", "{ expression = { pressure = '20*sqrt(max(v, 0))' } }")
+        .set("time.end", "2.0")
+        .set("time.step", "0.02");
+    let results = case.run(2);
+    let velocity = results.table("probes.csv").last("velocity_y");
+    assert!((velocity + 0.25).abs() < 1e-4, "10 Pa at {velocity} m/s");
+    assert!(results.number("max_energy_imbalance") < 1e-10);
+}

@@ -1,7 +1,8 @@
-//! Numbers that may be expressions in t, x, y, z.
+//! Numbers that may be expressions in t, x, y, z, and laws that are formulas in variables of their own.
 //!
 //! An expression is compiled once to a short program for a stack machine, so that it can be evaluated at every
-//! node and step, by any thread.
+//! node and step, by any thread. The same program runs on several machines: for values, the pieces that determine them, derivatives,
+//! enclosures over ranges of the variables, from which bounds of a law are proven, and times at which it switches.
 
 mod analysis;
 mod breakpoints;
