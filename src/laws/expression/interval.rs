@@ -108,9 +108,13 @@ impl Interval {
         if high <= 0.0 { Self { high: wide.high.min(0.0), ..wide } } else { wide }
     }
 
-    /// The values of an increasing function of the mathematical library, which lie between `least` and `most`.
+    /// The values of an increasing function of the mathematical library, which lie between `least` and `most`; its value at 0 is exact.
     fn increasing(self, function: fn(f64) -> f64, [least, most]: [f64; 2]) -> Self {
-        let wide = self.outward(function(self.low), function(self.high), 4);
+        let (low, high, at_zero) = (function(self.low), function(self.high), function(0.0));
+        let wide = self.outward(low, high, 4);
+        // Rounding passes neither the value at 0 nor the limits.
+        let least = if self.low >= 0.0 { least.max(at_zero) } else { least };
+        let most = if self.high <= 0.0 { most.min(at_zero) } else { most };
         Self { low: wide.low.max(least), high: wide.high.min(most), ..wide }
     }
 
@@ -145,7 +149,10 @@ impl Interval {
         }
         let [a, b] = [self.low, self.high].map(|end| end.powf(exponent));
         if exponent % 2.0 != 0.0 {
-            return self.outward(a, b, 4);
+            let wide = self.outward(a, b, 4);
+            let low = if self.low >= 0.0 { wide.low.max(0.0) } else { wide.low };
+            let high = if self.high <= 0.0 { wide.high.min(0.0) } else { wide.high };
+            return Self { low, high, ..wide };
         }
         let least = if self.contains(0.0) { 0.0 } else { a.min(b) };
         let wide = self.outward(least, a.max(b), 4);
@@ -343,7 +350,7 @@ impl Real for Interval {
 
     fn acos(self) -> Self {
         self.within(-1.0, 1.0)
-            .map_or(Self::NOTHING_KNOWN, |part| (-part).increasing(|x| (-x).acos(), [0.0, 4.0]))
+            .map_or(Self::NOTHING_KNOWN, |part| part.outward(part.high.acos(), part.low.acos(), 4))
     }
 
     fn atan(self) -> Self {

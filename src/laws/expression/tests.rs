@@ -307,6 +307,17 @@ fn suprema_are_sharp_to_a_per_cent_and_never_too_small() {
         let share = fall(wave, -REACH) / steepest;
         assert!((1.0..1.011).contains(&share), "{wave}: {share}");
     }
+    for text in ["sinh(v)", "v^3", "tanh(v)", "asin(v)", "cbrt(v)", "v/1e-3", "tan(v)"] {
+        let tiny = [
+            &[(Variable::V, Interval::new(0.0, 1e-300))][..],
+            &[(Variable::V, Interval::new(5e-324, 1e-300))][..],
+        ];
+        for range in tiny {
+            assert!(formula(text).enclose(range, Variable::V).value.low >= 0.0, "{text}");
+        }
+    }
+    let right_angle = formula("acos(v)").enclose(&[(Variable::V, Interval::from(0.0))], Variable::V).value;
+    assert!(right_angle.low < right_angle.high && right_angle.contains(std::f64::consts::FRAC_PI_2));
     assert_eq!(formula("10*v^0").differentiate(&[(Variable::V, 0.0)], Variable::V), [10.0, 0.0]);
     assert!((fall("v^3 + 0.1*sin(20*v)", 0.0) / 2.0 - 0.97).abs() < 0.04, "beside slopes of 1e60");
     assert!((fall("2*exp(-v/0.5)", 0.0) / 4.0 - 1.0).abs() < 0.011);

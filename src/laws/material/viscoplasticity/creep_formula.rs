@@ -122,9 +122,12 @@ impl CreepFormula {
                 "let it fall with e, or use [material.damage]",
             ),
         ];
-        for (found, wrong, help) in conditions {
+        // Beyond the rounding of a rate, and of its derivatives by stress and strain, of the size at the reference stress.
+        let rate = self.at(self.reference_stress, 0.0)[0].abs();
+        let scales = [rate, rate / self.reference_stress, rate];
+        for ((found, wrong, help), scale) in conditions.into_iter().zip(scales) {
             match found {
-                Ok(Supremum { bound, place }) if bound > 0.0 => {
+                Ok(Supremum { bound, place }) if bound > ROUNDING * scale => {
                     let place = self.rate.at(&place);
                     let near = if place.is_empty() { String::new() } else { format!(" near {place}") };
                     return Some([format!("the rate {wrong}{near}"), help.into()]);
@@ -152,6 +155,8 @@ impl CreepFormula {
     }
 }
 
+/// Share of a rate that is rounding.
+const ROUNDING: f64 = 1e-12;
 /// Largest size of a logarithm.
 const LARGEST: f64 = 690.0;
 
@@ -360,6 +365,14 @@ mod tests {
             let fault = written(text).fault().expect(text);
             assert!(fault.message.contains(message) && fault.help.contains(help), "{text}: {fault:?}");
         }
-        assert_eq!(written("1e-3*sinh(q/20)^4*exp(-e/0.1)").fault(), None);
+        for text in [
+            "1e-3*sinh(q/20)^4*exp(-e/0.1)",
+            "exp(q/5) - 1",
+            "1e-3*sinh(q/2)",
+            "8.5e-4*(q/1e-3)^2/(1 + e/0.1)",
+            "q^1.5",
+        ] {
+            assert_eq!(written(text).fault(), None, "{text}");
+        }
     }
 }
