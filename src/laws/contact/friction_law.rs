@@ -45,6 +45,11 @@ pub struct SlidingContext {
 }
 
 impl SlidingContext {
+    /// A step without length from a history of 0, at time 0 and the origin.
+    #[cfg(test)]
+    pub(super) const FIRST: Self =
+        Self { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] };
+
     /// The same beside a held part of the sliding velocity with this speed in m/s.
     pub fn beside(self, held: f64) -> Self {
         Self { held, ..self }

@@ -211,15 +211,6 @@ mod tests {
         }
     }
 
-    const FIRST: SlidingContext = SlidingContext {
-        history: 0.0,
-        step_length: 0.0,
-        is_blended: false,
-        held: 0.0,
-        time: 0.0,
-        place: [0.0; 3],
-    };
-
     fn any_law() -> impl Strategy<Value = FrictionLaw> {
         let weakening =
             (0.0f64..1.0, 0.0f64..1.0, 0.01f64..2.0).prop_map(|(dynamic, more, decay_velocity)| {
@@ -235,12 +226,15 @@ mod tests {
     #[test]
     fn beside_a_held_part_of_4_a_free_part_of_3_has_three_fifths_of_the_bound() {
         let coulomb = FrictionLaw::Coulomb(Coulomb { coefficient: 0.5 });
-        let found = coulomb.resolve_beside(9.0, 2.0, 10.0, FIRST.beside(4.0));
+        let found = coulomb.resolve_beside(9.0, 2.0, 10.0, SlidingContext::FIRST.beside(4.0));
         assert!((found.speed - 3.0).abs() < 1e-14 && (found.traction - 3.0).abs() < 1e-14, "{found:?}");
         // The slope of 5 v / hypot(v, 4).
         assert!((found.slope - 5.0 * 16.0 / 125.0).abs() < 1e-14 && (found.coefficient - 0.3).abs() < 1e-15);
-        assert_eq!(coulomb.resolve_beside(4.0, 2.0, 10.0, FIRST), coulomb.resolve(4.0, 2.0, 10.0, FIRST));
-        let rest = coulomb.resolve_beside(0.0, 2.0, 10.0, FIRST.beside(4.0));
+        assert_eq!(
+            coulomb.resolve_beside(4.0, 2.0, 10.0, SlidingContext::FIRST),
+            coulomb.resolve(4.0, 2.0, 10.0, SlidingContext::FIRST)
+        );
+        let rest = coulomb.resolve_beside(0.0, 2.0, 10.0, SlidingContext::FIRST.beside(4.0));
         assert_eq!((rest.speed, rest.traction, rest.slope), (0.0, 0.0, 1.25));
     }
 
@@ -248,14 +242,14 @@ mod tests {
         #[test]
         fn laws_conform(law in any_law(), pressure in -1.0f64..5.0, speed in 0.001f64..3.0, other in 0.0f64..3.0) {
             let h = 1e-6;
-            let by_value = (law.bound(speed + h, pressure, FIRST) - law.bound(speed - h, pressure, FIRST)) / (2.0 * h);
-            prop_assert!((by_value - law.slope(speed, pressure, FIRST)).abs() < 1e-4 * (1.0 + law.steepest_decrease(FIRST)));
-            let rise = (law.bound(speed, pressure, FIRST) - law.bound(other, pressure, FIRST)) * (speed - other);
-            let fall = law.steepest_decrease(FIRST) * pressure.max(0.0);
+            let by_value = (law.bound(speed + h, pressure, SlidingContext::FIRST) - law.bound(speed - h, pressure, SlidingContext::FIRST)) / (2.0 * h);
+            prop_assert!((by_value - law.slope(speed, pressure, SlidingContext::FIRST)).abs() < 1e-4 * (1.0 + law.steepest_decrease(SlidingContext::FIRST)));
+            let rise = (law.bound(speed, pressure, SlidingContext::FIRST) - law.bound(other, pressure, SlidingContext::FIRST)) * (speed - other);
+            let fall = law.steepest_decrease(SlidingContext::FIRST) * pressure.max(0.0);
             prop_assert!(rise <= 1e-15 && rise >= -fall * (speed - other) * (speed - other) - 1e-12);
             if law.follows_pressure() && pressure.abs() > 1e-5 {
-                let by_pressure = (law.bound(speed, pressure + h, FIRST) - law.bound(speed, pressure - h, FIRST)) / (2.0 * h);
-                let known = if pressure > 0.0 { law.coefficient(speed, FIRST) } else { 0.0 };
+                let by_pressure = (law.bound(speed, pressure + h, SlidingContext::FIRST) - law.bound(speed, pressure - h, SlidingContext::FIRST)) / (2.0 * h);
+                let known = if pressure > 0.0 { law.coefficient(speed, SlidingContext::FIRST) } else { 0.0 };
                 prop_assert!((by_pressure - known).abs() < 1e-7);
             }
         }
@@ -265,22 +259,22 @@ mod tests {
             law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0, held in -6.0f64..1.0,
         ) {
             let held = 10f64.powf(held);
-            let c = more * law.steepest_decrease(FIRST) * pressure.max(0.0) + 0.1;
-            let found = law.resolve_beside(s, c, pressure, FIRST.beside(held));
+            let c = more * law.steepest_decrease(SlidingContext::FIRST) * pressure.max(0.0) + 0.1;
+            let found = law.resolve_beside(s, c, pressure, SlidingContext::FIRST.beside(held));
             prop_assert!((c * found.speed + found.traction - s).abs() < 1e-12 * (1.0 + s));
             let whole = found.speed.hypot(held);
-            prop_assert!((found.traction - law.bound(whole, pressure, FIRST) * found.speed / whole).abs() < 1e-12 * (1.0 + s));
+            prop_assert!((found.traction - law.bound(whole, pressure, SlidingContext::FIRST) * found.speed / whole).abs() < 1e-12 * (1.0 + s));
             let slope = 1.0 / found.derivative - c;
             prop_assert!(found.derivative == 0.0 || (slope - found.slope).abs() < 1e-9 * (c + slope.abs()));
             let free_part = |speed: f64| {
                 let whole = speed.hypot(held);
-                law.bound(whole, pressure, FIRST) * speed / whole
+                law.bound(whole, pressure, SlidingContext::FIRST) * speed / whole
             };
             let h = 1e-5 * whole;
             let quotient = (free_part(found.speed + h) - free_part(found.speed - h)) / (2.0 * h);
-            let size = law.bound(0.0, pressure, FIRST) / whole + law.steepest_decrease(FIRST) * pressure.max(0.0);
+            let size = law.bound(0.0, pressure, SlidingContext::FIRST) / whole + law.steepest_decrease(SlidingContext::FIRST) * pressure.max(0.0);
             prop_assert!(found.derivative == 0.0 || (quotient - found.slope).abs() <= 1e-6 * size, "{quotient} {found:?}");
-            let known = if pressure > 0.0 { law.coefficient(whole, FIRST) * found.speed / whole } else { 0.0 };
+            let known = if pressure > 0.0 { law.coefficient(whole, SlidingContext::FIRST) * found.speed / whole } else { 0.0 };
             prop_assert!(found.derivative == 0.0 || (found.coefficient - known).abs() <= 1e-12 * known);
         }
 
@@ -288,17 +282,17 @@ mod tests {
         fn the_resolvent_finds_every_point_of_the_graph(
             law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0,
         ) {
-            let c = more * law.steepest_decrease(FIRST) * pressure.max(0.0) + 0.1;
-            let found = law.resolve(s, c, pressure, FIRST);
+            let c = more * law.steepest_decrease(SlidingContext::FIRST) * pressure.max(0.0) + 0.1;
+            let found = law.resolve(s, c, pressure, SlidingContext::FIRST);
             prop_assert!((c * found.speed + found.traction - s).abs() < 1e-13 * (1.0 + s));
             if found.speed > 0.0 {
-                prop_assert!((found.traction - law.bound(found.speed, pressure, FIRST)).abs() < 1e-12 * (1.0 + s));
+                prop_assert!((found.traction - law.bound(found.speed, pressure, SlidingContext::FIRST)).abs() < 1e-12 * (1.0 + s));
             } else {
-                prop_assert!(found.traction <= law.bound(0.0, pressure, FIRST));
+                prop_assert!(found.traction <= law.bound(0.0, pressure, SlidingContext::FIRST));
             }
             let h = 1e-6 * (1.0 + s);
             if s > h {
-                let (above, below) = (law.resolve(s + h, c, pressure, FIRST), law.resolve(s - h, c, pressure, FIRST));
+                let (above, below) = (law.resolve(s + h, c, pressure, SlidingContext::FIRST), law.resolve(s - h, c, pressure, SlidingContext::FIRST));
                 if (above.derivative == 0.0) == (below.derivative == 0.0) {
                     let quotient = (above.speed - below.speed) / (2.0 * h);
                     prop_assert!((quotient - found.derivative).abs() < 1e-3 * (found.derivative + 1e-6 / c));

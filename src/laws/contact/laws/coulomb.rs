@@ -23,31 +23,28 @@ impl FrictionBound for Coulomb {
 mod tests {
     use super::*;
 
-    const FIRST: SlidingContext = SlidingContext {
-        history: 0.0,
-        step_length: 0.0,
-        is_blended: false,
-        held: 0.0,
-        time: 0.0,
-        place: [0.0; 3],
-    };
-
     #[test]
     fn the_bound_is_proportional_to_the_pressure() {
         let coulomb = Coulomb { coefficient: 0.3 };
-        assert_eq!([coulomb.bound(1.0, 10.0, FIRST), coulomb.bound(0.0, -10.0, FIRST)], [3.0, 0.0]);
+        assert_eq!(
+            [
+                coulomb.bound(1.0, 10.0, SlidingContext::FIRST),
+                coulomb.bound(0.0, -10.0, SlidingContext::FIRST)
+            ],
+            [3.0, 0.0]
+        );
     }
 
     #[test]
     fn below_the_bound_a_point_sticks_and_above_it_slides() {
         let coulomb = Coulomb { coefficient: 0.5 };
-        let stuck = coulomb.resolve(4.9, 2.0, 10.0, FIRST);
+        let stuck = coulomb.resolve(4.9, 2.0, 10.0, SlidingContext::FIRST);
         assert_eq!((stuck.speed, stuck.traction, stuck.derivative), (0.0, 4.9, 0.0));
-        let slides = coulomb.resolve(7.0, 2.0, 10.0, FIRST);
+        let slides = coulomb.resolve(7.0, 2.0, 10.0, SlidingContext::FIRST);
         assert_eq!((slides.speed, slides.traction, slides.derivative), (1.0, 5.0, 0.5));
         assert_eq!(slides.coefficient, 0.5);
-        let away = coulomb.resolve(7.0, 2.0, -1.0, FIRST);
+        let away = coulomb.resolve(7.0, 2.0, -1.0, SlidingContext::FIRST);
         assert_eq!((away.speed, away.traction, away.coefficient), (3.5, 0.0, 0.0));
-        assert_eq!(coulomb.resolve(0.0, 2.0, 0.0, FIRST).derivative, 0.5);
+        assert_eq!(coulomb.resolve(0.0, 2.0, 0.0, SlidingContext::FIRST).derivative, 0.5);
     }
 }

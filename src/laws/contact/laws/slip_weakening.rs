@@ -54,20 +54,13 @@ impl FrictionBound for SlipWeakening {
 mod tests {
     use super::*;
 
-    const FIRST: SlidingContext = SlidingContext {
-        history: 0.0,
-        step_length: 0.0,
-        is_blended: false,
-        held: 0.0,
-        time: 0.0,
-        place: [0.0; 3],
-    };
-
     #[test]
     fn the_coefficient_falls_by_hand() {
         let law = SlipWeakening { at_rest: 0.6, dynamic: 0.2, decay_velocity: 0.5 };
-        assert!((law.bound(0.0, 10.0, FIRST) - 6.0).abs() < 1e-15);
-        assert!((law.bound(0.5, 10.0, FIRST) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
-        assert!((law.steepest_decrease(FIRST) - 0.8).abs() < 1e-15);
+        assert!((law.bound(0.0, 10.0, SlidingContext::FIRST) - 6.0).abs() < 1e-15);
+        assert!(
+            (law.bound(0.5, 10.0, SlidingContext::FIRST) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14
+        );
+        assert!((law.steepest_decrease(SlidingContext::FIRST) - 0.8).abs() < 1e-15);
     }
 }

@@ -31,20 +31,11 @@ impl FrictionBound for Tresca {
 mod tests {
     use super::*;
 
-    const FIRST: SlidingContext = SlidingContext {
-        history: 0.0,
-        step_length: 0.0,
-        is_blended: false,
-        held: 0.0,
-        time: 0.0,
-        place: [0.0; 3],
-    };
-
     #[test]
     fn the_bound_is_the_given_one_whatever_the_pressure() {
         let law = Tresca { bound: 3.0 };
-        assert_eq!(FrictionBound::bound(&law, 7.0, -1.0, FIRST), 3.0);
-        let slides = law.resolve(7.0, 2.0, -1.0, FIRST);
+        assert_eq!(FrictionBound::bound(&law, 7.0, -1.0, SlidingContext::FIRST), 3.0);
+        let slides = law.resolve(7.0, 2.0, -1.0, SlidingContext::FIRST);
         assert_eq!((slides.speed, slides.traction, slides.coefficient), (2.0, 3.0, 0.0));
     }
 }

@@ -11,7 +11,7 @@
 
 use super::{
     flow::{Flow, InPlaces, Parameters},
-    release::{Release, WEIGHT},
+    release::{Release, WEIGHT, rate_along_deviator},
     tangent::{Tangent, add_product, write_isotropic},
 };
 use crate::{
@@ -198,12 +198,8 @@ impl Flow for Elastic<CreepFormula> {
     }
 
     fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
-        let norm = von_mises(s);
-        if norm == 0.0 {
-            return ([0.0; S], 0.0);
-        }
-        let growth = self.parameters.rate.value(&[(Variable::Q, norm), (Variable::E, accumulated)]);
-        (WEIGHT.apply(s).map(|w| growth / norm * w), growth)
+        let rate = |norm| self.parameters.rate.value(&[(Variable::Q, norm), (Variable::E, accumulated)]);
+        rate_along_deviator(s, rate)
     }
 
     fn flow_to_end<const S: usize>(

@@ -23,7 +23,7 @@
 
 use super::{
     flow::{Flow, InPlaces, Parameters},
-    release::{Release, WEIGHT},
+    release::{Release, WEIGHT, rate_along_deviator},
     tangent::{Tangent, add_product, write_isotropic},
 };
 use crate::{
@@ -171,12 +171,7 @@ impl Flow for Elastic<Norton> {
 
     #[inline]
     fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
-        let norm = von_mises(s);
-        if norm == 0.0 {
-            return ([0.0; S], 0.0);
-        }
-        let growth = self.growth(norm, accumulated);
-        (WEIGHT.apply(s).map(|w| growth / norm * w), growth)
+        rate_along_deviator(s, |norm| self.growth(norm, accumulated))
     }
 
     fn flow_to_end<const S: usize>(

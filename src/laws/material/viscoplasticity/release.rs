@@ -4,11 +4,25 @@
 
 use crate::{
     laws::material::Isotropic,
-    linear_algebra::tensor::{Mandel, normal_components, trace},
+    linear_algebra::tensor::{Mandel, normal_components, trace, von_mises},
 };
 
 /// `W`: the square of the von Mises norm is `s : W s`, also in the plane.
 pub(super) const WEIGHT: Isotropic = Isotropic { volumetric: -0.5, shear: 1.5 };
+
+/// The strain rate along the deviator of a stress, and its size, which is a function of the von Mises norm.
+#[inline]
+pub(super) fn rate_along_deviator<const S: usize>(
+    s: &Mandel<S>,
+    growth: impl FnOnce(f64) -> f64,
+) -> (Mandel<S>, f64) {
+    let norm = von_mises(s);
+    if norm == 0.0 {
+        return ([0.0; S], 0.0);
+    }
+    let growth = growth(norm);
+    (WEIGHT.apply(s).map(|w| growth / norm * w), growth)
+}
 
 /// A stress `s*` in a material.
 pub(super) struct Release {

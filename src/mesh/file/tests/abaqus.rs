@@ -305,21 +305,7 @@ proptest! {
     ) {
         let mut file = BARS.as_bytes().to_vec();
         if is_cut { file.truncate(length.index(file.len())); }
-        for (place, byte, kind) in damage {
-            if file.is_empty() { break; }
-            let at = place.index(file.len());
-            match kind {
-                0 => file[at] = byte,
-                1 => file[at] ^= 1 << (byte % 8),
-                2 => { file.remove(at); }
-                3 => file.insert(at, byte),
-                _ => file[at] = b"0123456789-. \n*,"[byte as usize % 16],
-            }
-        }
-        match parse(&file) {
-            Ok(AnyMesh::Two(mesh)) => drop(check::validate(&mesh, &Default::default()).unwrap()),
-            Ok(AnyMesh::Three(mesh)) => drop(check::validate(&mesh, &Default::default()).unwrap()),
-            Err(error) => prop_assert!(!error.to_string().is_empty()),
-        }
+        damage_file(&mut file, damage, b"0123456789-. \n*,");
+        assert_sound_or_refused(&file);
     }
 }

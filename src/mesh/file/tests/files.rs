@@ -228,22 +228,8 @@ proptest! {
         damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..5), 1..6),
     ) {
         let mut file = originals().swap_remove(which);
-        for (place, byte, kind) in damage {
-            if file.is_empty() { break; }
-            let at = place.index(file.len());
-            match kind {
-                0 => file[at] = byte,
-                1 => file[at] ^= 1 << (byte % 8),
-                2 => { file.remove(at); }
-                3 => file.insert(at, byte),
-                _ => file[at] = b"0123456789-. \n$"[byte as usize % 15],
-            }
-        }
-        match parse(&file) {
-            Ok(AnyMesh::Two(mesh)) => drop(check::validate(&mesh, &Tags::default()).unwrap()),
-            Ok(AnyMesh::Three(mesh)) => drop(check::validate(&mesh, &Tags::default()).unwrap()),
-            Err(error) => prop_assert!(!error.to_string().is_empty()),
-        }
+        damage_file(&mut file, damage, b"0123456789-. \n$");
+        assert_sound_or_refused(&file);
     }
 
     #[test]
