@@ -173,6 +173,7 @@ fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) ->
         nodes: mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect(),
         corners,
         normal: normal.map(|n| n / size),
+        turns: mesh.facets[facet as usize].map(|node| mesh.turn(&mesh.nodes[node as usize])),
     }
 }
 
@@ -199,6 +200,7 @@ fn gather_facets<const D: usize>(
             nodes: nodes.to_vec(),
             corners: std::array::from_fn(|a| std::array::from_fn(|i| values[a * D + i])),
             normal: std::array::from_fn(|i| values[D * D + i]),
+            turns: [1.0; D],
         })
         .collect())
 }

@@ -18,9 +18,10 @@ use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
 /// The force and the moment of one source on the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resultant<const D: usize> {
-    /// Force in N (N/m in the plane).
+    /// Force in N (N/m in the plane); of a body of revolution the sum of the radial forces all around, and the force along the axis.
     pub force: Vector<D>,
-    /// Moment about the origin at the initial positions of the nodes in N m; in the plane only the last component, in N.
+    /// Moment about the origin at the initial positions of the nodes in N m; in the plane only the last component, in N. That of forces
+    /// on a body of revolution vanishes.
     pub moment: Vector<3>,
 }
 
@@ -284,6 +285,7 @@ impl<const D: usize> Sums<'_, D> {
     /// Adds a force and a moment.
     fn put(&mut self, source: Source, force: &Vector<D>, moment: &Vector<3>) {
         let Some(at) = self.sources.iter().position(|known| *known == source) else { return };
+        let moment = if self.mesh.is_revolved { &[0.0; 3] } else { moment };
         let values = &mut self.values[at * Resultant::<D>::WIDTH..][..Resultant::<D>::WIDTH];
         values.iter_mut().zip(force.iter().chain(moment)).for_each(|(sum, value)| *sum += value);
     }

@@ -4,8 +4,10 @@ use super::document::{
     Contact, Job, Method, check_contact, check_contact_names, check_material, check_material_in_body,
 };
 use super::findings::{MeshNames, Table, number_of_group};
+use crate::laws::contact::Gap;
+use crate::laws::expression::Scalar;
 use crate::laws::law::header;
-use crate::laws::material::Material;
+use crate::laws::material::{Hypothesis, Material};
 
 impl Job {
     /// All materials with their paths: the main one, then those of the regions.
@@ -86,11 +88,44 @@ pub(super) fn check_names(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>)
 fn check_hypothesis(job: &Job, table: &mut Table<'_>, dimension: usize) {
     let is_given = job.material.hypothesis.is_some();
     if dimension == 2 && !is_given {
-        let help = "add hypothesis = \"plane_stress\" or \"plane_strain\" to [material]";
+        let help = "add hypothesis = \"plane_stress\", \"plane_strain\" or \"axisymmetric\" to [material]";
         table.fault("material", "a 2D body needs a hypothesis", help);
     }
     if dimension == 3 && is_given {
         table.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
+    }
+    if job.material.hypothesis == Some(Hypothesis::Axisymmetric) {
+        check_revolved(job, table);
+    }
+}
+
+/// What acts on a body of revolution acts in its section, and all around alike.
+fn check_revolved(job: &Job, table: &mut Table<'_>) {
+    let mut refuse = |key: String, message: &str, help: &str| table.fault(&key, message, help);
+    if job
+        .gravity
+        .as_ref()
+        .and_then(|gravity| gravity.acceleration.first())
+        .is_some_and(|x| *x != Scalar::default())
+    {
+        let message = "the weight of a body of revolution acts along its axis, y";
+        refuse("gravity.acceleration".into(), message, "give 0 as the first component");
+    }
+    for (number, contact) in job.contact.iter().enumerate() {
+        let path = |key: &str| format!("contact.{number}.{key}");
+        let turning = "an obstacle beside a body of revolution does not turn in its section";
+        if let Some(key) = contact.obstacle.as_ref().and_then(Gap::rotation_key) {
+            refuse(path(&key), turning, "delete this key");
+        }
+        let Some(load) = &contact.obstacle_load else { continue };
+        if load.direction.first().is_some_and(|x| *x != 0.0) {
+            let help = "give a direction along the axis, such as [0, -1]";
+            let message = "an obstacle beside a body of revolution is moved along the axis, y";
+            refuse(path("obstacle_load.direction"), message, help);
+        }
+        if load.moment.is_some() {
+            refuse(path("obstacle_load.moment"), turning, "delete this key");
+        }
     }
 }
 

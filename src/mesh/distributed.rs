@@ -49,6 +49,9 @@ pub struct Mesh<const D: usize> {
     pub midsides: Vec<u32>,
     /// Whether cells are curved: nodes on edges are not at the midpoints.
     pub is_curved: bool,
+    /// Whether the mesh is one half of a section through the axis of a body of revolution: x is the radius, y the axis. Integrals are
+    /// then those over the whole turn.
+    pub is_revolved: bool,
     /// Nodes over all ranks that are corners of cells. Their original ids are below this number; those of nodes on edges are not.
     pub corner_nodes: usize,
     /// Original ids of the cells, ascending.
@@ -83,6 +86,17 @@ impl<const D: usize> Mesh<D> {
     /// Cells of this rank.
     pub fn cell_count(&self) -> usize {
         self.cell_ids.len()
+    }
+
+    /// How much of the body lies at a place of the mesh: 1, or the circumference in m of the circle through the place around the axis.
+    #[inline(always)]
+    pub fn turn(&self, place: &Vector<D>) -> f64 {
+        if self.is_revolved { std::f64::consts::TAU * place[0] } else { 1.0 }
+    }
+
+    /// Whether a place is on the axis of a body of revolution.
+    pub fn is_on_axis(&self, place: &Vector<D>) -> bool {
+        self.is_revolved && place[0] == 0.0
     }
 
     /// Memory of the part of this rank in bytes.

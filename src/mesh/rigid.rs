@@ -151,7 +151,7 @@ pub(super) fn absent<const D: usize>() -> Vec<Motion> {
     if D == 2 { [2, 3, 4].map(unit).to_vec() } else { Vec::new() }
 }
 
-fn unit(axis: usize) -> Motion {
+pub(super) fn unit(axis: usize) -> Motion {
     std::array::from_fn(|i| (i == axis) as u8 as f64)
 }
 

@@ -2,7 +2,7 @@
 
 use super::{
     Mesh,
-    rigid::{Motion, RigidBody, Skeleton, absent, extend},
+    rigid::{Motion, RigidBody, Skeleton, absent, extend, unit},
     shape::{centroid, signed_measure},
     surface::Bodies,
 };
@@ -72,6 +72,10 @@ fn skeleton<const D: usize>(
     for record in gather(session.world(), &records)?.chunks_exact(7) {
         let row = std::array::from_fn(|i| record[1 + i]);
         skeleton.bodies[record[0] as usize].rows.push(row);
+    }
+    if mesh.is_revolved {
+        // A body of revolution moves along its axis alone.
+        skeleton.bodies.iter_mut().for_each(|body| body.rows.extend([unit(0), unit(5)]));
     }
     if bodies.count > 1 {
         let joints = joints(session, mesh, &nodes)?;

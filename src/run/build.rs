@@ -42,7 +42,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let materials = Materials::new(session, job, &mesh)?;
     let geometry = Geometry::by_cells(&mesh, |cell| materials.of_cell(&mesh, cell));
     let mut state = session.agree(State::at_rest(&mesh))?;
-    let Supports { held, motion } = Supports::new(session, &mesh, &job.support, &state.velocity)?;
+    let Supports { held, motion } = Supports::of_body(session, &mesh, &job.support, &state.velocity)?;
     let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
     let load = load(job, &mesh, &materials.all);

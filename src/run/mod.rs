@@ -1,5 +1,6 @@
 //! Runs a job: builds only what the job contains, then takes the steps.
 
+mod axis;
 mod bonds;
 mod build;
 mod check;
@@ -52,7 +53,7 @@ macro_rules! on_the_mesh {
     ($session:ident, $loaded:ident, $module:ident::$function:ident $(, $more:expr)*) => {{
         let mut loaded = $loaded;
         match (Scene::of($session, &mut loaded)?, loaded.job.material.hypothesis) {
-            (Scene::Two(mesh), Some(Hypothesis::PlaneStrain)) => {
+            (Scene::Two(mesh), Some(Hypothesis::PlaneStrain | Hypothesis::Axisymmetric)) => {
                 $module::$function::<2, 4>($session, &loaded, mesh $(, $more)*)
             }
             (Scene::Two(mesh), _) => $module::$function::<2, 3>($session, &loaded, mesh $(, $more)*),

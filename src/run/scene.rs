@@ -1,6 +1,6 @@
 //! Each rank's part of a job's mesh, whether generated or read.
 
-use super::{memory::require_for_cells, validate::validate};
+use super::{axis::revolve, memory::require_for_cells, validate::validate};
 use crate::{
     error::{Error, Result, regular_file},
     fem::space::mortar::{Facet, contributions},
@@ -39,7 +39,7 @@ impl Scene {
     /// The mesh of a job, checked against the job; adds warnings about the mesh to those of the job. Collective.
     pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Self, Agreed> {
         let order = usize::from(loaded.job.mesh.order);
-        let scene = match &loaded.job.mesh.source {
+        let mut scene = match &loaded.job.mesh.source {
             MeshSource::Rectangle(of) => {
                 generated(session, blocks(of, rectangle), &loaded.job).map(Self::Two)?
             }
@@ -58,8 +58,11 @@ impl Scene {
                 scene
             }
         };
-        match &scene {
-            Self::Two(mesh) => validate(session, mesh, loaded)?,
+        match &mut scene {
+            Self::Two(mesh) => {
+                revolve(session, mesh, loaded)?;
+                validate(session, mesh, loaded)?;
+            }
             Self::Three(mesh) => validate(session, mesh, loaded)?,
         }
         Ok(scene)
@@ -90,7 +93,7 @@ fn facing_cells<const D: usize>(mesh: &GlobalMesh<D>, contacts: &[job::Contact])
         let corners = mesh.facet_corners(at);
         let normal = facet_normal(&corners);
         let size = norm(&normal);
-        Facet { nodes: mesh.facets[at].to_vec(), corners, normal: normal.map(|n| n / size) }
+        Facet { nodes: mesh.facets[at].to_vec(), corners, normal: normal.map(|n| n / size), turns: [1.0; D] }
     };
     let mut pairs = Vec::new();
     for contact in contacts {

@@ -1,9 +1,13 @@
 //! Memory traffic of the passes over the cells of a body.
 
 use super::Body;
-use crate::fem::{
-    effect::{Effect, Moment, Phases},
-    space::{Needs, Simplex},
+use crate::{
+    fem::{
+        effect::{Effect, Moment, Phases},
+        space::{Needs, SimplexPack},
+    },
+    linear_algebra::simd::LANES,
+    mesh::Mesh,
 };
 
 /// Bytes that each pass over the cells of this rank moves at the least, if nothing stays in cache between passes: connectivity,
@@ -21,8 +25,10 @@ pub struct PassBytes {
 impl PassBytes {
     /// Counts the passes of a step.
     pub fn of<const D: usize, const S: usize>(body: &Body<D, S>) -> Self {
-        let geometries = if body.mesh.is_curved { body.geometry.points() } else { 1 };
-        let cell = body.mesh.nodes_per_cell() * size_of::<u32>() + geometries * size_of::<Simplex<D>>();
+        let Mesh { is_curved, is_revolved, .. } = body.mesh;
+        let geometries = if is_curved || is_revolved { body.geometry.points() } else { 1 };
+        let geometry = size_of::<SimplexPack<D>>() / LANES;
+        let cell = body.mesh.nodes_per_cell() * size_of::<u32>() + geometries * geometry;
         let cells = body.mesh.cell_count() * cell;
         let field = body.mesh.nodes.len() * D * size_of::<f64>();
         // Histories, of each effect as far as `moved` says.
@@ -91,7 +97,6 @@ mod tests {
             space::Geometry,
         },
         laws::material::{ByMaterial, Elasticity, Hypothesis, Maxwell, Viscoplasticity},
-        mesh::Mesh,
     };
 
     /// Two triangles on four nodes.

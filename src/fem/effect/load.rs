@@ -150,11 +150,16 @@ fn forces_in_cells<const D: usize>(
             continue;
         }
         for (k, (place, weight)) in fine_cell_rule::<D>().iter().enumerate() {
-            let shares = values(D + 1, place);
+            let mut shares = values(D + 1, place);
+            if let CellShape::LinearRing(_) = cell.shape() {
+                shares[..=D].copy_from_slice(&place[..=D]);
+            }
             let coordinates = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]);
             let value = of_place(&point(coordinates, &shares))?;
             let weight = match cell.shape() {
-                CellShape::Curved(weights) => factor * weights[k][cell.lane()],
+                CellShape::Curved(weights) | CellShape::LinearRing(weights) => {
+                    factor * weights[k][cell.lane()]
+                }
                 _ => volume * weight,
             };
             scatter(&shares, weight, &value);

@@ -3,7 +3,7 @@
 use crate::{
     fem::space::{
         Batch, CellShape, MOST_NODES, MOST_POINTS, MassCoefficients, NodalPacks, OPPOSITE, SimplexPack,
-        cell_rule, edges, fine_cell_rule, values,
+        cell_rule, edges, fine_cell_rule, node_count, values,
     },
     laws::material::ByMaterial,
     linear_algebra::simd::{LANES, sum},
@@ -24,7 +24,13 @@ pub(super) fn add_to_batch<const D: usize, const S: usize>(
             add(factor, batch.cells, &batch.velocity, &mut batch.force);
         }
         CellShape::Straight => add_straight(factor, batch.cells, &batch.velocity, &mut batch.force),
-        CellShape::Curved(weights) => add_curved(factor, weights, &batch.velocity, &mut batch.force),
+        CellShape::Curved(weights) => {
+            let rule = (weights, node_count::<D>(), |at: &[f64; 4]| values(D + 1, at));
+            add_weighted(factor, rule, &batch.velocity, &mut batch.force);
+        }
+        CellShape::LinearRing(weights) => {
+            add_weighted(factor, (weights, D + 1, linear_values), &batch.velocity, &mut batch.force);
+        }
     }
 }
 
@@ -38,8 +44,19 @@ pub(super) fn square<const D: usize, const S: usize>(
         CellShape::Linear => square_linear(density, batch.cells, nodal),
         _ if batch.point > 0 => 0.0,
         CellShape::Straight => square_straight(density, batch.cells, nodal),
-        CellShape::Curved(weights) => square_curved(density, weights, nodal),
+        CellShape::Curved(weights) => {
+            let rule = (weights, node_count::<D>(), |at: &[f64; 4]| values(D + 1, at));
+            square_weighted(density, rule, nodal)
+        }
+        CellShape::LinearRing(weights) => square_weighted(density, (weights, D + 1, linear_values), nodal),
     }
+}
+
+/// The linear functions of the corners at a place, as [`values`] of all nodes.
+fn linear_values(place: &[f64; 4]) -> [f64; MOST_NODES] {
+    let mut out = [0.0; MOST_NODES];
+    out[..4].copy_from_slice(place);
+    out
 }
 
 /// Adds `factor * volume` times each nodal velocity and the sum of them all to the nodal forces.
@@ -121,18 +138,20 @@ fn times_straight<const D: usize>(nodal: &NodalPacks<D>, i: usize, lane: usize) 
     out
 }
 
-/// The mass matrix of a curved cell of density 1 times component `i` of nodal values.
+/// The weights of the points of the fine rule, the number of nodes, and the values of their functions at a place.
+type Weighted<'a, F> = (&'a [[f64; LANES]; MOST_POINTS], usize, F);
+
+/// The mass matrix of a cell of density 1 times component `i` of nodal values.
 #[inline(always)]
-fn times_curved<const D: usize>(
-    weights: &[[f64; LANES]; MOST_POINTS],
+fn times_weighted<const D: usize>(
+    (weights, nodes, values): Weighted<impl Fn(&[f64; 4]) -> [f64; MOST_NODES]>,
     nodal: &NodalPacks<D>,
     i: usize,
     lane: usize,
 ) -> [f64; MOST_NODES] {
-    let nodes = D + 1 + D * (D + 1) / 2;
     let mut out = [0.0; MOST_NODES];
     for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
-        let shares = values(D + 1, place);
+        let shares = values(place);
         let mut value = 0.0;
         for a in 0..nodes {
             value += shares[a] * nodal[a].0[i][lane];
@@ -179,33 +198,33 @@ fn square_straight<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal: 
     straight_factor::<D>(density) * sum(&integrals)
 }
 
-fn add_curved<const D: usize>(
+fn add_weighted<const D: usize>(
     factor: f64,
-    weights: &[[f64; LANES]; MOST_POINTS],
+    weighted: Weighted<impl Fn(&[f64; 4]) -> [f64; MOST_NODES] + Copy>,
     velocities: &NodalPacks<D>,
     forces: &mut NodalPacks<D>,
 ) {
     for i in 0..D {
         for lane in 0..LANES {
-            let momentum = times_curved(weights, velocities, i, lane);
-            for (force, momentum) in forces.iter_mut().zip(momentum) {
+            let momentum = times_weighted(weighted, velocities, i, lane);
+            for (force, momentum) in forces.iter_mut().zip(momentum).take(weighted.1) {
                 force.0[i][lane] += factor * momentum;
             }
         }
     }
 }
 
-fn square_curved<const D: usize>(
+fn square_weighted<const D: usize>(
     density: f64,
-    weights: &[[f64; LANES]; MOST_POINTS],
+    weighted: Weighted<impl Fn(&[f64; 4]) -> [f64; MOST_NODES] + Copy>,
     nodal: &NodalPacks<D>,
 ) -> f64 {
     let mut integrals = [0.0; LANES];
     for i in 0..D {
         for lane in 0..LANES {
-            let momentum = times_curved(weights, nodal, i, lane);
+            let momentum = times_weighted(weighted, nodal, i, lane);
             let products = momentum.iter().zip(nodal).map(|(m, value)| m * value.0[i][lane]);
-            integrals[lane] += products.take(D + 1 + D * (D + 1) / 2).sum::<f64>();
+            integrals[lane] += products.take(weighted.1).sum::<f64>();
         }
     }
     density * sum(&integrals)

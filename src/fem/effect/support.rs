@@ -28,9 +28,9 @@ pub struct Supports<const D: usize> {
     pub motion: Option<SupportMotion<D>>,
 }
 
-/// Directions at the nodes of a support.
+/// Directions at the nodes of a support, or of the axis of a body of revolution.
 struct Constraints<'a, const D: usize> {
-    support: &'a Support,
+    support: Option<&'a Support>,
     /// Owned nodes, ascending, each with its directions.
     nodes: Vec<(u32, Vec<Vector<D>>)>,
 }
@@ -68,14 +68,39 @@ struct Part<const D: usize> {
 }
 
 impl<const D: usize> Supports<D> {
-    /// The supports of a job; `layout` is a vector with ghosts. Refuses motions that contradict each other. Collective.
+    /// What holds the body of a job: its supports and, of a body of revolution, the axis. `layout` is a vector with ghosts. Refuses
+    /// motions that contradict each other. Collective.
+    pub fn of_body(
+        session: &Session,
+        mesh: &Mesh<D>,
+        supports: &[Support],
+        layout: &DistributedVector,
+    ) -> Result<Self> {
+        let mut constraints = constraints(session, mesh, supports)?;
+        let radial: Vector<D> = std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 });
+        let owned = mesh.nodes[..mesh.owned].iter().enumerate();
+        let on_axis = owned.filter(|(_, place)| mesh.is_on_axis(place));
+        let nodes = on_axis.map(|(node, _)| (node as u32, vec![radial])).collect();
+        constraints.push(Constraints { support: None, nodes });
+        Self::from(session, mesh, constraints, layout)
+    }
+
+    /// Supports of a job alone. Collective.
     pub fn new(
         session: &Session,
         mesh: &Mesh<D>,
         supports: &[Support],
         layout: &DistributedVector,
     ) -> Result<Self> {
-        let constraints = constraints(session, mesh, supports)?;
+        Self::from(session, mesh, constraints(session, mesh, supports)?, layout)
+    }
+
+    fn from(
+        session: &Session,
+        mesh: &Mesh<D>,
+        constraints: Vec<Constraints<'_, D>>,
+        layout: &DistributedVector,
+    ) -> Result<Self> {
         let mut of_node: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
         for (node, directions) in constraints.iter().flat_map(|constraints| &constraints.nodes) {
             of_node.entry(*node).or_default().extend(directions);
@@ -84,7 +109,7 @@ impl<const D: usize> Supports<D> {
         of_node.into_iter().for_each(|(node, directions)| held.hold(node, directions.into_iter()));
         hold_ghosts(session, mesh, &mut held, layout)?;
         let moves = |support: &Support| support.displacement.is_some() || support.velocity.is_some();
-        let motion = if supports.iter().any(moves) {
+        let motion = if constraints.iter().filter_map(|of| of.support).any(moves) {
             Some(session.agree(SupportMotion::new(mesh, &constraints))?)
         } else {
             None
@@ -147,7 +172,7 @@ fn constraints<'a, const D: usize>(
                 support.on.join(", ")
             ))));
         }
-        out.push(Constraints { support, nodes: nodes.into_iter().collect() });
+        out.push(Constraints { support: Some(support), nodes: nodes.into_iter().collect() });
     }
     Ok(out)
 }
@@ -201,11 +226,10 @@ impl<const D: usize> SupportMotion<D> {
         let mut values: Vec<Prescribed> = Vec::new();
         let mut moved: BTreeMap<u32, Vec<(Vector<D>, Option<usize>)>> = BTreeMap::new();
         for Constraints { support, nodes } in constraints {
-            let motion = match (&support.displacement, &support.velocity) {
-                (Some(displacement), _) => Some((displacement, true)),
-                (None, Some(velocity)) => Some((velocity, false)),
-                _ => None,
-            };
+            let motion = support.and_then(|support| {
+                let displacement = support.displacement.as_ref().map(|all| (all, true));
+                displacement.or(support.velocity.as_ref().map(|all| (all, false)))
+            });
             let numbers: Vec<usize> = motion
                 .iter()
                 .flat_map(|(list, is_displacement)| {

@@ -119,7 +119,7 @@ mod tests {
     use crate::{
         fem::space::{
             Geometry, Needs, Nodal,
-            samples::{number, quadratic, row},
+            samples::{number, quadratic, revolved, row},
         },
         mesh::Mesh,
     };
@@ -173,5 +173,8 @@ mod tests {
         check::<3, 6>(&quadratic(row(), 0.0), "tetrahedra");
         check::<2, 4>(&quadratic(row(), 0.03), "curved triangles");
         check::<3, 6>(&quadratic(row(), 0.03), "curved tetrahedra");
+        check::<2, 4>(&revolved(row()), "rings of linear triangles");
+        check::<2, 4>(&revolved(quadratic(row(), 0.0)), "rings of triangles");
+        check::<2, 4>(&revolved(quadratic(row(), 0.03)), "rings of curved triangles");
     }
 }

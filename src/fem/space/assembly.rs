@@ -2,7 +2,7 @@
 
 use super::{
     Cell, CellShape, Geometry, Held, Simplex,
-    quadratic::{MOST_NODES, MassCoefficients, derivatives, node_count, values},
+    quadratic::{MOST_NODES, MassCoefficients, derivatives, node_count, offsets, values},
     quadrature::{CellRule, cell_rule, fine_cell_rule},
 };
 use crate::{
@@ -33,14 +33,19 @@ struct Product {
     value: f64,
 }
 
-/// The products that do not vanish, integrated over a cell of volume 1.
-fn products<const D: usize>(rule: CellRule) -> Vec<Product> {
+/// The products that do not vanish, integrated over a cell of volume 1; with the values of the functions in a ring, see
+/// [`super::quadratic`].
+fn products<const D: usize>(rule: CellRule, is_ring: bool) -> Vec<Product> {
     let mut out = Vec::new();
     let all = |n: usize, m: usize| (0..n).flat_map(move |a| (0..m).map(move |b| [a, b]));
     for [a, b] in all(node_count::<D>(), node_count::<D>()) {
         for [c, d] in all(D + 1, D + 1) {
             let at = |(place, weight): &([f64; 4], f64)| {
-                weight * derivatives(D + 1, a, place)[c] * derivatives(D + 1, b, place)[d]
+                let offsets = if is_ring { offsets(D + 1, place) } else { [0.0; MOST_NODES] };
+                let slope = |node: usize, coordinate: usize| {
+                    derivatives(D + 1, node, place)[coordinate] + offsets[node]
+                };
+                weight * slope(a, c) * slope(b, d)
             };
             let value: f64 = rule.iter().map(at).sum();
             if value != 0.0 {
@@ -61,12 +66,12 @@ impl<const D: usize> CellMatrix<D> {
         let one = |point: usize| {
             let (rule, scale) = (&cell_rule::<D>()[point..=point], points as f64);
             let unweighted = |product: Product| Product { value: scale * product.value, ..product };
-            products::<D>(rule).into_iter().map(unweighted).collect()
+            products::<D>(rule, mesh.is_revolved).into_iter().map(unweighted).collect()
         };
         Self {
             blocks: [[[[0.0; D]; D]; _]; _],
             nodes,
-            products: if is_linear { Vec::new() } else { products::<D>(cell_rule::<D>()) },
+            products: if is_linear { Vec::new() } else { products::<D>(cell_rule::<D>(), mesh.is_revolved) },
             products_at: (0..points).map(one).collect(),
         }
     }
@@ -91,7 +96,9 @@ impl<const D: usize> CellMatrix<D> {
             blocks
         };
         match cell.shape() {
-            CellShape::Linear => add_linear(&mut self.blocks, &cell.point(0), volumetric, shear),
+            CellShape::Linear | CellShape::LinearRing(_) => {
+                add_linear(&mut self.blocks, &cell.point(0), volumetric, shear);
+            }
             CellShape::Straight => add_products(&mut self.blocks, &self.products, &linear(&cell.whole())),
             CellShape::Curved(_) => {
                 for (point, products) in self.products_at.iter().enumerate() {
@@ -117,6 +124,12 @@ impl<const D: usize> CellMatrix<D> {
                 for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
                     let (all, size) = (values(D + 1, place), factor * weights[cell.lane()]);
                     self.add_scalar(|a, b| size * all[a] * all[b]);
+                }
+            }
+            CellShape::LinearRing(weights) => {
+                for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
+                    let size = factor * weights[cell.lane()];
+                    self.add_scalar(|a, b| size * place[a] * place[b]);
                 }
             }
         }
@@ -155,6 +168,14 @@ fn add_linear<const D: usize, const N: usize>(
                     block[i][j] += cell.volume * (volumetric * ga[i] * gb[j] + 0.5 * shear * ga[j] * gb[i]);
                 }
                 block[i][i] += cell.volume * inner;
+            }
+            if D == 2 && cell.hoop != [0.0; 3] {
+                let (volumetric, [ha, hb]) = (cell.volume * volumetric, [cell.hoop[a], cell.hoop[b]]);
+                for i in 0..D {
+                    block[0][i] += volumetric * ha * gb[i];
+                    block[i][0] += volumetric * ga[i] * hb;
+                }
+                block[0][0] += (volumetric + cell.volume * shear) * ha * hb;
             }
         }
     }

@@ -110,6 +110,8 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     pub shape: CellShape<'g>,
     /// Geometry of the cells of the batch; volumes are the weights of the point.
     pub cells: &'g SimplexPack<D>,
+    /// Hoop strains of unit displacements at the corners of the cells, in a body of revolution.
+    hoop: Option<&'g Pack<3>>,
     /// Strain of the displacement.
     pub strain: Pack<S>,
     /// Strain of the displacement before the step.
@@ -176,6 +178,7 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             first_point: 0,
             shape: CellShape::Linear,
             cells: first,
+            hoop: None,
             strain: Pack::ABSENT,
             strain_before: Pack::ABSENT,
             strain_rate: Pack::ABSENT,
@@ -199,6 +202,7 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
                 (batch.number, batch.point) = (number * points + point, point);
                 batch.first_point = run.first * points + point * run.count;
                 batch.cells = geometry.pack(number, point);
+                batch.hoop = geometry.hoop(number, point);
                 batch.integrity = Integrity::default();
                 if points == 1 {
                     gather(&mut batch, mesh, nodal, needs, geometry.packs.get(number + 1));
@@ -232,7 +236,7 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
     /// point of cells, it must be called at their last one, see [`Batch::holds_forces`].
     pub fn scatter(&mut self, mesh: &Mesh<D>, forces: &mut [f64]) {
         match self.shape {
-            CellShape::Linear => scatter(self, self.nodes(mesh), forces),
+            CellShape::Linear | CellShape::LinearRing(_) => scatter(self, self.nodes(mesh), forces),
             _ => {
                 add_forces_at_point(self);
                 self.holds_forces = self.point + 1 < cell_rule::<D>().len();
@@ -258,7 +262,7 @@ fn gather<const D: usize, const S: usize>(
     needs: Needs,
     next: Option<&SimplexPack<D>>,
 ) {
-    let (nodes, cells) = (batch.nodes(mesh), batch.cells);
+    let (nodes, cells, hoop) = (batch.nodes(mesh), batch.cells, batch.hoop);
     let [displacement, velocity, _] = &mut batch.nodal;
     let velocity = if needs.velocity { &mut batch.velocity } else { velocity };
     if needs.strain {
@@ -275,10 +279,10 @@ fn gather<const D: usize, const S: usize>(
     }
     // Only now: what was stored number by number is not read back at once.
     if needs.strain {
-        batch.strain = kernels::strains(cells, &displacement[..]);
+        batch.strain = kernels::strains(cells, hoop, &displacement[..]);
     }
     if needs.strain_rate {
-        batch.strain_rate = kernels::strains(cells, &velocity[..]);
+        batch.strain_rate = kernels::strains(cells, hoop, &velocity[..]);
     }
     if needs.velocity_change {
         for (change, velocity) in batch.velocity_change.iter_mut().zip(&*velocity).take(D + 1) {
@@ -287,7 +291,7 @@ fn gather<const D: usize, const S: usize>(
     }
     if needs.strain_before {
         kernels::gather(D + 1, nodes, nodal.previous_displacement.as_chunks().0, displacement);
-        batch.strain_before = kernels::strains(cells, &displacement[..]);
+        batch.strain_before = kernels::strains(cells, hoop, &displacement[..]);
     }
     if needs.elastic_stress {
         batch.elastic_stress = Pack::ZERO;
@@ -320,7 +324,7 @@ fn square_of_forces<const D: usize, const S: usize>(
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn scatter<const D: usize, const S: usize>(batch: &mut Batch<'_, D, S>, nodes: &[u32], forces: &mut [f64]) {
-    kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
+    kernels::add_divergence(batch.cells, batch.hoop, &batch.stress, &mut batch.force);
     kernels::scatter(D + 1, nodes, &batch.force, forces.as_chunks_mut().0);
 }
 
@@ -360,14 +364,22 @@ fn gather_at_point<const D: usize, const S: usize>(
         batch.force.fill(Pack::ZERO);
     }
     let (place, _) = &cell_rule::<D>()[batch.point];
+    let (cells, hoop) = (batch.cells, batch.hoop);
+    let strains = |nodal: &NodalPacks<D>| {
+        let mut corners = kernels::linear_at(place, nodal);
+        if hoop.is_some() {
+            kernels::add_offsets(place, nodal, &mut corners);
+        }
+        kernels::strains(cells, hoop, &corners)
+    };
     if needs.strain {
-        batch.strain = kernels::strains(batch.cells, &kernels::linear_at(place, displacement));
+        batch.strain = strains(displacement);
     }
     if needs.strain_before {
-        batch.strain_before = kernels::strains(batch.cells, &kernels::linear_at(place, before));
+        batch.strain_before = strains(before);
     }
     if needs.strain_rate {
-        batch.strain_rate = kernels::strains(batch.cells, &kernels::linear_at(place, velocity));
+        batch.strain_rate = strains(velocity);
     }
     if needs.elastic_stress {
         batch.elastic_stress = Pack::ZERO;
@@ -379,8 +391,12 @@ fn gather_at_point<const D: usize, const S: usize>(
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_forces_at_point<const D: usize, const S: usize>(batch: &mut Batch<'_, D, S>) {
     let mut corners = [Pack::ZERO; 4];
-    kernels::add_divergence(batch.cells, &batch.stress, &mut corners);
-    kernels::add_nodal_forces(&cell_rule::<D>()[batch.point].0, &corners, &mut batch.force);
+    kernels::add_divergence(batch.cells, batch.hoop, &batch.stress, &mut corners);
+    let (place, _) = &cell_rule::<D>()[batch.point];
+    kernels::add_nodal_forces(place, &corners, &mut batch.force);
+    if batch.hoop.is_some() {
+        kernels::add_offset_forces(place, &corners, &mut batch.force);
+    }
 }
 
 /// Adds the forces on the nodes of quadratic cells to those of the body.
@@ -400,7 +416,7 @@ mod tests {
     use super::*;
     use crate::fem::space::{
         quadratic::linear_at,
-        samples::{number, quadratic, row},
+        samples::{number, quadratic, revolved, row},
     };
     use crate::linear_algebra::tensor::{Mandel, Vector, apply, symmetric_part};
 
@@ -508,8 +524,8 @@ mod tests {
             if portable {
                 let (nodes, mut corners) = (batch.nodes(&mesh), [Pack::ZERO; 4]);
                 kernels::gather(D + 1, nodes, u.as_chunks().0, &mut corners);
-                strain = kernels::strains(batch.cells, &corners);
-                kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
+                strain = kernels::strains(batch.cells, batch.hoop, &corners);
+                kernels::add_divergence(batch.cells, batch.hoop, &batch.stress, &mut batch.force);
                 kernels::scatter(D + 1, nodes, &batch.force, forces.as_chunks_mut().0);
             } else {
                 batch.scatter(&mesh, &mut forces);
@@ -601,6 +617,55 @@ mod tests {
         check_quadratic::<2, 4>(0.02);
         check_quadratic::<3, 6>(0.0);
         check_quadratic::<3, 6>(0.02);
+    }
+
+    /// In rings the hoop strain is `u_r / r`, volumes are those of the whole turn, and the power of the forces of any stress is minus the
+    /// integral of stress times strain rate.
+    fn check_rings(mesh: Mesh<2>) {
+        let geometry = Geometry::new(&mesh);
+        let is_linear = mesh.order() == 1;
+        let field = |[r, y]: &[f64; 2]| [0.7 * r + 0.2 + if is_linear { 0.0 } else { 0.1 * r * y }, *y];
+        let u: Vec<f64> = mesh.nodes.iter().flat_map(field).collect();
+        let v: Vec<f64> = (0..u.len()).map(number).collect();
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &v, velocity: &v, previous_velocity: &v };
+        let (mut forces, mut power, mut volume) = (vec![0.0; u.len()], 0.0, 0.0);
+        Batch::<2, 4>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
+            for lane in 0..batch.count {
+                let cell = batch.first_cell + lane;
+                let rule = if is_linear { crate::fem::space::quadrature::CENTROID } else { cell_rule::<2>() };
+                let place = crate::fem::space::place_in_cell(&mesh, cell, &rule[batch.point].0);
+                let ([radial, _], strain) = (field(&place), batch.strain.lane(lane));
+                let straight = if mesh.is_curved { 0.02 } else { 1e-11 };
+                assert!((strain[2] - radial / place[0]).abs() < straight, "{strain:?} {place:?}");
+                let stress = stress_of(batch.first_point + lane);
+                batch.stress.set(lane, stress);
+                let rate = batch.strain_rate.lane(lane);
+                assert_eq!(rate, batch.strain_before.lane(lane));
+                power -= batch.cells.volume[lane] * stress.iter().zip(rate).map(|(s, e)| s * e).sum::<f64>();
+                volume += batch.cells.volume[lane];
+            }
+            batch.scatter(&mesh, &mut forces);
+        });
+        let work: f64 = forces.iter().zip(&v).map(|(f, v)| f * v).sum();
+        assert!((work - power).abs() < 1e-11 * power.abs(), "{work} {power}");
+        // The first theorem of Pappus and Guldinus.
+        if !mesh.is_curved {
+            let ring = |cell: usize| {
+                let corners = &mesh.corners(cell)[..3];
+                let middle = corners.iter().map(|corner| corner[0]).sum::<f64>() / 3.0;
+                std::f64::consts::TAU * middle * crate::mesh::shape::signed_measure(corners)
+            };
+            let expected: f64 = (0..mesh.cell_count()).map(ring).sum();
+            assert!((volume - expected).abs() < 1e-12 * expected.abs(), "{volume} {expected}");
+        }
+    }
+
+    #[test]
+    fn cells_of_a_body_of_revolution_are_rings() {
+        check_rings(revolved(row()));
+        check_rings(revolved(quadratic(row(), 0.0)));
+        check_rings(revolved(quadratic(row(), 0.02)));
     }
 
     #[test]

@@ -2,15 +2,18 @@
 //!
 //! Stresses live at points: one in a linear cell, several in a quadratic one. A point has the geometry of a linear cell, see
 //! [`super::quadratic`].
+//!
+//! The cells of a body of revolution are rings: volumes are those of the whole turn, and the hoop strain `u_r / r` at a point is a
+//! multiple of the radial displacements at the corners of its linear cell.
 
 use super::{
-    quadratic::linear_at,
-    quadrature::{MOST_POINTS, cell_rule, fine_cell_rule},
+    quadratic::{linear_at, place_in_cell},
+    quadrature::{CENTROID, MOST_POINTS, cell_rule, fine_cell_rule},
 };
 use crate::{
     linear_algebra::{
         simd::{LANES, Pack, prefetch},
-        tensor::Vector,
+        tensor::{Mandel, Vector, symmetric_part},
     },
     mesh::{Mesh, shape},
 };
@@ -22,6 +25,8 @@ pub struct Simplex<const D: usize> {
     pub volume: f64,
     /// Gradients in 1/m of the shape functions of the cell's nodes 1 to D; that of node 0 is minus their sum.
     pub gradients: [Vector<D>; D],
+    /// In a body of revolution the hoop strain in 1/m of a radial displacement of 1 m at each corner; zeros elsewhere.
+    pub hoop: [f64; 3],
 }
 
 impl<const D: usize> Simplex<D> {
@@ -33,7 +38,14 @@ impl<const D: usize> Simplex<D> {
                 edges[a][i] = corners[a + 1][i] - corners[0][i];
             }
         }
-        Self { volume: shape::signed_measure(corners), gradients: dual_basis(&edges) }
+        Self { volume: shape::signed_measure(corners), gradients: dual_basis(&edges), hoop: [0.0; 3] }
+    }
+
+    /// The ring of the cell, given the place of its point in barycentric coordinates, the point's distance from the axis in m and the
+    /// measure of what turns there.
+    fn revolved(self, place: &[f64], radius: f64, turn: f64) -> Self {
+        let hoop = std::array::from_fn(|a| place[a] / radius);
+        Self { volume: turn * self.volume, hoop, ..self }
     }
 
     /// Gradient of the shape function of local node `a`.
@@ -65,6 +77,16 @@ impl<const D: usize> Simplex<D> {
         }
         out
     }
+
+    /// Strain of the field with these values at the corners.
+    #[inline(always)]
+    pub fn strain<const S: usize>(&self, nodal: &[Vector<D>]) -> Mandel<S> {
+        let mut out = symmetric_part(&self.field_gradient(nodal));
+        if S == 4 {
+            out[2] = self.hoop.iter().zip(nodal).map(|(hoop, value)| hoop * value[0]).sum();
+        }
+        out
+    }
 }
 
 /// A pack of cells, one in each lane; lanes without a cell have zero volume and zero gradients.
@@ -79,10 +101,11 @@ pub struct SimplexPack<const D: usize> {
 impl<const D: usize> SimplexPack<D> {
     const EMPTY: Self = Self { volume: [0.0; LANES], gradients: [Pack::ZERO; D] };
 
-    /// The cell of a lane.
+    /// The cell of a lane, in a body that is not one of revolution.
     #[inline(always)]
     pub fn simplex(&self, lane: usize) -> Simplex<D> {
-        Simplex { volume: self.volume[lane], gradients: self.gradients.map(|gradient| gradient.lane(lane)) }
+        let gradients = self.gradients.map(|gradient| gradient.lane(lane));
+        Simplex { volume: self.volume[lane], gradients, hoop: [0.0; 3] }
     }
 
     fn set(&mut self, lane: usize, cell: &Simplex<D>) {
@@ -138,9 +161,11 @@ pub struct Geometry<const D: usize> {
     pub packs: Vec<SimplexPack<D>>,
     /// All cells in the order of the mesh, split where the material changes: the batches of every pass.
     pub runs: Vec<CellRun>,
+    /// Hoop strains of unit displacements for each of these packs; present in a body of revolution.
+    hoops: Vec<Pack<3>>,
     /// Points in a cell.
     points: usize,
-    /// Weights of the fine rule in each run; present where cells are curved.
+    /// Weights of the fine rule in each run; present where cells are curved or rings.
     fine_weights: Vec<[[f64; LANES]; MOST_POINTS]>,
 }
 
@@ -151,8 +176,10 @@ pub enum CellShape<'g> {
     Linear,
     /// Quadratic shape functions and straight sides.
     Straight,
-    /// Quadratic shape functions and curved sides: weights in m^D of the points of the fine rule.
+    /// Quadratic shape functions and curved sides, or a ring: weights in m^D of the points of the fine rule.
     Curved(&'g [[f64; LANES]; MOST_POINTS]),
+    /// A ring with linear shape functions, with the same weights.
+    LinearRing(&'g [[f64; LANES]; MOST_POINTS]),
 }
 
 /// One cell with all its points.
@@ -185,7 +212,7 @@ impl<'g, const D: usize> Cell<'g, D> {
     /// A point of the cell: its weight, and the gradients there.
     #[inline(always)]
     pub fn point(self, point: usize) -> Simplex<D> {
-        self.geometry.pack(self.run, point).simplex(self.lane)
+        self.geometry.simplex(self.run, point, self.lane)
     }
 
     /// Number of its points.
@@ -200,7 +227,7 @@ impl<'g, const D: usize> Cell<'g, D> {
     pub fn whole(self) -> Simplex<D> {
         let first = self.point(0);
         match self.shape() {
-            CellShape::Linear => first,
+            CellShape::Linear | CellShape::LinearRing(_) => first,
             _ => Simplex { volume: (0..self.points()).map(|q| self.point(q).volume).sum(), ..first },
         }
     }
@@ -236,23 +263,39 @@ impl<const D: usize> Geometry<D> {
             (0..run.count).for_each(|lane| pack.set(lane, &simplex(run.first + lane)));
             pack
         };
-        if !mesh.is_curved {
+        if !(mesh.is_curved || mesh.is_revolved) {
             let simplex = |cell: usize| {
                 let whole = Simplex::new(&mesh.corners(cell)[..=D]);
                 if points == 1 { whole } else { Simplex { volume: share * whole.volume, ..whole } }
             };
             let packs = runs.iter().map(|run| pack_of(run, &simplex)).collect();
-            return Self { packs, runs, points, fine_weights: Vec::new() };
+            return Self { packs, runs, hoops: Vec::new(), points, fine_weights: Vec::new() };
         }
-        let at = |cell: usize, place: &[f64], weight: f64| {
+        let at = |cell: usize, place: &[f64; 4], weight: f64| {
             let nodes: Vec<Vector<D>> = mesh.cell_nodes(cell).map(|n| mesh.nodes[n as usize]).collect();
-            let simplex = Simplex::new(&linear_at(D + 1, place, &nodes)[..=D]);
-            Simplex { volume: weight * simplex.volume, ..simplex }
+            let is_linear = mesh.order() == 1;
+            let simplex = if is_linear {
+                Simplex::new(&nodes)
+            } else {
+                Simplex::new(&linear_at(D + 1, place, &nodes)[..=D])
+            };
+            let simplex = Simplex { volume: weight * simplex.volume, ..simplex };
+            if !mesh.is_revolved {
+                return simplex;
+            }
+            let middle = place_in_cell(mesh, cell, place);
+            simplex.revolved(place, middle[0], mesh.turn(&middle))
         };
-        let (mut packs, mut fine_weights) = (Vec::new(), Vec::new());
+        let rule = if points == 1 { CENTROID } else { cell_rule::<D>() };
+        let (mut packs, mut hoops, mut fine_weights) = (Vec::new(), Vec::new(), Vec::new());
         for run in &runs {
-            for (place, weight) in cell_rule::<D>() {
+            for (place, weight) in rule {
                 packs.push(pack_of(run, &|cell| at(cell, place, *weight)));
+                if mesh.is_revolved {
+                    let mut hoop = Pack::ZERO;
+                    (0..run.count).for_each(|lane| hoop.set(lane, at(run.first + lane, place, *weight).hoop));
+                    hoops.push(hoop);
+                }
             }
             let mut weights = [[0.0; LANES]; MOST_POINTS];
             for (weights, (place, weight)) in weights.iter_mut().zip(fine_cell_rule::<D>()) {
@@ -262,7 +305,7 @@ impl<const D: usize> Geometry<D> {
             }
             fine_weights.push(weights);
         }
-        Self { packs, runs, points, fine_weights }
+        Self { packs, runs, hoops, points, fine_weights }
     }
 
     /// Points in a cell, at which stresses live.
@@ -278,7 +321,10 @@ impl<const D: usize> Geometry<D> {
 
     /// Bytes that are kept.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.packs[..]) + size_of_val(&self.runs[..]) + size_of_val(&self.fine_weights[..])
+        size_of_val(&self.packs[..])
+            + size_of_val(&self.runs[..])
+            + size_of_val(&self.hoops[..])
+            + size_of_val(&self.fine_weights[..])
     }
 
     /// The geometry of a run of cells at a point.
@@ -287,12 +333,25 @@ impl<const D: usize> Geometry<D> {
         if self.fine_weights.is_empty() { &self.packs[run] } else { &self.packs[run * self.points + point] }
     }
 
+    /// The hoop strains of unit displacements at the corners of these cells, in a body of revolution.
+    #[inline(always)]
+    pub(super) fn hoop(&self, run: usize, point: usize) -> Option<&Pack<3>> {
+        self.hoops.get(run * self.points + point)
+    }
+
+    #[inline(always)]
+    fn simplex(&self, run: usize, point: usize, lane: usize) -> Simplex<D> {
+        let plain = self.pack(run, point).simplex(lane);
+        self.hoop(run, point).map_or(plain, |hoop| Simplex { hoop: hoop.lane(lane), ..plain })
+    }
+
     /// The shape of the cells of a run.
     #[inline(always)]
     pub(super) fn shape(&self, run: usize) -> CellShape<'_> {
         match self.fine_weights.get(run) {
-            _ if self.points == 1 => CellShape::Linear,
+            None if self.points == 1 => CellShape::Linear,
             None => CellShape::Straight,
+            Some(weights) if self.points == 1 => CellShape::LinearRing(weights),
             Some(weights) => CellShape::Curved(weights),
         }
     }
@@ -318,7 +377,7 @@ impl<const D: usize> Geometry<D> {
         let within = number - run.first * self.points;
         let (point, lane) =
             if self.points == 1 { (0, within) } else { (within / run.count, within % run.count) };
-        (run.first + lane, point, self.pack(at, point).simplex(lane))
+        (run.first + lane, point, self.simplex(at, point, lane))
     }
 
     /// The run of a cell. Runs have at most as many cells as a pack has lanes, so that the search starts at `cell / LANES`; where all

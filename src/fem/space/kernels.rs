@@ -2,7 +2,7 @@
 
 use super::{
     SimplexPack,
-    quadratic::{MOST_NODES, edges},
+    quadratic::{MOST_NODES, edges, node_count, offsets},
 };
 use crate::linear_algebra::{
     simd::{LANES, Pack},
@@ -85,10 +85,55 @@ pub(super) fn add_nodal_forces<const D: usize>(
     }
 }
 
-/// Strains of a field with these values at the corners.
+/// Gives the linear functions of [`linear_at`] the values of the quadratic functions at the point.
+#[inline(always)]
+pub(super) fn add_offsets<const D: usize>(
+    place: &[f64; 4],
+    nodal: &NodalPacks<D>,
+    corners: &mut [Pack<D>; 4],
+) {
+    let offsets = offsets(D + 1, place);
+    for i in 0..D {
+        let mut offset = [0.0; LANES];
+        for a in 0..node_count::<D>() {
+            for lane in 0..LANES {
+                offset[lane] += offsets[a] * nodal[a].0[i][lane];
+            }
+        }
+        for a in 0..D + 1 {
+            for lane in 0..LANES {
+                corners[a].0[i][lane] += offset[lane];
+            }
+        }
+    }
+}
+
+/// Adds to the forces on nodes what [`add_nodal_forces`] omits of forces on the corners that are not balanced.
+#[inline(always)]
+pub(super) fn add_offset_forces<const D: usize>(
+    place: &[f64; 4],
+    corners: &[Pack<D>; 4],
+    forces: &mut NodalPacks<D>,
+) {
+    let offsets = offsets(D + 1, place);
+    for i in 0..D {
+        for lane in 0..LANES {
+            let mut total = 0.0;
+            for a in 0..D + 1 {
+                total += corners[a].0[i][lane];
+            }
+            for a in 0..node_count::<D>() {
+                forces[a].0[i][lane] += offsets[a] * total;
+            }
+        }
+    }
+}
+
+/// Strains of a field with these values at the corners; in a body of revolution with the hoop strain.
 #[inline(always)]
 pub(super) fn strains<const D: usize, const S: usize>(
     cells: &SimplexPack<D>,
+    hoop: Option<&Pack<3>>,
     corners: &[Pack<D>],
 ) -> Pack<S> {
     let mut out = Pack::ZERO;
@@ -112,6 +157,15 @@ pub(super) fn strains<const D: usize, const S: usize>(
             }
         }
     }
+    if S == 4
+        && let Some(hoop) = hoop
+    {
+        for lane in 0..LANES {
+            for a in 0..3 {
+                out.0[2][lane] += hoop.0[a][lane] * corners[a].0[0][lane];
+            }
+        }
+    }
     out
 }
 
@@ -119,6 +173,7 @@ pub(super) fn strains<const D: usize, const S: usize>(
 #[inline(always)]
 pub(super) fn add_divergence<const D: usize, const S: usize>(
     cells: &SimplexPack<D>,
+    hoop: Option<&Pack<3>>,
     stress: &Pack<S>,
     forces: &mut [Pack<D>],
 ) {
@@ -142,6 +197,15 @@ pub(super) fn add_divergence<const D: usize, const S: usize>(
                 forces[a + 1].0[i][lane] -= force;
             }
             forces[0].0[i][lane] += total;
+        }
+    }
+    if S == 4
+        && let Some(hoop) = hoop
+    {
+        for lane in 0..LANES {
+            for a in 0..3 {
+                forces[a].0[0][lane] -= cells.volume[lane] * stress.0[2][lane] * hoop.0[a][lane];
+            }
         }
     }
 }

@@ -20,10 +20,11 @@ pub use held::{Held, Slanted};
 pub use kernels::NodalPacks;
 pub use linear_subspace::linear_subspace;
 pub use quadratic::{
-    MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, node_count, place_in_cell, values,
+    MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, node_count, offsets,
+    place_in_cell, values,
 };
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};
 pub use surface::{
-    FacetPoint, SurfacePoint, acts_at_midsides, corner_means, facet_points, facets, longest_side,
-    surface_means, surface_points,
+    FacetPoint, SurfacePoint, corner_means, facet_points, facets, longest_side, omits_corners, surface_means,
+    surface_points,
 };

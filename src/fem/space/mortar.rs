@@ -17,6 +17,8 @@
 //! - sum_a psi_a = 1: because sum_a chi_a = 1, the column sums of G are 1' G = w', thus w' G^-1 = 1', and
 //!   sum_a psi_a = w' G^-1 chi = 1' chi = 1.
 //!
+//! On a body of revolution all integrals are those over the whole turn.
+//!
 //! The psi depend on the space of the chi only: with any other basis q = T chi of it and N = T G, diag(w)
 //! N^-1 q is the same. Here q is orthonormal on C, which keeps N regular where C is small or thin.
 //!
@@ -289,10 +291,10 @@ struct Basis<const D: usize> {
 impl<const D: usize> Basis<D> {
     /// `count` orthonormal functions by the modified Gram-Schmidt process on the points of the quadrature,
     /// where their values are entered.
-    fn new(parts: &[Part<D>], samples: &mut [Sample], count: usize) -> Self {
-        let covered: f64 = parts.iter().map(|part| part.measure).sum();
+    fn new(parts: &[Part<D>], samples: &mut [Sample], (count, covered): (usize, f64)) -> Self {
+        let measure: f64 = parts.iter().map(|part| part.measure).sum();
         let centroid: Point = std::array::from_fn(|i| {
-            parts.iter().map(|part| part.measure * part.centroid[i]).sum::<f64>() / covered
+            parts.iter().map(|part| part.measure * part.centroid[i]).sum::<f64>() / measure
         });
         let size = parts.iter().flat_map(|part| &part.polygon).fold(0.0, |most: f64, corner| {
             let offset = subtract(corner, &centroid);
@@ -368,16 +370,21 @@ impl<'a, const D: usize> Slave<'a, D> {
             gap: 0.0,
             masters: Vec::new(),
         }));
-        let covered: f64 = parts.iter().map(|part| part.measure).sum();
+        let mut covered: f64 = parts.iter().map(|part| part.measure).sum();
         if parts.is_empty() || covered < SMALLEST_SHARE * self.measure {
             return;
         }
-        let mut samples = Vec::new();
+        let mut samples: Vec<Sample> = Vec::new();
         for (part, Part { polygon, .. }) in parts.iter().enumerate() {
             let points = quadrature::<D>(polygon).into_iter();
             samples.extend(points.map(|(place, weight)| Sample { part, place, weight, basis: [0.0; 3] }));
         }
-        let basis = Basis::new(parts, &mut samples, law.len());
+        if facet.turns() {
+            let turn = |place: Point| Shape::new(false, &self.corners, place).linear(&facet.turns).0;
+            samples.iter_mut().for_each(|sample| sample.weight *= turn(sample.place));
+            covered = samples.iter().map(|sample| sample.weight).sum();
+        }
+        let basis = Basis::new(parts, &mut samples, (law.len(), covered));
         let own = self.own_products(&basis, &samples, covered);
         let Some(duals) = self.duals(&basis, &own, covered) else { return };
         let result = &mut result[first..];

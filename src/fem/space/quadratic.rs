@@ -5,6 +5,9 @@
 //! `(4 l_i - 1) u_i + 4 sum_j l_j u_ij` at the corners. A quadratic cell is therefore at each of its points a linear cell with other
 //! nodal values, and forces on the corners of the linear cell go to the nodes by the same coefficients. The same holds for
 //! coordinates: the linear function of the coordinates of a curved cell has its Jacobian.
+//!
+//! Where the value at the point matters, too, as in the hoop strain of a body of revolution, the constant
+//! `-2 (sum_i l_i^2 u_i + 2 sum_ij l_i l_j u_ij)` is added at all corners ([`offsets`]).
 
 use crate::{
     linear_algebra::tensor::{Vector, add_scaled},
@@ -60,6 +63,20 @@ pub(super) fn derivatives(corners: usize, node: usize, place: &[f64]) -> [f64; 4
         (out[i], out[j]) = (4.0 * place[j], 4.0 * place[i]);
     } else {
         out[node] = 4.0 * place[node] - 1.0;
+    }
+    out
+}
+
+/// What the value of each node of a simplex with so many corners adds at all corners of the linear function at a point, so that this
+/// has the value of the quadratic function there.
+#[inline(always)]
+pub fn offsets(corners: usize, place: &[f64; 4]) -> [f64; MOST_NODES] {
+    let mut out = [0.0; MOST_NODES];
+    for i in 0..corners {
+        out[i] = -2.0 * place[i] * place[i];
+    }
+    for (offset, &[i, j]) in out[corners..].iter_mut().zip(edges(corners)) {
+        *offset = -4.0 * place[i] * place[j];
     }
     out
 }

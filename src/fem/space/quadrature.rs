@@ -93,6 +93,9 @@ const REACH: f64 = 0.387_298_334_620_741_7;
 /// Points of the finest cell rule.
 pub const MOST_POINTS: usize = 14;
 
+/// One point, exact for linear functions on triangles.
+pub(super) const CENTROID: CellRule = &[([2.0 * SIXTH, 2.0 * SIXTH, 2.0 * SIXTH, 0.0], 1.0)];
+
 /// The rule for triangles (`D = 2`) or tetrahedra (`D = 3`).
 pub const fn cell_rule<const D: usize>() -> CellRule {
     if D == 2 { TRIANGLE } else { TETRAHEDRON }

@@ -28,6 +28,12 @@ pub fn row<const D: usize>() -> Mesh<D> {
     }
 }
 
+/// The same cells as rings around an axis beside them.
+pub fn revolved(mesh: Mesh<2>) -> Mesh<2> {
+    let nodes = mesh.nodes.iter().map(|[x, y]| [x + 3.5, *y]).collect();
+    Mesh { nodes, is_revolved: true, ..mesh }
+}
+
 /// The same cells with nodes on their edges, up to `bend` times a number of magnitude 1 from the midpoints.
 pub fn quadratic<const D: usize>(mut mesh: Mesh<D>, bend: f64) -> Mesh<D> {
     let mut nodes = BTreeMap::new();

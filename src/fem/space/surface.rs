@@ -71,7 +71,8 @@ pub(super) const FACE_AND_MIRROR_IMAGE: f64 = 0.939_692_620_785_908;
 /// A node on an edge between faces of the body gets a point for each face; facets that meet at a smaller angle share a
 /// point with their mean normal. A constant pressure has the same nodal forces as by exact integration: the weights are those of the
 /// trapezoidal rule, for quadratic cells in the plane those of Simpson's rule, and in space those of the rule with the midpoints of
-/// edges, whose weights at corners are zero.
+/// edges, whose weights at corners are zero. On a body of revolution weights are those of the whole turn, and the normal on the axis is
+/// that of the face and its mirror image.
 pub fn surface_points<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
@@ -93,7 +94,7 @@ pub fn surface_means<const D: usize, const N: usize>(
         let corners = mesh.facets[facet as usize];
         for nodes in mesh.sub_facets(facet) {
             let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
-            for node in nodes {
+            for (at, node) in nodes.into_iter().enumerate() {
                 let factor = match (mesh.order(), corners.contains(&node)) {
                     (1, _) => 1.0,
                     (_, false) => 4.0 / 3.0,
@@ -102,13 +103,20 @@ pub fn surface_means<const D: usize, const N: usize>(
                 };
                 let global = mesh.global_node(node);
                 let record = &mut outgoing[mesh.owner(global)];
-                record.extend([f64::from(global), factor]);
+                record.extend([f64::from(global), factor * turn(mesh, &nodes, at)]);
                 record.extend(normal);
                 record.extend(of_facet(facet));
             }
         }
     }
     Ok(points_of_shares(mesh, &exchange_lists(session.world(), &outgoing)?))
+}
+
+/// The factor of the weight of a node of a linear facet, or of one of the parts of a quadratic facet, on a body of revolution: exact
+/// for a constant pressure where sides are straight.
+fn turn<const D: usize>(mesh: &Mesh<D>, nodes: &[u32; D], at: usize) -> f64 {
+    let of = |at: usize| mesh.turn(&mesh.nodes[nodes[at] as usize]);
+    if mesh.order() == 1 && mesh.is_revolved { (2.0 * of(at) + of(1 - at)) / 3.0 } else { of(at) }
 }
 
 /// The points at the nodes of this rank, from the records of the facets around them: node, factor, normal and values.
@@ -147,11 +155,17 @@ struct Share<const D: usize, const N: usize> {
 }
 
 /// Whether laws on boundaries act at midside nodes alone: of quadratic cells in space.
-pub fn acts_at_midsides<const D: usize>(mesh: &Mesh<D>) -> bool {
+fn acts_at_midsides<const D: usize>(mesh: &Mesh<D>) -> bool {
     D == 3 && mesh.order() == 2
 }
 
-/// The points of these boundaries at corners of quadratic facets in space, where laws do not act, with the means of values at the
+/// Whether there are corners of facets at which laws do not act, because their weights are zero: those of quadratic cells in space, and
+/// on the axis of bodies of revolution.
+pub fn omits_corners<const D: usize>(mesh: &Mesh<D>) -> bool {
+    mesh.order() == 2 && (D == 3 || mesh.is_revolved)
+}
+
+/// The points of these boundaries at corners where laws do not act, with the means of values at the
 /// midpoints of the edges that meet there: `of_midside` gives those at an owned node for the facets of such a normal. No points for
 /// other cells. Collective.
 pub fn corner_means<const D: usize, const N: usize>(
@@ -160,7 +174,7 @@ pub fn corner_means<const D: usize, const N: usize>(
     facets: &[u32],
     of_midside: impl Fn(u32, &Vector<D>) -> Option<[f64; N]>,
 ) -> Result<Vec<(SurfacePoint<D>, [f64; N])>, Agreed> {
-    if !acts_at_midsides(mesh) {
+    if !omits_corners(mesh) {
         return Ok(Vec::new());
     }
     let mut questions = vec![Vec::new(); session.ranks()];
@@ -169,7 +183,8 @@ pub fn corner_means<const D: usize, const N: usize>(
         let normal = facet_normal(&mesh.facet_corners(facet));
         for (i, midside) in mesh.facet_midsides(facet).into_iter().enumerate() {
             let midside = mesh.global_node(midside);
-            for corner in [corners[i], corners[(i + 1) % D]] {
+            let ends = [corners[i], corners[(i + 1) % D]].into_iter();
+            for corner in ends.filter(|&end| D == 3 || mesh.is_on_axis(&mesh.nodes[end as usize])) {
                 let record = &mut questions[mesh.owner(midside)];
                 record.extend([f64::from(midside), f64::from(mesh.global_node(corner))]);
                 record.extend(normal);
@@ -239,7 +254,8 @@ pub fn facet_points<const D: usize>(
                 at[i] += share * coordinates[i];
             }
         }
-        FacetPoint { shares, normal: normal.map(|x| x / measure), weight: measure * weight, place: at }
+        let weight = measure * weight * mesh.turn(&at);
+        FacetPoint { shares, normal: normal.map(|x| x / measure), weight, place: at }
     };
     (nodes.into_iter().take(count), rule.iter().map(point))
 }
@@ -285,7 +301,10 @@ fn points_of_node<const D: usize, const N: usize>(
     let node = mesh.owned_node(shares[0].node) as u32;
     faces
         .into_iter()
-        .map(|Face { normal, weight, size, values }| {
+        .map(|Face { mut normal, weight, size, values }| {
+            if mesh.is_on_axis(&mesh.nodes[node as usize]) {
+                normal[0] = 0.0;
+            }
             let length = norm(&normal);
             let point = SurfacePoint { node, normal: normal.map(|x| x / length), weight: weight / D as f64 };
             (point, values.map(|value| value / size))

@@ -17,7 +17,7 @@ const VALUES: usize = 14;
 const SAME: f64 = 1e-9;
 
 /// The states of the nodal points of all contacts at the nodes of this rank, those of a node together, in the order of
-/// their normals: neither the order of the tables of the job nor the partition matters. Corners of quadratic facets in space, where no law acts,
+/// their normals: neither the order of the tables of the job nor the partition matters. Corners where no law acts
 /// have the means of the points at the midpoints of edges around, a mean for each face of the body. Collective.
 pub(super) fn contact_points<const D: usize, const S: usize>(
     at: Converged<'_, D, S>,
@@ -62,7 +62,7 @@ pub(super) fn largest<const D: usize>(of_node: &[(usize, PointState<D>)]) -> &Po
     states.fold(&of_node[0].1, |best, other| if larger(best, other) { other } else { best })
 }
 
-/// Fills a history of contact points, given at the owned nodes, at corners of quadratic facets in space, where no law acts: with the
+/// Fills a history of contact points, given at the owned nodes, at corners where no law acts: with the
 /// largest of the means of the faces there. Collective.
 pub(super) fn fill_corners<const D: usize, const S: usize>(
     at: Converged<'_, D, S>,

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, effect::History, space::acts_at_midsides},
+    fem::{body::Body, effect::History, space::omits_corners},
     job::Job,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -97,7 +97,7 @@ impl<const D: usize> FieldOutput<D> {
             fields.push(Field { name: history.name(), place: Place::Cell, shape, values: &history.values });
         }
         let mut of_nodes: Vec<History> = at.body.node_histories().collect();
-        for history in of_nodes.iter_mut().filter(|_| acts_at_midsides(&at.body.mesh)) {
+        for history in of_nodes.iter_mut().filter(|_| omits_corners(&at.body.mesh)) {
             fill_corners(at, history.quantity, history.values.to_mut())?;
         }
         for history in &of_nodes {

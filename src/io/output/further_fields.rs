@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::{effect::PointState, space::acts_at_midsides},
+    fem::{effect::PointState, space::omits_corners},
     job::FurtherField,
     linear_algebra::tensor::{Mandel, principal_values},
 };
@@ -78,12 +78,12 @@ pub(super) fn of_contacts<'a, const D: usize, const S: usize, const W: usize>(
     Ok(Computed::of(values))
 }
 
-/// Contact traction at the nodes; `None` if no contact acts at nodes. Corners of quadratic facets in space have means. Collective.
+/// Contact traction at the nodes; `None` if no contact acts at nodes. Corners where no law acts have means. Collective.
 pub(super) fn contact_traction<'a, const D: usize, const S: usize>(
     at: Converged<'a, D, S>,
 ) -> Result<Option<Computed<'a>>> {
     let Some(traction) = &at.state.contact_traction else { return Ok(None) };
-    if !acts_at_midsides(&at.body.mesh) {
+    if !omits_corners(&at.body.mesh) {
         return Ok(Some(Computed::of(traction.owned()?)));
     }
     let mut values = vec![0.0; at.body.mesh.owned * D];

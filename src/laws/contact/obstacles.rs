@@ -105,7 +105,7 @@ impl Gap {
     }
 
     /// The key of the rotation, if it is given.
-    pub(super) fn rotation_key(&self) -> Option<String> {
+    pub fn rotation_key(&self) -> Option<String> {
         self.prescribed().rotation.map(|_| self.key("rotation"))
     }
 

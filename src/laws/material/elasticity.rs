@@ -4,7 +4,7 @@ use super::isotropic::Isotropic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The hypothesis of a plane problem.
+/// The hypothesis of a 2D problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Hypothesis {
@@ -12,13 +12,17 @@ pub enum Hypothesis {
     PlaneStress,
     /// A section of a long body that cannot strain in the direction of its length.
     PlaneStrain,
+    /// A body of revolution that moves without turning: x is the distance from the axis, y the place along it. Forces, masses and
+    /// energies are those of the whole turn.
+    Axisymmetric,
     /// Three dimensions. Job files of 3D bodies contain no hypothesis.
     #[serde(skip)]
     Space,
 }
 
 impl Hypothesis {
-    /// The hypothesis that corresponds to this number of stress components.
+    /// The hypothesis that corresponds to this number of stress components; that of plane strain also stands for a body of revolution,
+    /// in which only the hoop strain differs.
     pub fn of(components: usize) -> Self {
         match components {
             3 => Self::PlaneStress,
@@ -50,7 +54,7 @@ impl Elasticity {
         let (modulus, ratio) = (self.youngs_modulus, self.poisson_ratio);
         let volumetric = match hypothesis {
             Hypothesis::PlaneStress => modulus * ratio / (1.0 - ratio * ratio),
-            Hypothesis::PlaneStrain | Hypothesis::Space => {
+            Hypothesis::PlaneStrain | Hypothesis::Axisymmetric | Hypothesis::Space => {
                 modulus * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio))
             }
         };

@@ -16,13 +16,14 @@ use crate::{
     parallel::session::Session,
 };
 
-/// The step in s below which every cell is stable; `None` if springs on the surface, which belong to no cell, are explicit, too.
+/// The step in s below which every cell is stable; `None` if springs on the surface, which belong to no cell, are explicit, too, and
+/// where cells are rings.
 /// Collective.
 pub(super) fn explicit_step_bound<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
 ) -> Option<f64> {
-    if !body.surface_effects.is_empty() {
+    if !body.surface_effects.is_empty() || body.mesh.is_revolved {
         return None;
     }
     let mut least = f64::INFINITY;

@@ -25,7 +25,7 @@ pub(super) fn add_trace<const D: usize>(
     };
     let value = |n: u32| -> [f64; D] { std::array::from_fn(|i| x[n as usize * D + i]) };
     for &facet in contact.facets() {
-        if mesh.order() > 1 {
+        if mesh.order() > 1 || mesh.is_revolved {
             let (nodes, points) = facet_points(mesh, facet);
             for point in points {
                 let at_point = nodes.clone().zip(point.shares);

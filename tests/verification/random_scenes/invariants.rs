@@ -1,6 +1,6 @@
 //! What holds in each random scene.
 
-use super::drawn::{Frame, STEP, Scene, scene, turned};
+use super::drawn::{Frame, STEP, Scene, is_revolved, scene, turned};
 use clarke::{
     error::Exit,
     job::Job,
@@ -161,6 +161,9 @@ impl<const D: usize> Trial<'_, D> {
             ("turned", Frame { angle: OTHER.angle, ..Frame::PLAIN }),
             ("units", Frame { angle: 0.0, ..OTHER }),
         ] {
+            if is_revolved::<D>(self.number) && frame.angle != 0.0 {
+                continue;
+            }
             match self.run(frame, name, &Start::Anew) {
                 Ok(()) => {
                     for what in self.differences(frame, "ranks-1", name) {
@@ -317,7 +320,7 @@ impl<const D: usize> Trial<'_, D> {
         Results {
             history: history.keys().map(|name| (name.clone(), column(&history, name))).collect(),
             probe: vec![vector("displacement"), vector("velocity")],
-            open: open_resultants::<D>(&read("resultants.csv")),
+            open: open_resultants::<D>(&read("resultants.csv"), is_revolved::<D>(self.number)),
         }
     }
 
@@ -407,11 +410,13 @@ fn table(file: &Path) -> BTreeMap<String, Vec<String>> {
 }
 
 /// The largest difference of forces and moments from the rate of momentum in a step, and the largest ones of the run.
-fn open_resultants<const D: usize>(table: &BTreeMap<String, Vec<String>>) -> [Open; 2] {
+fn open_resultants<const D: usize>(table: &BTreeMap<String, Vec<String>>, is_revolved: bool) -> [Open; 2] {
     let axes = ["x", "y", "z"];
     let turns: Vec<String> =
         if D == 2 { vec!["moment_z".into()] } else { axes.map(|axis| format!("moment_{axis}")).to_vec() };
-    let forces: Vec<String> = axes[..D].iter().map(|axis| format!("force_{axis}")).collect();
+    // Of a body of revolution only the forces along the axis are balanced; stresses around it balance the others.
+    let balanced = if is_revolved { &axes[1..2] } else { &axes[..D] };
+    let forces: Vec<String> = balanced.iter().map(|axis| format!("force_{axis}")).collect();
     [forces, turns].map(|columns| {
         let mut open = 0.0;
         let mut size = 0.0;

@@ -13,6 +13,9 @@ pub struct Facet<const D: usize> {
     pub corners: [Vector<D>; D],
     /// The outward unit normal.
     pub normal: Vector<D>,
+    /// By how much integrals on a slave facet are multiplied at its corners, and in between linearly: 1, or on a body of revolution the
+    /// circumference in m.
+    pub turns: [f64; D],
 }
 
 impl<const D: usize> Facet<D> {
@@ -29,10 +32,18 @@ impl<const D: usize> Facet<D> {
     /// The integral of the shape function of a node over the whole facet, as a share of its length or area.
     pub(super) fn share(&self, node: usize) -> f64 {
         match (D, self.is_quadratic()) {
-            (2, true) => [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0][node],
+            (2, true) => {
+                [self.turns[0] / 6.0, self.turns[1] / 6.0, (self.turns[0] + self.turns[1]) / 3.0][node]
+            }
             (_, true) => [0.0, 0.0, 0.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0][node],
+            (2, false) => (2.0 * self.turns[node] + self.turns[1 - node]) / 6.0,
             _ => 1.0 / D as f64,
         }
+    }
+
+    /// Whether integrals are multiplied.
+    pub(super) fn turns(&self) -> bool {
+        self.turns != [1.0; D]
     }
 
     pub(super) fn shares_node(&self, other: &Self) -> bool {

@@ -61,7 +61,7 @@ impl<const D: usize> Surface<D> {
                     places.insert(number, std::array::from_fn(|k| 0.5 * (corners[i][k] + corners[j][k])));
                 }
             }
-            facets.push(Facet { nodes, normal: normal(&corners, &side), corners });
+            facets.push(Facet { nodes, normal: normal(&corners, &side), corners, turns: [1.0; D] });
         }
         Self { facets, places }
     }
@@ -78,6 +78,7 @@ impl<const D: usize> Surface<D> {
             nodes: facet.nodes.clone(),
             corners: facet.corners.map(|corner| place(&corner)),
             normal: turn(&facet.normal),
+            turns: facet.turns,
         });
         let places = self.places.iter().map(|(&number, x)| (number, place(x))).collect();
         Self { facets: facets.collect(), places }
@@ -548,6 +549,15 @@ fn constant_pressure_gives_the_exact_forces_of_the_master_nodes() {
     }
     let random = &mut Random(5);
     for (slave_order, master_order) in [(false, false), (true, true), (false, true), (true, false)] {
+        let rings = [
+            slave_segments(&[0.0, 0.3, 0.7, 1.0], slave_order),
+            master_segments(&[0.0, 0.45, 1.0], master_order),
+        ];
+        let [slave, master] = rings.map(|mut surface| {
+            surface.facets.iter_mut().for_each(|facet| facet.turns = facet.corners.map(|[radius, _]| radius));
+            surface
+        });
+        check(&slave, &master);
         let [slave, master] = squares(random, slave_order, master_order);
         check(&slave, &master);
         check(
@@ -869,7 +879,12 @@ fn the_search_finds_all_pairs() {
                 let corners = [[0.0; 3]; 3].map(|_: Vector<3>| middle.map(|x| x + random.uniform(-0.3, 0.3)));
                 let side = [0.0; 3].map(|_: f64| random.uniform(-1.0, 1.0));
                 let start = first + 3 * i as u32;
-                Facet { nodes: (start..start + 3).collect(), normal: normal(&corners, &side), corners }
+                Facet {
+                    nodes: (start..start + 3).collect(),
+                    normal: normal(&corners, &side),
+                    corners,
+                    turns: [1.0; 3],
+                }
             })
             .collect()
     };

@@ -1,0 +1,126 @@
+"""Writes half_ball.msh and ball.msh beside itself: sections through the axis of a ball, of second order, finer toward its lowest point.
+
+    python3 meshes/ball.py
+"""
+
+from math import cos, hypot, pi, sin
+from pathlib import Path
+
+RADIUS = 0.05
+
+
+def steps(count, ratio):
+    """Numbers from 0 to 1 whose differences grow by `ratio` in all."""
+    grown = [ratio ** (i / count) for i in range(count + 1)]
+    return [(x - 1) / (ratio - 1) if ratio != 1 else i / count for i, x in enumerate(grown)]
+
+
+def section(along, across, ratio):
+    """A quarter of the disc below the equator, in three blocks: one around the centre, one from it to the lower half of the arc with
+    `along` cells along the arc and `across` cells to it, and one to its upper half. Nodes, triangles, edges of arc and equator."""
+    near, inner, corner = steps(along, ratio), 0.55 * RADIUS, 0.42 * RADIUS
+    # Toward the arc cells become smaller.
+    radial = [1 - x for x in reversed(steps(across, ratio))]
+    upper = max(along // 2, 2)
+    even = steps(upper, 1)
+    nodes, cells = {}, []
+
+    def between(one, two, share):
+        return tuple((1 - share) * p + share * q for p, q in zip(one, two))
+
+    def at(point):
+        key = tuple(round(x / RADIUS, 9) + 0.0 for x in point)
+        nodes.setdefault(key, point)
+        return key
+
+    def block(place, columns, rows):
+        grid = [[at(place(i, j)) for j in range(rows + 1)] for i in range(columns + 1)]
+        for i in range(columns):
+            for j in range(rows):
+                a, b, c, d = grid[i][j], grid[i + 1][j], grid[i + 1][j + 1], grid[i][j + 1]
+                cells.extend([(a, b, c), (a, c, d)] if (i + j) % 2 else [(a, b, d), (b, c, d)])
+        return grid
+
+    centre, right, low, bottom = (0.0, 0.0), (inner, 0.0), (corner, -corner), (0.0, -inner)
+
+    def on_arc(angle):
+        return (RADIUS * sin(angle), -RADIUS * cos(angle))
+
+    middle = block(
+        lambda i, j: between(
+            between(bottom, low, near[i]), between(centre, right, near[i]), even[j]), along, upper)
+    lower = block(
+        lambda i, j: between(on_arc(pi / 4 * near[i]), between(bottom, low, near[i]), 1 - radial[across - j]),
+        along, across)
+    outer = block(
+        lambda i, j: between(between(low, right, even[j]), on_arc(pi / 4 * (1 + even[j])), radial[i]), across, upper)
+    arc = [(lower[i][0], lower[i + 1][0]) for i in range(along)]
+    arc += [(outer[across][j], outer[across][j + 1]) for j in range(upper)]
+    equator = [(middle[i + 1][upper], middle[i][upper]) for i in range(along)]
+    equator += [(outer[i + 1][upper], outer[i][upper]) for i in range(across)]
+    return nodes, cells, arc, equator
+
+
+def mirrored(nodes, triangles, arc):
+    """Both halves of the disc."""
+
+    def other(key):
+        return key if abs(nodes[key][1]) < 1e-12 else (*key, "above")
+
+    above = {other(key): (x, -y) for key, (x, y) in nodes.items()}
+    triangles = triangles + [tuple(other(key) for key in reversed(cell)) for cell in triangles]
+    return {**nodes, **above}, triangles, arc + [tuple(other(key) for key in reversed(edge)) for edge in arc]
+
+
+def write(path, nodes, triangles, edges):
+    """The mesh in Gmsh's format 4.1, with the nodes on edges; those of the arc are on the circle."""
+    on_arc = {frozenset(edge) for edge in edges["surface"]}
+    numbers = {key: number for number, key in enumerate(nodes, 1)}
+    places = list(nodes.values())
+    middles = {}
+
+    def middle(one, two):
+        key = frozenset((one, two))
+        if key not in middles:
+            x, y = ((p + q) / 2 for p, q in zip(nodes[one], nodes[two]))
+            if key in on_arc:
+                scale = RADIUS / hypot(x, y)
+                x, y = x * scale, y * scale
+            places.append((x, y))
+            middles[key] = len(places)
+        return middles[key]
+
+    def with_middles(cell):
+        pairs = [cell] if len(cell) == 2 else zip(cell, cell[1:] + cell[:1])
+        return [numbers[key] for key in cell] + [middle(*pair) for pair in pairs]
+
+    blocks = [(1, tag, 8, [with_middles(edge) for edge in cells]) for tag, cells in enumerate(edges.values(), 1)]
+    blocks.append((2, 1, 9, [with_middles(cell) for cell in triangles]))
+    groups = len(edges)
+    box = f"0 {-RADIUS:g} 0 {RADIUS:g} {RADIUS:g} 0"
+    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(groups + 1)]
+    lines += [f'1 {tag} "{name}"' for tag, name in enumerate(edges, 1)]
+    lines += [f'2 {groups + 1} "body"', "$EndPhysicalNames", "$Entities", f"0 {groups} 1 0"]
+    lines += [f"{tag} {box} 1 {tag} 0" for tag in range(1, groups + 1)]
+    lines += [f"1 {box} 1 {groups + 1} 0", "$EndEntities"]
+    lines += ["$Nodes", f"1 {len(places)} 1 {len(places)}", f"2 1 0 {len(places)}"]
+    lines += [str(tag) for tag in range(1, len(places) + 1)]
+    lines += [f"{x:.12g} {y:.12g} 0" for x, y in places] + ["$EndNodes"]
+    total = sum(len(cells) for *_, cells in blocks)
+    lines += ["$Elements", f"{len(blocks)} {total} 1 {total}"]
+    number = 0
+    for dimension, tag, kind, cells in blocks:
+        lines.append(f"{dimension} {tag} {kind} {len(cells)}")
+        for cell in cells:
+            number += 1
+            lines.append(" ".join(map(str, (number, *cell))))
+    path.write_text("\n".join(lines + ["$EndElements"]) + "\n")
+
+
+here = Path(__file__).parent
+for name, along, across, ratio in (("coarse", 8, 6, 4), ("medium", 16, 10, 6), ("fine", 32, 18, 8)):
+    nodes, triangles, arc, equator = section(along, across, ratio)
+    write(here / f"half_ball_{name}.msh", nodes, triangles, {"surface": arc, "equator": equator})
+nodes, triangles, arc, _ = section(16, 8, 8)
+nodes, triangles, arc = mirrored(nodes, triangles, arc)
+write(here / "ball.msh", nodes, triangles, {"surface": arc})

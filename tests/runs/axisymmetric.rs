@@ -1,0 +1,160 @@
+//! Bodies of revolution.
+
+use crate::{
+    case::Case,
+    results::{Results, assert_same_answer, relative_difference},
+};
+
+/// A cylinder under uniform tension along its axis: with crossed diagonals, on the axis.
+fn cylinder() -> Case {
+    Case::of("pressed_blocks")
+        .without("contact")
+        .without("region")
+        .without("output")
+        .set("material.hypothesis", "'axisymmetric'")
+        .set("mesh.rectangle", "{ size = [1.0, 2.0], cells = [4, 5], diagonal = 'crossed' }")
+        .set("support", "[{ on = ['bottom'], fix = ['y'] }]")
+        .set("traction", "[{ on = ['top'], value = [0, 50] }]")
+        .set("output.folder", "'out'")
+        .set("output.probe", "[{ name = 'rim', point = [1, 2] }, { name = 'axis', point = [0, 1] }]")
+        .set("output.profile", "[{ on = 'top' }]")
+}
+
+/// The value of a column in the last row with this word in another one.
+fn last(case: &Case, (table, column, word): (&str, &str, &str), name: &str) -> f64 {
+    case.results().table(table).only(column, word).last(name)
+}
+
+/// The last value of a column of the history.
+fn at_end(results: &Results, name: &str) -> f64 {
+    results.table("history.csv").last(name)
+}
+
+#[test]
+fn a_cylinder_under_tension_is_exact_without_a_support_at_its_axis() {
+    for order in ["1", "2"] {
+        for ranks in [1, 2, 3] {
+            let case = cylinder().set("mesh.order", order).run_and_keep(ranks);
+            let close = |found: f64, expected: f64| {
+                let off = (found - expected).abs();
+                assert!(off < 1e-11 * expected.abs().max(1e-3), "{order} {ranks}: {found} {expected}");
+            };
+            let probe = |name: &str, what: &str| last(&case, ("probes.csv", "probe", name), what);
+            close(probe("rim", "displacement_y"), 0.1);
+            close(probe("rim", "displacement_x"), -0.3 * 0.05);
+            close(probe("axis", "displacement_x"), 0.0);
+            let force = |source: &str, what: &str| last(&case, ("resultants.csv", "source", source), what);
+            close(force("traction top", "force_y"), 50.0 * std::f64::consts::PI);
+            close(force("support bottom", "force_y"), -50.0 * std::f64::consts::PI);
+            close(force("traction top", "moment_z"), 0.0);
+            close(
+                at_end(&case.results(), "elastic_energy"),
+                0.5 * 50.0 * 50.0 / 1000.0 * 2.0 * std::f64::consts::PI,
+            );
+        }
+    }
+}
+
+#[test]
+fn uniform_stress_passes_between_bodies_of_revolution_whose_meshes_do_not_match() {
+    for order in ["1", "2"] {
+        for ranks in [1, 2, 3] {
+            let case = Case::of("pressed_blocks")
+                .set("material.hypothesis", "'axisymmetric'")
+                .set("mesh.order", order)
+                .set("support", "[{ on = ['lower.bottom'], fix = ['y'] }]")
+                .run_and_keep(ranks);
+            let table = case.results().table("profiles.csv");
+            let last = table.words("time").last().expect("a row").to_string();
+            let pressures = table.only("time", &last).numbers("contact_pressure");
+            assert!(pressures.len() > 8);
+            for pressure in pressures {
+                assert!((pressure - 5.0).abs() < 1e-10, "order {order}, {ranks} ranks: {pressure} Pa");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ball_falls_and_flies_without_straining() {
+    for scheme in ["implicit_euler", "bdf2", "midpoint", "lagged_euler"] {
+        for order in ["1", "2"] {
+            let case = Case::of("bouncing_ball")
+                .set("mesh.order", order)
+                .set("gravity", "{ acceleration = [0, -10] }")
+                .set("contact.0.obstacle.plane.point", "[0, -1]")
+                .set("time.scheme", &format!("'{scheme}'"))
+                .set("time.step", if scheme == "lagged_euler" { "1e-8" } else { "1e-3" })
+                .set("time.end", if scheme == "lagged_euler" { "1e-7" } else { "0.01" })
+                .set("contact.0.redistribute_mass", if scheme == "lagged_euler" { "false" } else { "true" });
+            let case = case.run_and_keep(2);
+            let end: f64 = if scheme == "lagged_euler" { 1e-7 } else { 0.01 };
+            let probe = |what: &str| last(&case, ("probes.csv", "probe", "centre"), what);
+            let velocity = probe("velocity_y");
+            assert!((velocity + 1.0 + 10.0 * end).abs() < 1e-9, "{scheme} {order}: {velocity}");
+            assert!(probe("velocity_x") == 0.0);
+            let strained = at_end(&case.results(), "elastic_energy");
+            assert!(strained.abs() < 1e-9, "{scheme} {order}: {strained} J");
+        }
+    }
+}
+
+/// The ball of the job, which flows and rubs, in its first contact.
+fn rough_ball() -> Case {
+    Case::of("bouncing_ball")
+        .set("contact.0.friction", "{ coulomb = { coefficient = 0.3 } }")
+        .set("material.viscoplasticity", "{ perzyna = { relaxation = 1e3, yield_stress = 1e8 } }")
+        .set("time.scheme", "'bdf2'")
+        .set("time.end", "1e-4")
+        .set("contact.0.redistribute_mass", "false")
+}
+
+#[test]
+fn a_ball_that_flows_and_rubs_has_the_same_numbers_on_every_number_of_ranks() {
+    for order in ["1", "2"] {
+        let case = rough_ball().set("mesh.order", order);
+        let one = case.run(1);
+        let energy = at_end(&one, "viscoplastic_dissipation");
+        assert!(energy > 1e-3 && at_end(&one, "friction_dissipation") > 1e-6, "{energy} J");
+        for ranks in [2, 3] {
+            let other = rough_ball().set("mesh.order", order).run_and_keep(ranks);
+            assert_same_answer(&one, &other.results(), 1e-8, &format!("order {order} on {ranks} ranks"));
+        }
+    }
+}
+
+#[test]
+fn a_restarted_ball_goes_on_as_if_it_had_not_stopped() {
+    let straight = rough_ball().set("checkpoint", "{ at = [5e-5] }").run_and_keep(2);
+    let expected = std::fs::read(straight.folder().join("out/history.csv")).expect("history");
+    straight.run_with(2, &["--restart", "--force"]).expect(0);
+    assert!(expected == std::fs::read(straight.folder().join("out/history.csv")).expect("history"));
+}
+
+#[test]
+fn a_flat_ring_of_large_radius_is_a_section_in_plane_strain() {
+    let block = |hypothesis: &str, radius: f64| {
+        let right = radius + 1.0;
+        Case::of("conical_indenter")
+            .set("material.hypothesis", &format!("'{hypothesis}'"))
+            .set("mesh.rectangle.corner", &format!("[{radius}, 0]"))
+            .set("mesh.rectangle.cells", "[6, 4]")
+            .set("support", "[{ on = ['bottom'], fix = 'all' }]")
+            .without("contact.0.obstacle_load")
+            .set("contact.0.obstacle.plane.point", &format!("[{radius}, 0.99]"))
+            .set("output.probe", &format!("[{{ name = 'p', point = [{right}, 1] }}]"))
+            .run_and_keep(1)
+    };
+    let value = |case: &Case| last(case, ("probes.csv", "probe", "p"), "displacement_x");
+    let plane = value(&block("plane_strain", 1e6));
+    let ring = value(&block("axisymmetric", 1e6));
+    assert!(plane.abs() > 1e-5 && relative_difference(&[plane], &[ring]) < 1e-5, "{plane} {ring}");
+}
+
+#[test]
+fn a_mesh_beyond_the_axis_and_contact_on_the_axis_are_refused() {
+    let beyond = cylinder().set("mesh.rectangle.corner", "[-0.5, 0]");
+    beyond.run_with(2, &[]).expect(2).says("reaches x = -0.5 m, beyond the axis");
+    let inside = cylinder().set("contact", "[{ on = ['left'], normal = { unilateral = {} } }]");
+    inside.run_with(2, &[]).expect(2).says("is inside the body of revolution");
+}
