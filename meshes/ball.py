@@ -118,9 +118,8 @@ def write(path, nodes, triangles, edges):
 
 
 here = Path(__file__).parent
-for name, along, across, ratio in (("coarse", 8, 6, 4), ("medium", 16, 10, 6), ("fine", 32, 18, 8)):
-    nodes, triangles, arc, equator = section(along, across, ratio)
-    write(here / f"half_ball_{name}.msh", nodes, triangles, {"surface": arc, "equator": equator})
+nodes, triangles, arc, equator = section(16, 10, 6)
+write(here / "half_ball.msh", nodes, triangles, {"surface": arc, "equator": equator})
 nodes, triangles, arc, _ = section(16, 8, 8)
 nodes, triangles, arc = mirrored(nodes, triangles, arc)
 write(here / "ball.msh", nodes, triangles, {"surface": arc})

@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Result},
     fem::body::Body,
     linear_algebra::petsc::{BlockRows, DistributedVector},
-    mesh::free_motions,
+    mesh::{Mesh, free_motions},
     parallel::{agreement::Agreed, session::Session},
 };
 use std::collections::BTreeMap;
@@ -86,12 +86,16 @@ impl Springs {
         let weakest = weakest_side(session, body, length)?;
         let stiffness = |&(node, motion): &(usize, [f64; D])| {
             let range = rows.offsets[node]..rows.offsets[node + 1];
+            let rigid = rigid_part(&body.mesh, &motion);
+            if rigid == [0.0; D] {
+                return 0.0;
+            }
             let (mut own, mut together) = (0.0, 0.0);
             for at in range {
-                let power = quadratic_form::<D>(&rows.values[at * D * D..][..D * D], &motion);
-                together += power;
+                let block = &rows.values[at * D * D..][..D * D];
+                together += quadratic_form(block, &rigid);
                 if rows.columns[at] as usize == first + node {
-                    own = power;
+                    own = quadratic_form(block, &motion);
                 }
             }
             if let Some(&resistance) = weakest.get(&node) {
@@ -140,7 +144,10 @@ fn weakest_side<const D: usize, const S: usize>(
             let mut values = all.owned_mut()?;
             for (node, range) in rows.offsets.windows(2).enumerate() {
                 let blocks = rows.values[range[0] * D * D..range[1] * D * D].chunks_exact(D * D);
-                blocks.for_each(|block| (0..D).for_each(|i| values[node * D + i] += block[i * D + i]));
+                let rigid: [f64; D] = rigid_part(&body.mesh, &[1.0; D]);
+                blocks.for_each(|block| {
+                    (0..D).for_each(|i| values[node * D + i] += rigid[i] * block[i * D + i]);
+                });
             }
         }
         all.update_ghosts()?;
@@ -153,6 +160,15 @@ fn weakest_side<const D: usize, const S: usize>(
         Ok(coupling.slaves().map(weaker).collect())
     };
     session.agree(resistances())
+}
+
+/// The part of a motion that is a translation of the body: of a body of revolution along its axis.
+fn rigid_part<const D: usize>(mesh: &Mesh<D>, motion: &[f64; D]) -> [f64; D] {
+    let mut rigid = *motion;
+    if mesh.is_revolved {
+        rigid[0] = 0.0;
+    }
+    rigid
 }
 
 /// The sum of all blocks over all ranks: the resistance to translations of everything together. Collective.
