@@ -20,6 +20,8 @@ pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) ->
         return Ok(());
     }
     mesh.is_revolved = true;
+    // States of a plane body are not those of this one.
+    mesh.digest = !mesh.digest;
     let near = ON_AXIS * longest_side(session, &mesh.nodes);
     mesh.nodes.iter_mut().filter(|[radius, _]| radius.abs() <= near).for_each(|place| place[0] = 0.0);
     let [least] = session.largest([mesh.nodes.iter().map(|[radius, _]| -radius).fold(0.0, larger)]);

@@ -302,7 +302,8 @@ fn points_of_node<const D: usize, const N: usize>(
     faces
         .into_iter()
         .map(|Face { mut normal, weight, size, values }| {
-            if mesh.is_on_axis(&mesh.nodes[node as usize]) {
+            // Facets that lie on the axis have no mirror images.
+            if mesh.is_on_axis(&mesh.nodes[node as usize]) && normal[1] != 0.0 {
                 normal[0] = 0.0;
             }
             let length = norm(&normal);

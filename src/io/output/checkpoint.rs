@@ -423,8 +423,7 @@ fn check_mesh<const D: usize, const S: usize>(
 ) -> Result<Header> {
     let header = read_header(path, bytes)?;
     if header.mesh != digest(body) || header.dimension != D {
-        let words =
-            "the checkpoint belongs to another mesh; a run can start only from a state on its own mesh";
+        let words = "the checkpoint belongs to another mesh, or to a body of another hypothesis; a run can start only from a state on its own mesh";
         return Err(refused(path, words));
     }
     Ok(header)

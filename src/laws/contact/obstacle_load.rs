@@ -15,12 +15,12 @@ pub struct ObstacleLoad {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(example = [0.0, -1.0])]
     pub direction: Vec<f64>,
-    /// The force along the direction: a number, or an expression in t. In 2D it is a force per metre of thickness.
+    /// The force along the direction: a number, or an expression in t. In a plane problem it is a force per metre of thickness.
     #[serde(default)]
     #[schemars(extend("variables" = "t", "unit" = "N"), example = "min(t, 2 - t)")]
     pub force: Scalar,
-    /// Mass of the obstacle, in 2D per metre of thickness. 0: the force and the contact tractions are in equilibrium in each step.
-    /// The kinetic energy of the obstacle is `obstacle_kinetic_energy` in `history.csv`; implicit_euler and lagged_euler damp its motion, by
+    /// Mass of the obstacle, in a plane problem per metre of thickness. 0: the force and the contact tractions are in equilibrium in
+    /// each step. The kinetic energy of the obstacle is `obstacle_kinetic_energy` in `history.csv`; implicit_euler and lagged_euler damp its motion, by
     /// `obstacle_numerical_dissipation`.
     #[serde(default)]
     #[schemars(extend("unit" = "kg"), range(min = 0), example = 0.5)]
@@ -30,13 +30,13 @@ pub struct ObstacleLoad {
     #[schemars(extend("unit" = "m/s"), example = 1.0)]
     pub velocity: f64,
     /// The moment about the centre of a sphere or shape, counterclockwise; in 3D about its `axis`, as seen against its direction: a
-    /// number, or an expression in t. In 2D it is a moment per metre of thickness. It acts against friction only: the shape itself does
-    /// not turn, and should be round about the axis. Absent: the obstacle turns by its key `rotation`, or not at all.
+    /// number, or an expression in t. In a plane problem it is a moment per metre of thickness. It acts against friction only: the
+    /// shape itself does not turn, and should be round about the axis. Absent: the obstacle turns by its key `rotation`, or not at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("variables" = "t", "unit" = "N m"), example = 0.0)]
     pub moment: Option<Scalar>,
-    /// Moment of inertia about the centre or the axis, in 2D per metre of thickness. 0: the moment and the contact tractions are in
-    /// equilibrium in each step; steps of an obstacle that also moves along `direction` may then fail.
+    /// Moment of inertia about the centre or the axis, in a plane problem per metre of thickness. 0: the moment and the contact tractions
+    /// are in equilibrium in each step; steps of an obstacle that also moves along `direction` may then fail.
     #[serde(default, skip_serializing_if = "is_zero")]
     #[schemars(extend("unit" = "kg m^2"), range(min = 0), example = 1e-3)]
     pub moment_of_inertia: f64,

@@ -13,7 +13,7 @@ pub enum Hypothesis {
     /// A section of a long body that cannot strain in the direction of its length.
     PlaneStrain,
     /// A body of revolution that moves without turning: x is the distance from the axis, y the place along it. Forces, masses and
-    /// energies are those of the whole turn.
+    /// energies are those of the whole turn, densities masses per volume.
     Axisymmetric,
     /// Three dimensions. Job files of 3D bodies contain no hypothesis.
     #[serde(skip)]

@@ -33,7 +33,7 @@ pub use viscosity::Viscosity;
     description = "A material. An effect is simulated only if its table or key is present."
 )]
 pub struct Material<N = Scalar> {
-    /// The hypothesis of a plane problem. Required in 2D, not allowed in 3D.
+    /// The hypothesis of a 2D problem. Required in 2D, not allowed in 3D.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hypothesis: Option<Hypothesis>,
     /// Mass density. An expression in x, y, z is evaluated at the centre of each cell. Absent: no inertia, the problem is
