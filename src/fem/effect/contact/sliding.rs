@@ -145,7 +145,7 @@ impl<const D: usize> Contact<D> {
         let Some(friction) = &self.friction else { return out };
         let blend = self.blend.to_end();
         for (sliding, slip) in friction.sliding(Body, velocity) {
-            let (speed, point) = (norm(&slip), &self.points[sliding.at]);
+            let (speed, point) = (friction.speed(sliding, &slip), &self.points[sliding.at]);
             if let Some(history) = friction.law.history() {
                 let after = friction.law.history_after(sliding.history, blend, speed);
                 let values = [after, sliding.history[0], sliding.history[1], history.initial];
