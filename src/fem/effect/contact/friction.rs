@@ -377,6 +377,14 @@ impl<const D: usize> Friction<D> {
         self.points.iter().fold(0.0, |most, point| larger(most, decrease(point)))
     }
 
+    /// The growth of the bound of a point at rest with the pressure where it comes under pressure, the largest of all points; 0 if bounds do
+    /// not depend on the pressure.
+    pub(super) fn rise_of_bound(&self) -> f64 {
+        let rise = |point: &TangentialPoint<D>| self.law.by_pressure(0.0, 0.0, point.context);
+        let follows = self.law.follows_pressure();
+        self.points.iter().filter(|_| follows).fold(0.0, |most, point| larger(most, rise(point)))
+    }
+
     /// The state of each point with its weight, at these velocities.
     pub(super) fn motions(
         &self,
@@ -552,6 +560,17 @@ mod tests {
             owned: 1,
             partly_held: Vec::new(),
         }
+    }
+
+    #[test]
+    fn a_bound_that_is_nearly_constant_grows_steeply_from_zero() {
+        // 300 p / (p + 0.01) grows by 30 000 Pa for each Pa at p = 0.
+        let formula = "expression = { coefficient = '300/(p + 0.01)' }";
+        let law: FrictionLaw = toml::from_str(formula).expect("a law");
+        assert!((Friction { law, ..pressed(1.0) }.rise_of_bound() - 3e4).abs() < 1e-8);
+        assert!((pressed(1.0).rise_of_bound() - 0.5).abs() < 1e-15);
+        let tresca: FrictionLaw = toml::from_str("tresca = { bound = 2 }").expect("a law");
+        assert_eq!(Friction { law: tresca, ..pressed(1.0) }.rise_of_bound(), 0.0);
     }
 
     #[test]

@@ -185,6 +185,12 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or(0.0, Friction::steepest_decrease)
     }
 
+    /// By how many Pa the friction bound grows for each Pa of contact pressure where a point comes under pressure, in the current step: the
+    /// largest at points on this rank.
+    pub fn rise_of_bound(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, Friction::rise_of_bound)
+    }
+
     /// The steepest decrease in Pa s/m of the normal graph in the current step.
     pub fn monotonicity_constant(&self) -> f64 {
         self.law.monotonicity_constant(self.blend.way())
