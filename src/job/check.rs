@@ -255,17 +255,13 @@ fn check_extrapolation(job: &Job, table: &mut Table<'_>) {
     }
 }
 
-/// An expected result has a tolerance, and belongs to a probe that exists.
+/// An expected result has a tolerance.
 fn check_expected(job: &Job, table: &mut Table<'_>) {
     for (quantity, expected) in &job.check {
         if expected.relative.is_none() && expected.absolute.is_none() {
             let message = format!("\"{quantity}\" has no tolerance");
             let help = "add relative = 1e-6, or absolute in the quantity's own unit";
             table.fault_at_name(("check", quantity), message, help);
-        }
-        let name = quantity.strip_prefix("probe.").and_then(|rest| rest.split('.').next());
-        if let Some(name) = name.filter(|name| !job.output.probe.iter().any(|probe| probe.name == *name)) {
-            table.warn(format!("[check] \"{quantity}\": the job has no probe \"{name}\""));
         }
     }
 }

@@ -146,6 +146,19 @@ impl Loaded {
         self.texts.refuse(vec![Fault::new(place, message, "").help(help)])
     }
 
+    /// Refuses these names in a table, which may contain dots, each with a message and advice.
+    pub(crate) fn refuse_names(&self, table: &str, faults: Vec<(&str, [String; 2])>) -> Result<()> {
+        if faults.is_empty() {
+            return Ok(());
+        }
+        let node = self.root.deepest(table);
+        let fault = |(name, [message, help]): (&str, [String; 2])| {
+            let place = node.child(name).map_or(&node.at, |child| &child.key);
+            Fault::new(place.clone(), message, "").help(help)
+        };
+        Err(self.texts.refuse(faults.into_iter().map(fault).collect()))
+    }
+
     /// The job, whose options of PETSc may write files and load code if it `is_trusted`.
     pub fn trusted(self, is_trusted: bool) -> Self {
         Self { is_trusted, ..self }

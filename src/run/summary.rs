@@ -5,6 +5,7 @@ use crate::{
     error::{Error, Result},
     fem::effect::Peaks,
     io::output::whole_file::write_whole,
+    laws::digits::Digits,
     solver::certificate::Certificates,
 };
 use serde::Serialize;
@@ -140,8 +141,10 @@ impl Summary {
                 "a viscosity, or a density without redistribute_mass,"
             };
             format!(
-                "the contact pressure reached {most:.4e} Pa, but with weakening friction a step is certain to have one solution only up \
-                 to {bound:.4e} Pa; {remedy} raises this bound"
+                "the contact pressure reached {} Pa, but with weakening friction a step is certain to have one solution only up \
+                 to {} Pa; {remedy} raises this bound",
+                Digits(most),
+                Digits(bound)
             )
         });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {

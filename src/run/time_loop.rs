@@ -18,6 +18,7 @@ use crate::{
     fem::effect::Form,
     io::output::{checkpoint::Identity, log::Log, output_field::Converged},
     job::{Accept, Job, Loaded},
+    laws::digits::Digits,
     linear_algebra::{
         petsc::Precision,
         tensor::{larger, von_mises},
@@ -212,10 +213,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         self.certificates = renewed;
         if was_unique && !self.certificates.steps_are_unique() && !words.refusals.is_empty() {
             return Err(Error::Failed(format!(
-                "at t = {:.6e} s a step may have several solutions: theta is {:.4} for the steps of this run; choose other steps, or \
+                "at t = {:.6e} s a step may have several solutions: theta is {} for the steps of this run; choose other steps, or \
                  accept it with [solver] accept = [\"uniqueness\"]",
                 state.time,
-                self.certificates.theta_step.unwrap_or(f64::NAN)
+                Digits(self.certificates.theta_step.unwrap_or(f64::NAN))
             )));
         }
         Ok(())
@@ -441,9 +442,10 @@ fn refuse_uncertified(known: &Certificates, outcome: &StepOutcome, time: f64) ->
         return Ok(());
     }
     Err(Error::Internal(format!(
-        "the search found {} solutions of the step to t = {time:.6e} s, which has one because theta of a step is {theta:.4}: this is a \
+        "the search found {} solutions of the step to t = {time:.6e} s, which has one because theta of a step is {}: this is a \
          fault of the program, and neither the certificate nor the solutions can be relied on; please report it with the job",
-        outcome.solutions
+        outcome.solutions,
+        Digits(theta)
     )))
 }
 
@@ -468,7 +470,7 @@ mod tests {
         let words = fault.to_string();
         assert_eq!(Exit::from(fault) as u8, 4);
         assert!(words.contains("found 3 solutions of the step to t = 2.500000e-1 s"), "{words}");
-        assert!(words.contains("theta of a step is 0.5000") && words.contains("please report"), "{words}");
+        assert!(words.contains("theta of a step is 0.5:") && words.contains("please report"), "{words}");
         let passes =
             |known: Certificates, found: StepOutcome| refuse_uncertified(&known, &found, 0.25).is_ok();
         assert!(

@@ -3,6 +3,7 @@
 use crate::{
     error::Result,
     fem::{body::Body, effect::Contact},
+    io::output::quantity_name::RunOf,
     job::{Loaded, MeshNames},
     mesh::{Mesh, free_motions},
     parallel::{agreement::Agreed, session::Session},
@@ -26,6 +27,7 @@ pub(super) fn validate<const D: usize>(
         inner: &inner,
     };
     session.agree(loaded.check_mesh(names))?;
+    session.agree(refuse_unknown_results::<D>(loaded))?;
     session.agree(refuse_empty_matrix(mesh, loaded))?;
     refuse_conflicts(session, mesh, loaded)?;
     let quality = mesh.quality_summary(session);
@@ -37,6 +39,16 @@ pub(super) fn validate<const D: usize>(
         ));
     }
     Ok(())
+}
+
+/// Refuses expected results that no run of the job has: they would be missed at its end only.
+fn refuse_unknown_results<const D: usize>(loaded: &Loaded) -> Result<()> {
+    let job = &loaded.job;
+    let run = RunOf { job, called: "the job", dimension: D };
+    let faults = job.check.keys().flat_map(|name| {
+        run.faults_of_name(name).into_iter().map(|fault| (name.as_str(), fault)).collect::<Vec<_>>()
+    });
+    loaded.refuse_names("check", faults.collect())
 }
 
 fn refuse_conflicts<const D: usize>(

@@ -79,7 +79,7 @@ fn check_says_how_contact_pressures_grow_with_the_velocity() {
     assert!(growth(&wall).is_null());
     let job = wall.written();
     launch::run(1, &["check", job.to_str().expect("path")]).expect(0).says(
-        "m_j = 0.0000 Pa s/m, the growth constant is infinite because a contact law ends in a vertical ray: ",
+        "m_j = 0 Pa s/m, the growth constant is infinite because a contact law ends in a vertical ray: ",
     );
     let springs = Case::of("compliant_foundation").set("time.end", "0.05");
     let results = springs.run(1);
@@ -118,8 +118,8 @@ fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law(
         );
         let words = unbounded["certificates"]["not_covered"][1].as_str().expect("words").to_owned();
         assert!(
-            words.contains("with the sliding velocity by up to 4.0000 Pa s/m for each Pa")
-                && words.contains("theta of a step is 4.7")
+            words.contains("with the sliding velocity by up to 4 Pa s/m for each Pa")
+                && words.contains("theta of a step is 0.00047")
                 && words.contains("e-4 for each Pa, so that each step has one solution")
                 && words.contains("for given contact pressures up to 2.12"),
             "{words}"
@@ -321,7 +321,7 @@ fn a_certificate_is_that_of_the_shortest_step_where_short_steps_are_worse() {
     close(shortest, 0.03, 1e-12, "the shortest step");
     close(longest, 0.08, 1e-12, "the longest step");
     let refused = safe().set("time.land_on", "[0.11]").run_with(2, &["--force"]).expect(2);
-    refused.says("a step between 3.0000e-2 and 8.0000e-2 s may have several solutions");
+    refused.says("a step between 0.03 and 0.08 s may have several solutions");
 }
 
 #[test]

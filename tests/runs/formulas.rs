@@ -97,3 +97,14 @@ fn a_pressure_with_an_infinite_slope_brakes_a_column() {
     assert!((velocity + 0.25).abs() < 1e-4, "10 Pa at {velocity} m/s");
     assert!(results.number("max_energy_imbalance") < 1e-10);
 }
+
+#[test]
+fn nearly_constant_bounds_where_a_body_lifts_off_are_named_with_a_remedy_that_works() {
+    let strip = |coefficient: &str| {
+        let law = format!("{{ expression = {{ coefficient = '{coefficient}' }} }}");
+        Case::of("peeled_strip").set("time.end", "0.02").set("contact.0.friction", &law)
+    };
+    let words = "friction bounds grow by 300000 Pa for each Pa of contact pressure where points come under pressure: use";
+    strip("300/(p + 1e-3)").run_with(1, &[]).expect(1).says(words);
+    strip("300/(p + 300)").run(1);
+}

@@ -145,8 +145,7 @@ impl RunTable {
 
     /// The first line of its file, with these of its groups.
     pub(super) fn header(&self, dimension: usize, is_there: &[bool]) -> String {
-        let groups = self.groups.iter().zip(is_there).filter(|(_, is_there)| **is_there);
-        let columns = groups.flat_map(|(group, _)| *group).flat_map(|column| column.names(dimension));
+        let columns = self.columns_of_groups(dimension, is_there);
         self.keys.iter().map(|key| (*key).to_owned()).chain(columns).collect::<Vec<_>>().join(",")
     }
 
@@ -156,6 +155,12 @@ impl RunTable {
         columns.flat_map(move |column| {
             column.names(dimension).into_iter().map(move |name| (name, column.units[dimension - 2]))
         })
+    }
+
+    /// The columns of numbers in these of its groups.
+    pub(super) fn columns_of_groups(&self, dimension: usize, is_there: &[bool]) -> Vec<String> {
+        let groups = self.groups.iter().zip(is_there).filter(|(_, is_there)| **is_there);
+        groups.flat_map(|(group, _)| *group).flat_map(|column| column.names(dimension)).collect()
     }
 
     /// The unit of a column; empty for one without a unit.

@@ -24,6 +24,7 @@ pub(crate) mod output_field;
 pub mod parallel_file;
 pub(crate) mod probes;
 pub mod profiles;
+pub(crate) mod quantity_name;
 pub(crate) mod resultants;
 pub mod redistribution;
 mod free_space;

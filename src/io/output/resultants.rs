@@ -49,12 +49,7 @@ impl<const D: usize> ResultantTable<D> {
             names.extend((1..).map(same).find(|name| !names.contains(name)));
         }
         let names = names.iter().map(|name| entry(name)).collect();
-        let friction = job.contact.iter().any(|contact| contact.friction.is_some());
-        let loads = || job.contact.iter().filter_map(|contact| contact.obstacle_load.as_ref());
-        let moves = loads().any(|load| !load.direction.is_empty());
-        let turns = loads().any(|load| load.moment.is_some());
-        let with = [true, !job.contact.is_empty(), friction, moves, turns];
-        Ok(Self { resultants, names, with, file: None })
+        Ok(Self { resultants, names, with: groups(job), file: None })
     }
 
     /// Opens the file on rank 0; continues it after this step if one is given.
@@ -130,6 +125,15 @@ fn name(job: &Job, source: Source) -> String {
         Source::Momentum => return "momentum".into(),
     };
     format!("{kind} {}", on.join("+"))
+}
+
+/// The groups of columns that a run of the job has.
+pub(super) fn groups(job: &Job) -> [bool; 5] {
+    let friction = job.contact.iter().any(|contact| contact.friction.is_some());
+    let loads = || job.contact.iter().filter_map(|contact| contact.obstacle_load.as_ref());
+    let moves = loads().any(|load| !load.direction.is_empty());
+    let turns = loads().any(|load| load.moment.is_some());
+    [true, !job.contact.is_empty(), friction, moves, turns]
 }
 
 /// The names of all sources that a run of the job may have.

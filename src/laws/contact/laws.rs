@@ -87,7 +87,7 @@ impl NormalLaw {
     }
 
     /// Whether the law has a gap, or takes that of an obstacle.
-    pub(super) fn has_gap(&self) -> bool {
+    pub(crate) fn has_gap(&self) -> bool {
         self.response().is_ok_and(|law| law.depends_on_displacement())
     }
 

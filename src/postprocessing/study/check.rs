@@ -1,11 +1,8 @@
 //! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
-use super::{
-    document::{Exact, ProbeError, Quantity, Reference, Response, Run, Space, Study, Values},
-    quantity::TableQuantity,
-};
+use super::document::{Exact, ProbeError, Quantity, Reference, Response, Run, Space, Study, Values};
 use crate::{
-    io::output::{columns::RunTable, field_list::FIELDS, resultants::source_names},
+    io::output::quantity_name::{RunOf, TableQuantity},
     job::{Document, Job},
     laws::nearest::nearest,
 };
@@ -164,95 +161,19 @@ fn check_exact(exact: &Exact, of: Quantity, base: &Job, path: &str, document: &m
     }
 }
 
-/// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 19] = [
-    "ranks",
-    "dimension",
-    "cells",
-    "nodes",
-    "unknowns",
-    "steps",
-    "time",
-    "rejected_steps",
-    "set_ups",
-    "newton_iterations",
-    "linear_iterations",
-    "final_von_mises",
-    "max_von_mises",
-    "max_strain",
-    "max_inclusion_residual",
-    "max_residual",
-    "max_energy_imbalance",
-    "max_slip_pressure",
-    "peak_memory_bytes",
-];
-
-/// The names that the last part of a response may have, if they are known before the runs.
-fn known_columns(parts: &[&str], base: &Job) -> Vec<String> {
-    if let Some(table) = parts.first().and_then(|word| RunTable::of(word)) {
-        return table.columns(base.dimension().unwrap_or(3)).map(|(name, _)| name).collect();
-    }
-    let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.names);
-    let of_summary = OF_SUMMARY.iter().chain(figures).filter(|_| parts.len() == 1);
-    of_summary.map(|name| (*name).to_owned()).collect()
-}
-
 /// Checks that the quantity is one of a known form, that the base job has its probe or profile, and that it is a column of its table.
 fn check_response(study: &Study, base: &Job, index: usize, document: &mut Document) {
     let response = &study.response[index];
     let name = &response.of;
     let path = format!("response.{index}.of");
-    let quantity = TableQuantity::parse(name);
-    let parts: Vec<&str> = name.split('.').collect();
-    let has_form = match &quantity {
-        Some(TableQuantity { table, of, side, .. }) => {
-            let sides: &[Option<&str>] = if table.word == "profile" {
-                &[Some("max"), Some("min"), Some("first")]
-            } else {
-                &[None, Some("max"), Some("min"), Some("mean"), Some("amplitude")]
-            };
-            sides.contains(side) && *of != Some("")
-        }
-        None => RunTable::of(parts[0]).is_none() && parts.iter().all(|part| !part.is_empty()),
-    };
-    match quantity.filter(|_| has_form).and_then(|quantity| Some((quantity.table.word, quantity.of?))) {
-        Some(("probe", probe)) => check_probe_name(base, probe, &path, document),
-        Some(("profile", boundary)) => {
-            let names: Vec<&str> = base.output.profile.iter().map(|profile| profile.on.as_str()).collect();
-            if !names.contains(&boundary) {
-                let message = format!("the base job has no profile along `{boundary}`");
-                document.fault(&path, message, listed(&names, "profiles: add [[output.profile]] to it"));
-            }
-        }
-        Some(("resultant", source)) => {
-            let names = source_names(base);
-            if !names.iter().any(|name| name == source) {
-                let near = nearest(source, names.iter().map(String::as_str));
-                let near = near.map_or(String::new(), |near| format!("did you mean `{near}`? "));
-                let help = format!("{near}the base job has: {}", names.join(", "));
-                document.fault(&path, format!("no source of resultants is called `{source}`"), help);
-            }
-        }
-        _ => {}
-    }
-    let known = known_columns(&parts, base);
-    let column = parts.last().copied().unwrap_or_default();
-    if has_form && !known.is_empty() && !known.iter().any(|known| known == column) {
-        let names = || known.iter().map(String::as_str);
-        let near = nearest(column, names()).map_or(String::new(), |near| format!("did you mean `{near}`? "));
-        let help = format!("{near}it may be {}", names().collect::<Vec<_>>().join(", "));
-        document.fault(&path, format!("there is no quantity `{name}`"), help);
-    }
-    if !has_form {
-        let help = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
-                    resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also history.max.COLUMN and \
-                    resultant.SOURCE.max.COLUMN; .min., .mean. or .amplitude. in place of .max., of profiles .min. or .first.)";
-        document.fault(&path, format!("`{name}` is not a quantity"), help);
-    }
+    let run = RunOf { job: base, called: "the base job", dimension: base.dimension().unwrap_or(3) };
+    let faults = run.faults_of_name(name);
+    let is_known = faults.is_empty();
+    faults.into_iter().for_each(|[message, help]| document.fault(&path, message, help));
     if study.response[..index].iter().any(|other| other.name() == response.name()) {
         document.fault(&path, format!("`{name}` is given twice"), "delete one of them");
     }
-    if has_form && !response.window().is_whole() {
+    if is_known && !response.window().is_whole() {
         check_window(response, base, &format!("response.{index}"), document);
     }
 }

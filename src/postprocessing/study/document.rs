@@ -1,10 +1,11 @@
 //! The study as plain structs: the single source of the name, meaning, unit, range and default of each key.
 
-use super::quantity::{TableQuantity, Window};
+use super::quantity::Window;
 use crate::{
     io::output::{
         field_list::{DISPLACEMENT, STRESS, VELOCITY},
         output_field::OutputField,
+        quantity_name::TableQuantity,
     },
     job::{Kind, Scalar, Scheme, schema_of},
 };

@@ -1,7 +1,7 @@
 //! Quantities of a finished run by name, as in `[check]` of a job.
 
 use crate::{
-    io::output::{columns::RunTable, csv::records},
+    io::output::{csv::records, quantity_name::TableQuantity},
     linear_algebra::tensor::larger,
 };
 use std::path::Path;
@@ -27,33 +27,6 @@ impl Window {
     fn contains(self, time: f64) -> bool {
         let slack = ROUNDING * time.abs();
         self.from.is_none_or(|from| time >= from - slack) && self.to.is_none_or(|to| time <= to + slack)
-    }
-}
-
-/// A quantity of a table, by its name.
-pub(super) struct TableQuantity<'a> {
-    /// The table.
-    pub table: &'static RunTable,
-    /// The probe, source or boundary, which may contain dots; absent for a table without names.
-    pub of: Option<&'a str>,
-    /// The extremum, `mean`, `amplitude` or `first`.
-    pub side: Option<&'a str>,
-    /// The column.
-    pub column: &'a str,
-}
-
-impl<'a> TableQuantity<'a> {
-    /// The parts of `TABLE.NAME.COLUMN` or `TABLE.NAME.SIDE.COLUMN`, in tables without names those without `NAME`.
-    pub(super) fn parse(name: &'a str) -> Option<Self> {
-        let (word, rest) = name.split_once('.')?;
-        let table = RunTable::of(word)?;
-        let (before, column) = rest.rsplit_once('.').unwrap_or(("", rest));
-        let (of, side) = match before.rsplit_once('.') {
-            _ if table.keys.is_empty() => (None, Some(before).filter(|side| !side.is_empty())),
-            Some((of, side @ ("max" | "min" | "mean" | "amplitude" | "first"))) => (Some(of), Some(side)),
-            _ => (Some(before), None),
-        };
-        Some(Self { table, of, side, column })
     }
 }
 

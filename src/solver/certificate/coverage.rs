@@ -1,7 +1,10 @@
 //! Cases that the certificates do not cover.
 
 use super::Certificates;
-use crate::fem::{body::Body, effect::Contact};
+use crate::{
+    fem::{body::Body, effect::Contact},
+    laws::digits::Digits,
+};
 
 /// Whether `theta_step` below 1 excludes a second solution of a step: nothing in the step depends on the unknown contact pressures or
 /// softens, and cells do not flow in it.
@@ -42,8 +45,9 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
     }
     if let Some(decrease) = decrease_with_displacement {
         words.push(format!(
-            "a contact pressure decreases with the displacement, by up to {decrease:.4e} Pa/m: theta of a step accounts for \
-             this, but uniqueness of the continuous problem is not certified"
+            "a contact pressure decreases with the displacement, by up to {} Pa/m: theta of a step accounts for \
+             this, but uniqueness of the continuous problem is not certified",
+            Digits(decrease)
         ));
     }
     for fall in contacts.iter().filter_map(|contact| contact.decrease_per_pressure(step_length)) {
@@ -59,17 +63,19 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
             let each = match theta_step {
                 Some(0.0) => {
                     let each = (1.0 - Certificates::MARGIN) / bound;
-                    format!("theta of a step is {each:.4e} for each Pa, so that ")
+                    format!("theta of a step is {} for each Pa, so that ", Digits(each))
                 }
                 _ => String::new(),
             };
             format!(
-                "; {each}each step has one solution for given contact pressures up to {bound:.4e} Pa; the run warns if they exceed this bound"
+                "; {each}each step has one solution for given contact pressures up to {} Pa; the run warns if they exceed this bound",
+                Digits(bound)
             )
         });
         words.push(format!(
-            "the friction traction decreases with the sliding velocity by up to {fall:.4} Pa s/m for each Pa of contact \
-             pressure, and the normal law does not bound the pressure: theta does not cover this decrease{covered}"
+            "the friction traction decreases with the sliding velocity by up to {} Pa s/m for each Pa of contact \
+             pressure, and the normal law does not bound the pressure: theta does not cover this decrease{covered}",
+            Digits(fall)
         ));
     }
     if theta_step.is_some() {

@@ -1,7 +1,7 @@
 //! The consequences of the certificates for a run.
 
 use super::Certificates;
-use crate::job::Accept;
+use crate::{job::Accept, laws::digits::Digits};
 
 /// The outcome.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,7 +21,7 @@ impl Certificates {
         let mut verdict = Verdict::default();
         verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
         if let Some(fall) = self.monotonicity_constant {
-            verdict.words.push(format!("m_j = {fall:.4} Pa s/m, {}", self.growth()));
+            verdict.words.push(format!("m_j = {} Pa s/m, {}", Digits(fall), self.growth()));
         }
         let covered = if self.not_covered.is_empty() { "" } else { ", except for what is not covered" };
         if let Some(theta) = self.theta {
@@ -31,11 +31,11 @@ impl Certificates {
                 verdict.warnings.push(format!(
                     "theta = {} is not below 1: the continuous problem may have several solutions; to \
                      exclude this, increase the viscosity or use a contact law that decreases less steeply",
-                    short(theta)
+                    Digits(theta)
                 ));
                 "not below 1: the continuous problem may have several solutions"
             };
-            verdict.words.push(format!("theta = {}, {meaning}{covered}", short(theta)));
+            verdict.words.push(format!("theta = {}, {meaning}{covered}", Digits(theta)));
         }
         let fall = self.monotonicity_constant.filter(|_| self.decrease_with_displacement.is_none());
         if let (Some(modulus), Some(fall)) = (self.viscosity_modulus, fall) {
@@ -46,19 +46,21 @@ impl Certificates {
             };
             let (sign, meaning) = if modulus > product { (">", "holds") } else { ("<=", "does not hold") };
             let size = if product < f64::INFINITY {
-                format!("{product:.4} Pa s")
+                format!("{} Pa s", Digits(product))
             } else {
                 "infinite (the supports do not prevent a rigid motion against the contact)".to_owned()
             };
             verdict.words.push(format!(
-                "m_A = {modulus:.4} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) of Wang and Cheng (2022) {meaning}"
+                "m_A = {} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) of Wang and Cheng (2022) {meaning}",
+                Digits(modulus)
             ));
         }
         if let Some(theta) = self.theta_step {
             if self.steps_are_unique() {
                 let steps = self.steps_in_words();
                 verdict.words.push(format!(
-                    "theta of a step = {theta:.4}, below 1: each step{steps} has one solution{covered}"
+                    "theta of a step = {}, below 1: each step{steps} has one solution{covered}",
+                    Digits(theta)
                 ));
             } else {
                 let steps = self.step_range.unwrap_or([step; 2]);
@@ -70,8 +72,9 @@ impl Certificates {
             if let Some(flowing) = self.flowing_step_bound.filter(|flowing| (*flowing..bound).contains(&step))
             {
                 verdict.warnings.push(format!(
-                    "the step of {step} s exceeds {flowing:.4e} s: errors may grow where most of the body flows; a step below \
-                     {flowing:.4e} s or an implicit scheme prevents this"
+                    "the step of {step} s exceeds {0} s: errors may grow where most of the body flows; a step below \
+                     {0} s or an implicit scheme prevents this",
+                    Digits(flowing)
                 ));
             }
         }
@@ -82,7 +85,9 @@ impl Certificates {
     fn growth(&self) -> String {
         match (self.growth_constants, &self.unbounded_growth) {
             (Some([rest, slope]), _) => format!(
-                "|dj(r)| <= {rest:.4} Pa + {slope:.4} Pa s/m |r|: the contact pressure grows at most linearly with the velocity r, as hypothesis H(j) of Wang and Cheng (2022) requires"
+                "|dj(r)| <= {} Pa + {} Pa s/m |r|: the contact pressure grows at most linearly with the velocity r, as hypothesis H(j) of Wang and Cheng (2022) requires",
+                Digits(rest),
+                Digits(slope)
             ),
             (None, Some(why)) => format!("{why}: hypothesis H(j) does not apply"),
             (None, None) => "growth constant unknown".into(),
@@ -102,11 +107,11 @@ impl Verdict {
         let steps = if shortest == longest {
             format!("a step of {longest} s")
         } else {
-            format!("a step between {shortest:.4e} and {longest:.4e} s")
+            format!("a step between {} and {} s", Digits(shortest), Digits(longest))
         };
         let found = format!(
             "theta of a step = {} is not below {}: {steps} may have several solutions",
-            short(theta),
+            Digits(theta),
             if theta < 1.0 { 1.0 - Certificates::MARGIN } else { 1.0 }
         );
         self.words.push(found.clone());
@@ -123,7 +128,7 @@ impl Verdict {
                      redistribute_mass{longer}"
                 )
             },
-            |largest| format!("the largest step with one solution is {largest:.4e} s"),
+            |largest| format!("the largest step with one solution is {} s", Digits(largest)),
         );
         self.judge(
             found,
@@ -133,6 +138,7 @@ impl Verdict {
     }
 
     fn stability(&mut self, known: &Certificates, bound: f64, step: f64, accepted: bool) {
+        let least_bound = Digits(bound);
         let (is_least, follows_stress) = (known.explicit_bound_is_least, known.explicit_bound_follows_stress);
         if step < bound {
             let least = if is_least { "at least " } else { "" };
@@ -142,17 +148,17 @@ impl Verdict {
                 ""
             };
             self.words.push(format!(
-                "steps are stable up to {least}{bound:.4e} s (elastic and viscoplastic stress, adhesion and contact memory are \
+                "steps are stable up to {least}{least_bound} s (elastic and viscoplastic stress, adhesion and contact memory are \
                  explicit){power}"
             ));
             return;
         }
         let found = format!(
-            "the step of {step} s exceeds {bound:.4e} s, above which explicit stresses amplify errors"
+            "the step of {step} s exceeds {least_bound} s, above which explicit stresses amplify errors"
         );
         self.words.push(found.clone());
         let remedy = format!(
-            "use a step below {bound:.4e} s, [time] scheme = \"implicit_euler\", or accept it with \
+            "use a step below {least_bound} s, [time] scheme = \"implicit_euler\", or accept it with \
              [solver] accept = [\"explicit_stability\"]"
         );
         self.judge(found, remedy, accepted);
@@ -165,11 +171,6 @@ impl Verdict {
             self.refusals.push((found, remedy));
         }
     }
-}
-
-/// Four decimals, of large numbers four digits.
-fn short(number: f64) -> String {
-    if number < 1e6 { format!("{number:.4}") } else { format!("{number:.3e}") }
 }
 
 #[cfg(test)]
@@ -210,7 +211,7 @@ mod tests {
         let first = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).words[0].clone();
         assert_eq!(
             first(paper()),
-            "m_j = 10.0000 Pa s/m, |dj(r)| <= 0.0000 Pa + 10.0000 Pa s/m |r|: the contact pressure grows at most linearly with the velocity r, as hypothesis H(j) of Wang and Cheng (2022) requires"
+            "m_j = 10 Pa s/m, |dj(r)| <= 0 Pa + 10 Pa s/m |r|: the contact pressure grows at most linearly with the velocity r, as hypothesis H(j) of Wang and Cheng (2022) requires"
         );
         let why = Some("the growth constant is infinite".into());
         let wall = first(Certificates { growth_constants: None, unbounded_growth: why, ..paper() });
@@ -229,7 +230,7 @@ mod tests {
         };
         assert_eq!(
             words(0.0),
-            "m_A = 50.0000 Pa s > m_j |gamma|^2 = 0.0000 Pa s: condition (13) of Wang and Cheng (2022) holds"
+            "m_A = 50 Pa s > m_j |gamma|^2 = 0 Pa s: condition (13) of Wang and Cheng (2022) holds"
         );
         assert!(words(0.1).contains("<= m_j |gamma|^2 = infinite") && words(0.1).contains("does not hold"));
     }
@@ -245,7 +246,7 @@ mod tests {
     fn a_bound_that_is_only_the_least_is_said_to_be_that() {
         let known = Certificates { explicit_bound_is_least: true, ..paper() };
         let words = known.verdict(0.01, None, &[]).words;
-        assert!(words.iter().any(|words| words.starts_with("steps are stable up to at least 1.2000e-1 s")));
+        assert!(words.iter().any(|words| words.starts_with("steps are stable up to at least 0.12 s")));
     }
 
     #[test]
@@ -269,7 +270,7 @@ mod tests {
     #[test]
     fn a_step_that_is_stable_while_little_flows_is_warned_of() {
         let verdict = paper().verdict(0.1, None, &[]);
-        assert!(verdict.refusals.is_empty() && verdict.warnings[0].contains("exceeds 8.0000e-2 s"));
+        assert!(verdict.refusals.is_empty() && verdict.warnings[0].contains("exceeds 0.08 s"));
         assert!(paper().verdict(0.079, None, &[]).warnings.is_empty());
     }
 
@@ -278,9 +279,7 @@ mod tests {
         let known = Certificates { theta_step: Some(1.2), ..paper() };
         let refused = known.verdict(0.125, Some(0.05), &[]);
         assert_eq!(refused.refusals.len(), 2);
-        assert!(
-            refused.refusals[0].1.contains("5.0000e-2 s") && refused.refusals[1].1.contains("1.2000e-1 s")
-        );
+        assert!(refused.refusals[0].1.contains("0.05 s") && refused.refusals[1].1.contains("0.12 s"));
         assert!(refused.refusals[1].1.contains("scheme = \"implicit_euler\""), "{:?}", refused.refusals[1]);
         let all = [Accept::Uniqueness, Accept::ExplicitStability];
         let accepted = known.verdict(0.125, Some(0.05), &all);

@@ -10,14 +10,14 @@ use super::{
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
     obstacle_motions::ObstacleMotions,
-    problem::{MASSLESS_REMEDY, REMEDY, SOFTENING_REMEDY, StepProblem, System},
+    problem::{MASSLESS_REMEDY, REMEDY, STEEP_RISE, StepProblem, System, rise_remedy, softening_remedy},
     solver::Reduced,
 };
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{COUNTS, Contact, Energy, Peaks, PointCount},
+        effect::{COUNTS, Contact, Energy, Form, Peaks, PointCount},
     },
     linear_algebra::{
         petsc::{DistributedVector, ProjectedKsp, Snes, has_option},
@@ -519,23 +519,33 @@ fn set_give<const D: usize, const S: usize>(body: &mut Body<D, S>, ratio: f64) {
     body.contacts.iter_mut().for_each(|contact| contact.set_give(ratio / contact.friction_scale()));
 }
 
-/// The failure of a step, which may lie at laws that soften.
+/// The failure of a step, which may lie at laws that soften or at friction whose bounds grow steeply. Collective.
 fn explain_failure<const D: usize, const S: usize>(
     problem: &StepProblem<'_, D, S>,
     why: &str,
     softens: bool,
 ) -> Error {
+    let contacts = &problem.body.contacts;
+    let rises = contacts.iter().map(Contact::rise_of_bound);
+    let [rise] = problem.session.largest([rises.fold(0.0, larger)]);
+    if rise > STEEP_RISE {
+        return problem.failed(why, &rise_remedy(rise));
+    }
     if !softens {
         return problem.failed(why, REMEDY);
     }
-    let contacts = &problem.body.contacts;
     let falls = contacts.iter().any(|contact| contact.monotonicity_constant() > 0.0);
     let weakens = contacts.iter().any(Contact::has_decreasing_friction);
     let own = [falls.then_some("contact"), weakens.then_some("friction")];
     let names: Vec<&str> = problem.body.softening().chain(own.into_iter().flatten()).collect();
     let why = format!("{why}; forces of {} fall here as the body moves", names.join(", "));
     let is_massless = weakens && problem.body.redistributed_mass.is_some();
-    problem.failed(&why, if is_massless { MASSLESS_REMEDY } else { SOFTENING_REMEDY })
+    if is_massless {
+        return problem.failed(&why, MASSLESS_REMEDY);
+    }
+    let body = &problem.body;
+    let has = [Form::Mass, Form::Viscosity].map(|form| body.has_form(form));
+    problem.failed(&why, &softening_remedy(has, body.softens_at_surface()))
 }
 
 /// Whether pressure or friction of a contact decrease with the motion.

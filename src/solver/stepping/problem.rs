@@ -7,6 +7,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{body::Body, effect::Step, state::State},
+    laws::digits::Digits,
     linear_algebra::petsc::DistributedVector,
     parallel::session::Session,
 };
@@ -76,10 +77,55 @@ impl System<'_> {
 pub(super) const REMEDY: &str =
     "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
 
-/// The same where laws soften: shorter steps help only if something resists fast motions.
-pub(super) const SOFTENING_REMEDY: &str = "give the body a density or a viscosity and try a smaller [time] step, refine the mesh where these forces fall, \
-     or lower the `strength` of bonds";
+/// The same where laws soften, given whether the body has a density and a viscosity and whether bonds soften: shorter steps help only if
+/// something resists fast motions.
+pub(super) fn softening_remedy([has_density, has_viscosity]: [bool; 2], has_bonds: bool) -> String {
+    let first = match (has_density, has_viscosity) {
+        (false, false) => "give the body a density or a viscosity and try a smaller [time] step",
+        (true, false) => "try a smaller [time] step, give the body a viscosity",
+        (_, true) => "try a smaller [time] step",
+    };
+    let mesh = "refine the mesh where these forces fall";
+    if has_bonds {
+        format!("{first}, {mesh}, or lower the `strength` of bonds")
+    } else {
+        format!("{first}, or {mesh}")
+    }
+}
+
+/// Growth of friction bounds with the pressure above which it is named as the reason of a failure. With Coulomb's law a step may have no
+/// solution or several from a coefficient of about 1 on, which depends on the body.
+pub(super) const STEEP_RISE: f64 = 2.0;
+
+/// The same for friction whose bound grows so steeply with the contact pressure: of points that are about to open or to close, the
+/// rounded pressure decides between no friction and all of it.
+pub(super) fn rise_remedy(rise: f64) -> String {
+    format!(
+        "friction bounds grow by {} Pa for each Pa of contact pressure where points come under pressure: use a friction coefficient that, \
+         multiplied by the pressure, grows by about 1 Pa for each Pa there (in `c/(p + d)` a larger d), or [contact.friction.tresca], whose \
+         bound does not depend on the pressure",
+        Digits(rise)
+    )
+}
 
 /// The same for friction that weakens where the surface has no mass: the velocity jumps, the more the shorter the steps.
 pub(super) const MASSLESS_REMEDY: &str = "friction that weakens makes the velocity of a surface without mass jump, the more the \
      shorter the steps: leave its mass there (`redistribute_mass = false`, under bdf2 or implicit_euler) or give the material a viscosity";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_is_given_only_what_it_lacks() {
+        let says = |has, words: &str| softening_remedy(has, false).contains(words);
+        assert!(says([false; 2], "give the body a density or a viscosity"));
+        assert!(says([true, false], "give the body a viscosity"));
+        assert!(
+            !says([false, true], "give")
+                && !says([true; 2], "give")
+                && says([true; 2], "smaller [time] step, or")
+        );
+        assert!(softening_remedy([true; 2], true).ends_with("or lower the `strength` of bonds"));
+    }
+}

@@ -41,6 +41,9 @@ fn times(dimension: Dimension, by: Dimension) -> Dimension {
 /// Steps of a scene, and their length in s.
 pub const STEPS: u32 = 12;
 pub const STEP: f64 = 0.003;
+/// Names of probes with the first coordinate and all others in m: a corner, which waves from the left side may not have reached, and a
+/// point beside that side.
+pub const PROBES: [(&str, [f64; 2]); 2] = [("corner", [1.2, 0.9]), ("left", [0.2, 0.5])];
 /// A time in s at which adaptive steps must end, and a kink of a load so shortly before it that a step is shorter than any certified.
 const LANDING: f64 = 7.3 * STEP;
 const KINK: f64 = LANDING - 1e-3 * STEP;
@@ -248,11 +251,12 @@ pub fn scene<const D: usize>(number: u64, frame: Frame) -> Scene<D> {
     }
     loads(&mut draw, &content);
     contacts(&mut draw, &content);
-    draw.line("[[output.probe]]\nname = \"corner\"");
-    let mut corner = [0.9; D];
-    corner[0] = 1.2 + from_axis::<D>(number, content.has_base);
-    let corner = draw.vector(corner, LENGTH);
-    draw.line(format!("point = {corner}"));
+    for (name, [x, rest]) in PROBES {
+        let mut point = [rest; D];
+        point[0] = x + from_axis::<D>(number, content.has_base);
+        let point = draw.vector(point, LENGTH);
+        draw.line(format!("[[output.probe]]\nname = \"{name}\"\npoint = {point}"));
+    }
     let half = draw.number(STEP * f64::from(STEPS / 2), TIME);
     draw.line(format!("[checkpoint]\nat = [{half:e}]"));
     let has_stages = draw.chance(0.12);

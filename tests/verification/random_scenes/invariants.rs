@@ -1,6 +1,6 @@
 //! What holds in each random scene.
 
-use super::drawn::{Frame, STEP, Scene, is_revolved, scene, turned};
+use super::drawn::{Frame, PROBES, STEP, Scene, is_revolved, scene, turned};
 use clarke::{
     error::Exit,
     job::Job,
@@ -21,6 +21,10 @@ const BALANCE: f64 = 1e-7;
 const EQUAL: f64 = 1e-5;
 /// The same where rounding errors choose among adaptive steps, or among several solutions of a step.
 const CHOSEN: f64 = 3e-2;
+/// What the log says of a step that has passed unstable states.
+const JUMP: &str = "passes unstable states";
+/// What the log says of the number of linear systems that were indefinite.
+const INDEFINITE: &str = "linear systems were indefinite";
 /// Energies in J that are none: a body that moves rigidly has rounding errors alone.
 const NONE: f64 = 1e-12;
 /// Errors of momentum in a step as a share of the energy over 1 m/s: the tolerance of a step. A body that moves freely has no other
@@ -68,8 +72,8 @@ pub fn hold(session: &Session, numbers: std::ops::Range<u64>, folder: &Path) {
 struct Results<const D: usize> {
     /// Columns of the history, by their names.
     history: BTreeMap<String, Vec<f64>>,
-    /// Displacement and velocity of the probe at the end, in the frame.
-    probe: Vec<[f64; D]>,
+    /// Displacement and velocity of each probe at the end, in the frame.
+    probes: Vec<[[f64; D]; 2]>,
     /// Forces and moments.
     open: [Open; 2],
 }
@@ -220,11 +224,11 @@ impl<const D: usize> Trial<'_, D> {
 
     /// Shorter steps must approach a limit, unless the body passes unstable states: where it lands depends on the steps.
     fn halve(&self, plain: &Results<D>, fault: &mut impl FnMut(String)) {
-        let mut values = vec![self.sample(plain)];
+        let mut values = vec![Self::sample(plain)];
         for steps in [2, 4, 8] {
             let name = format!("steps-{steps}");
             match self.run(Frame { steps, ..Frame::PLAIN }, &name, &Start::Anew) {
-                Ok(()) => values.push(self.sample(&self.results(&name))),
+                Ok(()) => values.push(Self::sample(&self.results(&name))),
                 // A certificate may exclude short steps. Friction that weakens where the surface has neither mass nor viscosity has no
                 // limit of short steps: velocities are jumps over lengths of steps.
                 Err((Exit::Refused, _)) => return,
@@ -249,9 +253,10 @@ impl<const D: usize> Trial<'_, D> {
         }
     }
 
-    /// The velocity and the displacement of the probe at the end; velocities count for the length of the run.
-    fn sample(&self, results: &Results<D>) -> Vec<f64> {
-        results.probe[0].to_vec()
+    /// The displacements of all probes at the end. Convergence is one of the body: where a wave has hardly come to a probe, the errors there
+    /// are those of the wave elsewhere.
+    fn sample(results: &Results<D>) -> Vec<f64> {
+        results.probes.iter().flat_map(|[displacement, _]| *displacement).collect()
     }
 
     /// The output folder of the last stage.
@@ -312,14 +317,15 @@ impl<const D: usize> Trial<'_, D> {
             table[name].iter().map(number).collect()
         };
         let probes = read("probes.csv");
-        let vector = |quantity: &str| -> [f64; D] {
-            std::array::from_fn(|i| {
-                *column(&probes, &format!("{quantity}_{}", ["x", "y", "z"][i])).last().expect("a row")
-            })
+        let vector = |probe: &str, quantity: &str| -> [f64; D] {
+            let row = probes["probe"].iter().rposition(|name| name == probe).expect("a row");
+            std::array::from_fn(|i| column(&probes, &format!("{quantity}_{}", ["x", "y", "z"][i]))[row])
         };
         Results {
             history: history.keys().map(|name| (name.clone(), column(&history, name))).collect(),
-            probe: vec![vector("displacement"), vector("velocity")],
+            probes: PROBES
+                .map(|(probe, _)| ["displacement", "velocity"].map(|quantity| vector(probe, quantity)))
+                .to_vec(),
             open: open_resultants::<D>(&read("resultants.csv"), is_revolved::<D>(self.number)),
         }
     }
@@ -334,13 +340,21 @@ impl<const D: usize> Trial<'_, D> {
 
     /// Whether some stage passed unstable states: rounding errors choose where it lands.
     fn has_jumped(&self, name: &str) -> bool {
-        self.says(name, "run.log", "passes unstable states")
+        self.says(name, "run.log", JUMP)
     }
 
-    /// Whether steps may have had several solutions, as the run says.
+    /// Whether a linear system of some stage was indefinite: the energy of its step is not convex, and may have several minima.
+    fn was_indefinite(&self, name: &str) -> bool {
+        ["job", "second"].iter().any(|stage| {
+            let file = self.folder.join(name).join("out").join(stage).join("run.log");
+            let text = std::fs::read_to_string(file).unwrap_or_default();
+            text.lines().any(|line| line.contains(INDEFINITE) && !line.contains(&format!(", 0 {INDEFINITE}")))
+        })
+    }
+
+    /// Whether steps may have had several solutions without unstable states, as the run says.
     fn may_choose(&self, name: &str) -> bool {
-        self.has_jumped(name)
-            || self.says(name, "summary.json", "a step is certain to have one solution only up to")
+        self.says(name, "summary.json", "a step is certain to have one solution only up to")
     }
 
     /// Whether a run of the same scene may fail with these words where this one does not: from where it has landed after unstable
@@ -349,41 +363,98 @@ impl<const D: usize> Trial<'_, D> {
         self.has_jumped(name) && words.contains("fall here as the body moves")
     }
 
+    /// The steps of the last stage before unstable states; all of them where none were passed.
+    fn steps_before_jump(&self, name: &str) -> usize {
+        let log = |folder: &Path| std::fs::read_to_string(folder.join("run.log")).unwrap_or_default();
+        let (first, last) = (self.folder.join(name).join("out/job"), self.out(name));
+        if last != first && log(&first).contains(JUMP) {
+            return 0;
+        }
+        let number = |line: &str| line.strip_prefix("step ")?.split(',').next()?.parse::<usize>().ok();
+        let log = log(&last);
+        let jumps = log.lines().filter(|line| line.contains(JUMP));
+        jumps.map(|line| number(line).expect("a step") - 1).min().unwrap_or(usize::MAX)
+    }
+
     /// How the results of a frame differ from those of the plain one.
+    ///
+    /// Where a body has passed unstable states, the steps before must be equal. At such a state the derivative of a step is singular, and
+    /// behind it are as many equilibria as there are sets of points that may soften while others unload: rounding errors choose one.
+    /// Bonds and friction mostly meet again at the same end, damage does not: it never heals and keeps the choice. What follows is not
+    /// compared, nor where Newton's method has passed such states within a step.
     fn differences(&self, frame: Frame, plain: &str, other: &str) -> Vec<String> {
-        let may_choose = self.may_choose(plain) || self.may_choose(other);
-        let (plain, other) = (self.results(plain), self.results(other));
-        let [metre, kilogram, second] = frame.units;
+        let names = [plain, other];
+        let pair = Pair { frame, results: names.map(|name| self.results(name)) };
+        let rows = pair.results.each_ref().map(|results| results.history["step"].len());
+        let job = scene::<D>(self.number, Frame::PLAIN).job;
+        let (is_adaptive, is_damaged) = (job.contains("adaptive"), job.contains("[material.damage]"));
+        let has_jumped = names.iter().any(|name| self.has_jumped(name));
+        let is_chosen = has_jumped || names.iter().any(|name| self.was_indefinite(name));
+        let may_choose = is_adaptive || names.iter().any(|name| self.may_choose(name));
+        let share = if may_choose { CHOSEN } else { EQUAL };
+        let mut found = Vec::new();
+        if !is_adaptive && rows[0] != rows[1] {
+            found.push(format!("{} steps instead of {}", rows[1], rows[0]));
+        }
+        if !is_damaged || !is_chosen {
+            let share = if has_jumped { CHOSEN } else { share };
+            found.extend(pair.energies(rows.map(|count| count - 1), share));
+            found.extend(pair.motions(share));
+        }
+        if has_jumped && !is_adaptive && rows[0] == rows[1] {
+            let before = names.map(|name| self.steps_before_jump(name));
+            let same = before[0].min(before[1]).min(rows[0]);
+            found.extend((0..same).flat_map(|row| pair.energies([row; 2], share)));
+        }
+        found
+    }
+}
+
+/// The results of the plain frame, and those of a frame.
+struct Pair<const D: usize> {
+    frame: Frame,
+    results: [Results<D>; 2],
+}
+
+impl<const D: usize> Pair<D> {
+    /// Differences of the energies in these rows above this share of all of them.
+    fn energies(&self, rows: [usize; 2], share: f64) -> Vec<String> {
+        let [metre, kilogram, second] = self.frame.units;
         let joule = kilogram * metre * metre / (second * second);
-        let energies = plain.history.keys().filter(|name| {
+        let [plain, other] = self.results.each_ref().map(|results| &results.history);
+        let energies = plain.keys().filter(|name| {
             name.ends_with("_energy") || name.ends_with("_dissipation") || name.as_str() == "external_work"
         });
-        let last =
-            |results: &Results<D>, name: &str| results.history[name].last().copied().unwrap_or(f64::NAN);
-        let turnover: f64 = energies.clone().map(|name| last(&plain, name).abs()).sum();
+        let turnover: f64 = energies.clone().map(|name| plain[name][rows[0]].abs()).sum();
         let mut found = Vec::new();
-        let is_adaptive = scene::<D>(self.number, Frame::PLAIN).job.contains("adaptive");
-        let share = if is_adaptive || may_choose { CHOSEN } else { EQUAL };
         for name in energies {
-            let (expected, got) = (last(&plain, name), last(&other, name) / joule);
+            let (expected, got) = (plain[name][rows[0]], other[name][rows[1]] / joule);
             if exceeds((got - expected).abs(), share * turnover + NONE) {
-                found.push(format!("{name} {got:e} instead of {expected:e} of {turnover:e} J"));
+                let step = rows[0] + 1;
+                found
+                    .push(format!("{name} {got:e} instead of {expected:e} of {turnover:e} J in step {step}"));
             }
         }
-        for (at, unit) in [metre, metre / second].into_iter().enumerate() {
-            let expected = turned(frame.angle, plain.probe[at]);
-            let size = expected.iter().map(|x| x * x).sum::<f64>().sqrt();
-            for i in 0..D {
-                let got = other.probe[at][i] / unit;
-                if exceeds((got - expected[i]).abs(), 10.0 * share * size.max(1e-6)) {
-                    let what = ["displacement", "velocity"][at];
-                    found.push(format!("{what} {got:e} instead of {:e}", expected[i]));
+        found
+    }
+
+    /// Differences of the displacements and velocities at the end above ten times this share.
+    fn motions(&self, share: f64) -> Vec<String> {
+        let [metre, _, second] = self.frame.units;
+        let mut found = Vec::new();
+        for (number, (probe, _)) in PROBES.iter().enumerate() {
+            for (at, unit) in [metre, metre / second].into_iter().enumerate() {
+                let [plain, other] = self.results.each_ref().map(|results| results.probes[number][at]);
+                let expected = turned(self.frame.angle, plain);
+                let size = expected.iter().map(|x| x * x).sum::<f64>().sqrt();
+                for i in 0..D {
+                    let got = other[i] / unit;
+                    if exceeds((got - expected[i]).abs(), 10.0 * share * size.max(1e-6)) {
+                        let what = ["displacement", "velocity"][at];
+                        found.push(format!("{what} of {probe} {got:e} instead of {:e}", expected[i]));
+                    }
                 }
             }
-        }
-        let steps = |results: &Results<D>| results.history["step"].len();
-        if steps(&plain) != steps(&other) && !is_adaptive {
-            found.push(format!("{} steps instead of {}", steps(&other), steps(&plain)));
         }
         found
     }

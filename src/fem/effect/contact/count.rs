@@ -51,7 +51,7 @@ impl<const D: usize> Contact<D> {
         let mut count = PointCount::default();
         for point in self.points.iter().filter(|point| point.carries(&self.law)) {
             count.open += usize::from(point.pressure_at(&self.law, Newton, velocity) == 0.0);
-            let along = point.normal_component(Newton, velocity);
+            let along = point.velocity_along_normal(Newton, velocity);
             let branch = if point.unknown.has_pressure() {
                 let found =
                     self.law.resolve_worn(self.scale * along + point.pressure, self.scale, point.context);

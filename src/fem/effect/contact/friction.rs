@@ -157,11 +157,18 @@ impl<const D: usize> Friction<D> {
         if self.law.history().is_none() {
             return;
         }
-        let Self { law, points, .. } = self;
-        for point in points {
-            let speed = norm(&point.sliding(Body, velocity));
-            point.history = [law.history_after(point.history, blend, speed), point.history[0]];
+        for at in 0..self.points.len() {
+            let point = &self.points[at];
+            let speed = self.speed(point, &point.sliding(Body, velocity));
+            let after = self.law.history_after(point.history, blend, speed);
+            self.points[at].history = [after, point.history[0]];
         }
+    }
+
+    /// The speed in m/s for the history of a point with this sliding velocity at the end of the step just solved: 0 where it sticks, whatever
+    /// rounding errors the velocity has along a tangent that is not an axis.
+    pub(super) fn speed(&self, point: &TangentialPoint<D>, sliding: &Vector<D>) -> f64 {
+        if self.status(point, sliding) == FrictionStatus::Sticks { 0.0 } else { norm(sliding) }
     }
 
     /// Uses the pressures of `points` in the bounds.
@@ -370,25 +377,33 @@ impl<const D: usize> Friction<D> {
         self.points.iter().fold(0.0, |most, point| larger(most, decrease(point)))
     }
 
+    /// The growth of the bound of a point at rest with the pressure where it comes under pressure, the largest of all points; 0 if bounds do
+    /// not depend on the pressure.
+    pub(super) fn rise_of_bound(&self) -> f64 {
+        let rise = |point: &TangentialPoint<D>| self.law.by_pressure(0.0, 0.0, point.context);
+        let follows = self.law.follows_pressure();
+        self.points.iter().filter(|_| follows).fold(0.0, |most, point| larger(most, rise(point)))
+    }
+
     /// The state of each point with its weight, at these velocities.
     pub(super) fn motions(
         &self,
         vectors: Vectors,
         velocity: &[f64],
     ) -> impl Iterator<Item = (FrictionStatus, f64)> {
-        self.sliding(vectors, velocity).map(|(point, sliding)| {
-            // A node that is held over an obstacle at rest has no friction of its own.
-            let is_idle = !point.is_free() && norm(&sliding) == 0.0;
-            if is_idle || (self.law.follows_pressure() && point.pressure <= 0.0) {
-                return (FrictionStatus::Separated, point.weight);
-            }
-            let parameter = add_scaled(&point.whole_traction(), self.scale, &sliding);
-            let found = self.law.resolve(norm(&parameter), self.scale, point.pressure, point.context);
-            (
-                if found.derivative == 0.0 { FrictionStatus::Sticks } else { FrictionStatus::Slides },
-                point.weight,
-            )
-        })
+        self.sliding(vectors, velocity).map(|(point, sliding)| (self.status(point, &sliding), point.weight))
+    }
+
+    /// The state of a point with this sliding velocity.
+    fn status(&self, point: &TangentialPoint<D>, sliding: &Vector<D>) -> FrictionStatus {
+        // A node that is held over an obstacle at rest has no friction of its own.
+        let is_idle = !point.is_free() && norm(sliding) == 0.0;
+        if is_idle || (self.law.follows_pressure() && point.pressure <= 0.0) {
+            return FrictionStatus::Separated;
+        }
+        let parameter = add_scaled(&point.whole_traction(), self.scale, sliding);
+        let found = self.law.resolve(norm(&parameter), self.scale, point.pressure, point.context);
+        if found.derivative == 0.0 { FrictionStatus::Sticks } else { FrictionStatus::Slides }
     }
 
     /// Power in W dissipated by friction at these velocities.
@@ -505,4 +520,73 @@ fn held_part_of_normal<const D: usize>(point: &Point<D>) -> (Vector<D>, f64) {
     let part = add_scaled(&point.normal, -point.free_length, &point.direction);
     let size = norm(&part);
     if size > ROUNDING { (part.map(|x| x / size), size) } else { ([0.0; D], 0.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::contact::{Decay, DistanceWeakening};
+
+    /// A node on a slanted boundary under 10 Pa of pressure, which has slid 0.3 mm in the last step of a two-step scheme, with a traction
+    /// along the boundary.
+    fn pressed(traction: f64) -> Friction<2> {
+        let law = DistanceWeakening { at_rest: 0.5, dynamic: 0.3, distance: 0.01, decay: Decay::Linear };
+        let tangent = [0.8, 0.6];
+        let point = TangentialPoint {
+            at: 0,
+            numbers: [0; 2],
+            weight: 1.0,
+            tangents: [tangent, [0.0; 2]],
+            count: 1,
+            follows: true,
+            all: 1,
+            obstacle: [0.0; 2],
+            obstacle_speed: 0.0,
+            context: SlidingContext::default(),
+            history: [4e-4, 1e-4],
+            pressure: 10.0,
+            traction: tangent.map(|x| traction * x),
+            held_traction: [0.0; 2],
+            tangent: Tangent::free(),
+            change: [0.0; 2],
+        };
+        Friction {
+            law: FrictionLaw::DistanceWeakening(law),
+            context: SlidingContext::default(),
+            scale: 1.0,
+            give: 0.0,
+            follows: true,
+            points: vec![point],
+            owned: 1,
+            partly_held: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_bound_that_is_nearly_constant_grows_steeply_from_zero() {
+        // 300 p / (p + 0.01) grows by 30 000 Pa for each Pa at p = 0.
+        let formula = "expression = { coefficient = '300/(p + 0.01)' }";
+        let law: FrictionLaw = toml::from_str(formula).expect("a law");
+        assert!((Friction { law, ..pressed(1.0) }.rise_of_bound() - 3e4).abs() < 1e-8);
+        assert!((pressed(1.0).rise_of_bound() - 0.5).abs() < 1e-15);
+        let tresca: FrictionLaw = toml::from_str("tresca = { bound = 2 }").expect("a law");
+        assert_eq!(Friction { law: tresca, ..pressed(1.0) }.rise_of_bound(), 0.0);
+    }
+
+    #[test]
+    fn slip_ends_where_a_point_sticks_on_a_slanted_boundary() {
+        let blend = Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(0.002) };
+        // Along the normal, but for a rounding error.
+        let velocity = [-0.6 + 1e-16, 0.8];
+        let mut friction = pressed(2.0);
+        assert!(norm(&friction.points[0].sliding(Body, &velocity)) > 0.0);
+        friction.start_step(blend, 0.0);
+        friction.advance_histories(&velocity, blend);
+        assert_eq!(friction.points[0].history, [4e-4, 4e-4], "2 Pa are less than 0.3 times 10 Pa");
+        // A point that slides continues its slip: 4/3 x 0.4 mm - 1/3 x 0.1 mm + 0.002 s x 0.05 m/s.
+        let mut friction = pressed(4.9);
+        friction.start_step(blend, 0.0);
+        friction.advance_histories(&[0.04, 0.03], blend);
+        assert!((friction.points[0].history[0] - 6e-4).abs() < 1e-12);
+    }
 }

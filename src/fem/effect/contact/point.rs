@@ -367,10 +367,22 @@ impl<const D: usize> Point<D> {
             Unknown::Velocity => law.pressure(self.normal_component(vectors, velocity), self.context),
             // Supports prescribe the velocity, and with it a pressure that is a function of it.
             Unknown::Held if self.carries(law) && self.can_touch() => {
-                law.pressure(self.normal_component(vectors, velocity), self.context)
+                law.pressure(self.velocity_along_normal(vectors, velocity), self.context)
             }
             Unknown::Held => 0.0,
         }
+    }
+
+    /// The normal component of a nodal velocity in m/s; rest where supports prescribe it, but for rounding errors: a law that acts on both
+    /// sides of rest has a pressure for any other velocity.
+    pub(super) fn velocity_along_normal(&self, vectors: Vectors, velocity: &[f64]) -> f64 {
+        let along = self.normal_component(vectors, velocity);
+        if self.unknown != Unknown::Held {
+            return along;
+        }
+        let size = |node: usize| (0..D).map(|i| (self.normal[i] * velocity[node * D + i]).abs()).sum::<f64>();
+        let terms: f64 = self.places(vectors).map(|(node, share)| share.abs() * size(node)).sum();
+        if along.abs() <= ROUNDING * terms { 0.0 } else { along }
     }
 
     /// Whether its pressure is known: not that of a constraint where supports hold the normal, and would carry it, unless it stops an
@@ -434,4 +446,27 @@ pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, held: &He
     let (nodes, points) = facet_points(mesh, facet);
     let nodes: Vec<u32> = nodes.collect();
     points.map(|p| Point::new(&nodes, &p.shares[..nodes.len()], p.normal, p.weight, held)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::contact::NormalLaw;
+
+    #[test]
+    fn a_held_point_that_moves_along_a_slanted_boundary_rests_along_its_normal() {
+        let held = Held::<2>::from(vec![true; 2]);
+        let place = SurfacePoint { node: 0, normal: [0.6, -0.8], weight: 1.0 };
+        let point = Point::nodal(place, &held);
+        assert_eq!(point.unknown, Unknown::Held);
+        let law = "damped_response = { breakpoints = [0.05], slopes = [2, 1], symmetry = 'odd' }";
+        let law: NormalLaw = toml::from_str(law).expect("a law");
+        let law = law.response().expect("a law");
+        let along = [0.8 + 1e-16, 0.6];
+        assert!(point.normal_component(Vectors::Body, &along) != 0.0);
+        assert_eq!(point.pressure_at(&law, Vectors::Body, &along), 0.0);
+        // 2 Pa s/m times -0.01 m/s.
+        let off = [-0.006, 0.008];
+        assert!((point.pressure_at(&law, Vectors::Body, &off) + 0.02).abs() < 1e-15);
+    }
 }

@@ -102,7 +102,7 @@ impl<const D: usize> Contact<D> {
                 state.sticks = motions.next().map(|(motion, _)| motion == FrictionStatus::Sticks);
             }
             if point.carries(&self.law) {
-                let along = point.normal_component(Body, velocity);
+                let along = point.velocity_along_normal(Body, velocity);
                 if point.unknown.has_pressure() {
                     state.pressure = point.pressure_in(traction);
                     let parameter = self.scale * along + state.pressure;

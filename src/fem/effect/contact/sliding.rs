@@ -145,7 +145,7 @@ impl<const D: usize> Contact<D> {
         let Some(friction) = &self.friction else { return out };
         let blend = self.blend.to_end();
         for (sliding, slip) in friction.sliding(Body, velocity) {
-            let (speed, point) = (norm(&slip), &self.points[sliding.at]);
+            let (speed, point) = (friction.speed(sliding, &slip), &self.points[sliding.at]);
             if let Some(history) = friction.law.history() {
                 let after = friction.law.history_after(sliding.history, blend, speed);
                 let values = [after, sliding.history[0], sliding.history[1], history.initial];
@@ -183,6 +183,12 @@ impl<const D: usize> Contact<D> {
     /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
     pub fn steepest_friction_decrease(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, Friction::steepest_decrease)
+    }
+
+    /// By how many Pa the friction bound grows for each Pa of contact pressure where a point comes under pressure, in the current step: the
+    /// largest at points on this rank.
+    pub fn rise_of_bound(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, Friction::rise_of_bound)
     }
 
     /// The steepest decrease in Pa s/m of the normal graph in the current step.
