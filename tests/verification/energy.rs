@@ -159,7 +159,7 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
                 ("shape", format!("distance = \"max(abs(x) - 0.3, {}) - 0.5\"", ["", "", "y", "z"][D]))
             };
             format!(
-                "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\n[contact.obstacle.{kind}]\n{surface}\n\
+                "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\ndamping = 2\n[contact.obstacle.{kind}]\n{surface}\n\
                  centre = [{centre}\"{high}*t-0.5\"]\nrotation = 4\n\
                  {axis}"
             )
@@ -167,8 +167,9 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
         "one way" => "[contact.normal.unilateral]\nbound = \"velocity\"\n".into(),
         _ => {
             let (stiffness, exponent) = (draw.between(10.0, 1000.0), draw.one_of(&["1", "1.5", "2"]));
+            let damping = if exponent == "2" { 0.0 } else { high };
             format!(
-                "[contact.normal.compliance]\nstiffness = {stiffness}\nexponent = {exponent}\ngap = \"{gap} - {high}*t\"\n"
+                "[contact.normal.compliance]\nstiffness = {stiffness}\nexponent = {exponent}\ndamping = {damping}\ngap = \"{gap} - {high}*t\"\n"
             )
         }
     };

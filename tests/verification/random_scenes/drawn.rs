@@ -679,6 +679,9 @@ fn normal_law<const D: usize>(draw: &mut Draw<D>) -> Normal {
             let value = draw.decades(100.0, 10_000.0);
             draw.key("stiffness", value, times(pressure, [-exponent, 0.0, 0.0]));
             draw.key("exponent", exponent, ONE);
+            if exponent == 1.5 {
+                draw.key("damping", high, damping);
+            }
             Normal::Gap
         }
         _ => Normal::Gap,
