@@ -84,6 +84,9 @@ fn material(draw: &mut Draw, dynamic: bool, is_viscous: bool) -> String {
         let (volumetric, shear) = (draw.between(-0.3, 5.0), draw.between(2.0, 20.0));
         text += &format!("viscosity = {{ volumetric = {volumetric}, shear = {shear} }}\n");
     }
+    if dynamic && elastic && draw.0.is_multiple_of(3) {
+        text += "damping = { mass = 4, stiffness = 0.01 }\n";
+    }
     if elastic && draw.between(0.0, 1.0) < 0.7 {
         text += &format!("viscoplasticity.{}\n", viscoplasticity(draw));
     }

@@ -103,6 +103,7 @@ impl Material {
                 .map(|(law, youngs_modulus)| Elasticity { youngs_modulus, poisson_ratio: law.poisson_ratio }),
             viscosity: viscosity.map(|(volumetric, shear)| Viscosity { volumetric, shear }),
             viscoplasticity: flow.map(|law| law.with_yield_stress(yield_stress.unwrap_or(0.0))),
+            damping: self.damping,
             damage: self.damage,
         }
     }
@@ -150,6 +151,7 @@ mod tests {
             density: Some(Scalar::Number(3.0)),
             elasticity: Some(Elasticity { youngs_modulus: of("10 - y"), poisson_ratio: 0.25 }),
             viscosity: Some(Viscosity { volumetric: of("-x"), shear: of("4") }),
+            damping: None,
             viscoplasticity: None,
             damage: None,
         }

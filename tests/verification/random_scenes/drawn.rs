@@ -365,6 +365,11 @@ fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str) 
         draw.line(format!("[{table}.viscosity]"));
         draw.key("volumetric", volumetric, viscosity);
         draw.key("shear", shear, viscosity);
+        if content.is_elastic && content.is_dynamic {
+            draw.line(format!("[{table}.damping]"));
+            draw.key("mass", 2.0, TIME.map(|x| -x));
+            draw.key("stiffness", 0.002, TIME);
+        }
     }
     if content.is_elastic && draw.chance(0.4) {
         flow(draw, table);
