@@ -176,6 +176,7 @@ mod tests {
                 yield_stress,
                 exponent,
                 hardening_modulus: Some(7.0),
+                kinematic_modulus: None,
                 metric: Metric::Compliance,
             };
             Material { viscoplasticity: Some(Viscoplasticity::Perzyna(parameters)), ..graded() }
@@ -186,6 +187,7 @@ mod tests {
             yield_stress: 1.5,
             exponent: 1.0,
             hardening_modulus: Some(7.0),
+            kinematic_modulus: None,
             metric: Metric::Compliance,
         };
         assert_eq!(there, Some(Viscoplasticity::Perzyna(expected)));

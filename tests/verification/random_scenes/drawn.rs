@@ -405,7 +405,10 @@ fn flow<const D: usize>(draw: &mut Draw<D>, table: &str) {
             draw.key("relaxation", relaxation, viscosity);
             draw.key("yield_stress", bound, pressure);
             match draw.one_of(&["perfect", "hardening", "power"]) {
-                "hardening" => draw.key("hardening_modulus", 4.0, pressure),
+                "hardening" => {
+                    draw.key("hardening_modulus", 4.0, pressure);
+                    draw.key("kinematic_modulus", 2.0, pressure);
+                }
                 "power" => draw.key("exponent", 1.5, ONE),
                 _ => draw.line(format!("metric = \"{metric}\"")),
             }
