@@ -14,10 +14,10 @@ use crate::{
             Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
             HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, Quantity,
             RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect,
-            SurfaceForce, Term,
+            SurfaceForce, Term, VISCOUS,
         },
         pairs::{Pair, shares},
-        space::{Batch, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, facet_points},
+        space::{Batch, Geometry, Held, Inputs, Needs, Nodal, assemble, facet_points},
         state::State,
     },
     laws::material::Isotropic,
@@ -60,6 +60,8 @@ pub struct Body<const D: usize, const S: usize> {
     pub elastic_support: ElasticSupport<D>,
     /// The mass that contact boundaries have passed on, if some have, on all ranks alike.
     pub redistributed_mass: Option<RedistributedMass<D>>,
+    /// The same of the forces on the velocity that are proportional to the mass.
+    redistributed_drag: Option<RedistributedMass<D>>,
     /// The motion of supports, if some move.
     pub support_motion: Option<SupportMotion<D>>,
     /// The state at which laws are evaluated, converged or at the end of the step being taken.
@@ -98,6 +100,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             paired_displacement: None,
             elastic_support: ElasticSupport::default(),
             redistributed_mass: None,
+            redistributed_drag: None,
             support_motion: None,
             evaluation,
             step: Step::default(),
@@ -120,11 +123,6 @@ impl<const D: usize, const S: usize> Body<D, S> {
         facets: &[u32],
         layout: &DistributedVector,
     ) -> Result<()> {
-        let inertia: Vec<_> = self.terms().filter(|term| term.form() == Some(Form::Mass)).collect();
-        let add_mass = |cell: usize, matrix: &mut CellMatrix<D>| {
-            let cell = self.geometry.cell_at(cell);
-            inertia.iter().for_each(|term| term.add_matrix(cell.material(), cell, 1.0, matrix));
-        };
         let mut flags = layout.like()?;
         {
             let mut values = flags.local_mut()?;
@@ -135,9 +133,22 @@ impl<const D: usize, const S: usize> Body<D, S> {
         flags.add_ghosts_to_owners()?;
         flags.update_ghosts()?;
         let is_massless: Vec<bool> = flags.local()?.iter().step_by(D).map(|flag| *flag > 0.0).collect();
-        let mass = RedistributedMass::new(session, &self.mesh, &is_massless, layout, add_mass)?;
-        self.redistributed_mass = Some(mass);
+        let redistribute = |is_meant: fn(&Term<'_>) -> bool| {
+            let terms: Vec<_> = self.terms().filter(is_meant).collect();
+            RedistributedMass::new(session, &self.mesh, &is_massless, layout, |cell, matrix| {
+                let cell = self.geometry.cell_at(cell);
+                terms.iter().for_each(|term| term.add_matrix(cell.material(), cell, 1.0, matrix));
+            })
+        };
+        let mass = redistribute(|term| term.form() == Some(Form::Mass))?;
+        let drag = self.has_drag().then(|| redistribute(is_drag)).transpose()?;
+        (self.redistributed_mass, self.redistributed_drag) = (Some(mass), drag);
         Ok(())
+    }
+
+    /// Whether forces in proportion to the mass damp the velocity.
+    pub fn has_drag(&self) -> bool {
+        self.terms().any(|term| is_drag(&term))
     }
 
     /// The constant matrix, in its unknowns, of a step in which velocity and displacement change by `length` in s times their rates.
@@ -161,6 +172,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 terms.iter().for_each(|term| term.add_matrix(geometry.material(), geometry, length, matrix));
                 if let Some(mass) = &self.redistributed_mass {
                     mass.add_to_cell(cell, 1.0 / length, matrix);
+                }
+                if let Some(drag) = &self.redistributed_drag {
+                    drag.add_to_cell(cell, 1.0, matrix);
                 }
             })?;
         let length = (!self.is_explicit()).then_some(length);
@@ -291,6 +305,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 energy[KINETIC] += 0.5 * mass.square(|at| nodal.velocity[at]);
                 energy[NUMERICAL] -= 0.5 * mass.square(change);
             }
+            if let Some(drag) = &self.redistributed_drag {
+                energy[VISCOUS] += step.length * drag.square(|at| nodal.velocity[at]);
+            }
             let effects = self.surface_effects.iter();
             with_seen(self.coupling.as_ref(), &self.held, nodal, |nodal| {
                 effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
@@ -404,11 +421,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Adds `F x` with the part of the matrix `F` of a form that is in the matrix of a step.
     fn add_linear_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         self.elastic_support.add_form(form, x, forces);
-        if let Some(mass) = self.redistributed_mass.as_ref().filter(|_| form == Form::Mass) {
-            mass.add_product(1.0, |at| x[at], forces);
-        }
-        let needs =
-            Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
+        let redistributed = match form {
+            Form::Mass => &self.redistributed_mass,
+            Form::Viscosity => &self.redistributed_drag,
+            Form::Elasticity | Form::Strain => &None,
+        };
+        redistributed.iter().for_each(|change| change.add_product(1.0, |at| x[at], forces));
+        let has_values = form == Form::Mass || (form == Form::Viscosity && self.has_drag());
+        let needs = Needs { strain_rate: form != Form::Mass, velocity: has_values, ..Needs::default() };
         let called = Called::filter(&self.effects, |effect| effect.term().form() == Some(form));
         Batch::for_all(&self.mesh, &self.geometry, Nodal::all(x), needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
@@ -597,8 +617,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         *self.at_supports.borrow_mut() = SupportForces { runs, forces };
     }
 
-    /// Passes on the forces at the local nodes of stress and inertia in the requested runs of cells after a committed step whose energy
-    /// was computed: minus what all other forces must balance there. The velocity, with ghosts, is `velocity`, and has changed since
+    /// Passes on the forces at the local nodes of stress, inertia and damping in the requested runs of cells after a committed step whose
+    /// energy was computed: minus what all other forces must balance there. The velocity, with ghosts, is `velocity`, and has changed since
     /// `before` by `length` in s times its rate.
     pub fn with_support_forces<T>(
         &self,
@@ -616,11 +636,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             Batch::for_each(requested, &self.mesh, &self.geometry, inputs, |batch: &mut Batch<D, S>| {
                 batch.velocity = batch.velocity_change;
                 inertia.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
-                // Quadratic cells have all their inertia at the first point.
-                let nodes = if batch.point == 0 { self.mesh.nodes_per_cell() } else { 0 };
-                for force in &mut batch.force[..nodes] {
-                    force.0.as_flattened_mut().iter_mut().for_each(|force| *force *= -1.0 / length);
-                }
+                self.scale_nodal_forces(batch, -1.0 / length);
                 batch.scatter(&self.mesh, forces);
             });
             if let Some(mass) = &self.redistributed_mass {
@@ -628,7 +644,36 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 mass.add_product(-1.0 / length, change, forces);
             }
         }
+        if self.has_drag() {
+            self.add_drag((0..runs.len()).filter(|number| runs[*number]), velocity, forces);
+        }
         read(forces)
+    }
+
+    /// Adds the forces of damping by the mass at this velocity to `forces`; both with ghosts.
+    pub fn add_damping_by_mass(&self, velocity: &[f64], forces: &mut [f64]) {
+        self.add_drag(0..self.geometry.runs.len(), velocity, forces);
+    }
+
+    /// Adds these forces in these runs of cells, and those that the redistribution of the mass adds.
+    fn add_drag(&self, runs: impl Iterator<Item = usize>, velocity: &[f64], forces: &mut [f64]) {
+        let drag = Called::filter(&self.effects, |effect| is_drag(&effect.term()));
+        let needs = Needs { velocity: true, ..Needs::default() };
+        let inputs = Inputs { nodal: Nodal::all(velocity), needs };
+        Batch::for_each(runs, &self.mesh, &self.geometry, inputs, |batch: &mut Batch<D, S>| {
+            drag.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
+            self.scale_nodal_forces(batch, -1.0);
+            batch.scatter(&self.mesh, forces);
+        });
+        self.redistributed_drag.iter().for_each(|drag| drag.add_product(-1.0, |at| velocity[at], forces));
+    }
+
+    /// Multiplies the nodal forces of a batch, of which quadratic cells have those of a mass at the first point.
+    fn scale_nodal_forces(&self, batch: &mut Batch<D, S>, factor: f64) {
+        let nodes = if batch.point == 0 { self.mesh.nodes_per_cell() } else { 0 };
+        for force in &mut batch.force[..nodes] {
+            force.0.as_flattened_mut().iter_mut().for_each(|force| *force *= factor);
+        }
     }
 
     /// Strain of the displacement, one a cell: the mean over its points.
@@ -848,6 +893,11 @@ impl Called {
     fn has(self, at: usize) -> bool {
         self.0 >> at & 1 == 1
     }
+}
+
+/// Whether a term is damping by the mass.
+fn is_drag(term: &Term<'_>) -> bool {
+    matches!(term, Term::Drag(_))
 }
 
 /// The values after the last step and, where they are kept, before it.

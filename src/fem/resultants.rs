@@ -1,4 +1,4 @@
-//! Forces and moments on a body: reactions of supports, contact, loads, and the rate of momentum, which is their sum.
+//! Forces and moments on a body: reactions of supports, contact, loads, damping by the mass, and the rate of momentum, which is their sum.
 
 use super::{
     body::Body,
@@ -47,6 +47,8 @@ pub enum Source {
     Traction(usize),
     /// All body forces and the weight.
     BodyForce,
+    /// Damping by the mass.
+    Damping,
     /// Not a force: the rate of momentum and of angular momentum, the sum of all others.
     Momentum,
 }
@@ -77,6 +79,8 @@ pub struct Resultants<const D: usize> {
     slanted: Vec<(u32, u32)>,
     /// For each local node its share of the mass and of the first moments of mass of this rank's cells; empty without inertia.
     masses: Vec<(f64, Vector<D>)>,
+    /// The same of the force on a body that moves at 1 m/s, where damping by the mass resists it.
+    drags: Vec<(f64, Vector<D>)>,
     /// Resultants of the loads of this rank, once they are known and if they are the same at all times.
     steady: Option<Vec<f64>>,
     surface: Vec<SurfaceForce<D>>,
@@ -134,15 +138,14 @@ impl<const D: usize> Resultants<D> {
         if body.load.has_body_forces() {
             sources.push(Source::BodyForce);
         }
-        let mut masses = Vec::new();
-        let components = mesh.nodes.len() * D;
+        let (mut masses, mut drags) = (Vec::new(), Vec::new());
+        if body.has_drag() {
+            sources.push(Source::Damping);
+            drags = shares_of_nodes(&mesh.nodes, |x, forces| body.add_damping_by_mass(x, forces));
+        }
         if body.has_form(Form::Mass) {
             sources.push(Source::Momentum);
-            let [mut mass, mut moment] = [vec![0.0; components], vec![0.0; components]];
-            body.add_form(Form::Mass, &vec![1.0; components], &mut mass);
-            body.add_form(Form::Mass, mesh.nodes.as_flattened(), &mut moment);
-            let shares = mass.chunks_exact(D).zip(moment.chunks_exact(D));
-            masses.extend(shares.map(|(mass, moment)| (mass[0], std::array::from_fn(|i| moment[i]))));
+            masses = shares_of_nodes(&mesh.nodes, |x, forces| body.add_form(Form::Mass, x, forces));
         }
         let sums = vec![0.0; sources.len() * Resultant::<D>::WIDTH + body.contacts.len() * AREAS];
         Ok(Self {
@@ -150,6 +153,7 @@ impl<const D: usize> Resultants<D> {
             held,
             slanted,
             masses,
+            drags,
             steady: None,
             surface: Vec::new(),
             sums: [sums.clone(), sums],
@@ -206,7 +210,7 @@ impl<const D: usize> Resultants<D> {
         motion: BalancedMotion<'_>,
         load: Option<&DistributedVector>,
     ) -> Result<()> {
-        let Self { sources, held, slanted, masses, steady, surface, sums, largest } = self;
+        let Self { sources, held, slanted, masses, drags, steady, surface, sums, largest } = self;
         let mesh = &body.mesh;
         let (resultants, areas) = sums[0].split_at_mut(sources.len() * Resultant::<D>::WIDTH);
         resultants.fill(0.0);
@@ -253,19 +257,26 @@ impl<const D: usize> Resultants<D> {
         for SurfaceForce { contact, node, force } in surface {
             sums.add_both(body, *contact, (*node, force));
         }
-        if !masses.is_empty() {
-            let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
-            let changes = velocity.chunks_exact(D).zip(before.chunks_exact(D));
-            for ((mass, centre), (now, before)) in masses.iter().zip(changes) {
-                let rate: Vector<D> = std::array::from_fn(|i| (now[i] - before[i]) / length);
-                (0..D).for_each(|i| force[i] += mass * rate[i]);
-                let own = moment_of(centre, &rate);
-                (0..3).for_each(|i| moment[i] += own[i]);
-            }
-            sums.put(Source::Momentum, &force, &moment);
-        }
+        let at = |node: usize, i: usize| velocity[node * D + i];
+        sums.put_all(Source::Damping, drags, |node| std::array::from_fn(|i| at(node, i)));
+        sums.put_all(Source::Momentum, masses, |node| {
+            std::array::from_fn(|i| (at(node, i) - before[node * D + i]) / length)
+        });
         Ok(())
     }
+}
+
+/// For each node its share of a sum that `add` makes of nodal vectors, and of its first moments.
+fn shares_of_nodes<const D: usize>(
+    nodes: &[Vector<D>],
+    mut add: impl FnMut(&[f64], &mut [f64]),
+) -> Vec<(f64, Vector<D>)> {
+    let components = nodes.len() * D;
+    let [mut sum, mut moment] = [vec![0.0; components], vec![0.0; components]];
+    add(&vec![1.0; components], &mut sum);
+    add(nodes.as_flattened(), &mut moment);
+    let shares = sum.chunks_exact(D).zip(moment.chunks_exact(D));
+    shares.map(|(sum, moment)| (sum[0], std::array::from_fn(|i| moment[i]))).collect()
 }
 
 /// Number of sums of each contact: areas by state and the integral of the pressure.
@@ -288,6 +299,18 @@ impl<const D: usize> Sums<'_, D> {
         let moment = if self.mesh.is_revolved { &[0.0; 3] } else { moment };
         let values = &mut self.values[at * Resultant::<D>::WIDTH..][..Resultant::<D>::WIDTH];
         values.iter_mut().zip(force.iter().chain(moment)).for_each(|(sum, value)| *sum += value);
+    }
+
+    /// Adds the sum over all nodes of their shares times nodal vectors, and its moment.
+    fn put_all(&mut self, source: Source, shares: &[(f64, Vector<D>)], vector: impl Fn(usize) -> Vector<D>) {
+        let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
+        for (node, (share, centre)) in shares.iter().enumerate() {
+            let vector = vector(node);
+            (0..D).for_each(|i| force[i] += share * vector[i]);
+            let own = moment_of(centre, &vector);
+            (0..3).for_each(|i| moment[i] += own[i]);
+        }
+        self.put(source, &force, &moment);
     }
 
     /// Adds a force at a node.

@@ -188,6 +188,13 @@ fn check_density_and_elasticity(job: &Job, table: &mut Table<'_>) {
         let message = "an initial stress requires an elastic material";
         table.fault_at_key("initial.stress", message, "add [material.elasticity]");
     }
+    let has_back_stress = |material: &Material| {
+        material.viscoplasticity.as_ref().is_some_and(|law| law.with_yield_stress(0.0).has_back_stress())
+    };
+    if has_stress && job.materials().any(|(_, material)| has_back_stress(material)) {
+        let message = "kinematic hardening follows from the stress that flow leaves, to which an initial stress would add";
+        table.fault_at_key("initial.stress", message, "delete it, or `kinematic_modulus`");
+    }
     let rigid = job.materials().filter(|(_, material)| material.elasticity.is_none());
     for (path, _) in rigid.filter(|_| job.output.error_indicator) {
         let elasticity = header(&format!("{path}.elasticity"));

@@ -123,7 +123,7 @@ fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Resul
                 "give [material] density, or use scheme \"bdf2\"",
             ));
         }
-        if !scheme.is_implicit() && material.density.is_none() && material.viscosity.is_none() {
+        if !scheme.is_implicit() && material.density.is_none() && !material.is_viscous() {
             return Err(loaded.fault(
                 "time.scheme",
                 format!(

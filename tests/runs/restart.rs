@@ -118,7 +118,7 @@ fn a_restarted_run_with_each_contact_law_is_the_straight_run_to_the_last_bit() {
     for law in [
         "unilateral = { gap = '0.004 - 0.01*t' }",
         "unilateral = { bound = 'velocity' }",
-        "compliance = { stiffness = 1000, exponent = 1.5, gap = 0.004 }",
+        "compliance = { stiffness = 1000, exponent = 1.5, damping = 30, gap = 0.004 }",
         "graph = { points = [[0, -2], [0, 2]] }",
     ] {
         let make = || saving().set("contact.0.normal", &format!("{{ {law} }}"));
@@ -293,8 +293,8 @@ fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() 
 
 #[test]
 fn a_restarted_run_under_each_scheme_is_the_straight_run_to_the_last_bit() {
-    let flow = "{ perzyna = { relaxation = 100, yield_stress = 9, hardening_modulus = 300 } }";
-    let law = "{ compliance = { stiffness = 1000, exponent = 1.5, gap = '0.004 - 0.01*t' } }";
+    let flow = "{ perzyna = { relaxation = 100, yield_stress = 9, hardening_modulus = 300, kinematic_modulus = 200 } }";
+    let law = "{ compliance = { stiffness = 1000, exponent = 1.5, damping = 30, gap = '0.004 - 0.01*t' } }";
     for scheme in ["'implicit_euler'", "'bdf2'"] {
         let make = || {
             saving()

@@ -186,6 +186,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
         yield_stress: 1.0,
         exponent: 1.0,
         hardening_modulus: None,
+        kinematic_modulus: None,
         metric: Metric::Elasticity,
     };
     let laws = || ByMaterial::uniform(FlowLaw::Perzyna(Elastic { parameters, elasticity: tensor }));

@@ -6,7 +6,10 @@ use super::{
     scenes::{any_mesh, brick, crossed, noise, simulation, stir},
 };
 use clarke::{
-    fem::{body::Body, effect::Form},
+    fem::{
+        body::Body,
+        effect::{Form, KINETIC, VISCOUS},
+    },
     linear_algebra::tensor::larger,
     mesh::{
         GlobalMesh,
@@ -113,6 +116,45 @@ fn flies_rigidly<const D: usize, const S: usize>(
         let exact = if variant.scheme == "midpoint" { 1e-9 } else { 1.01 / STEPS as f64 };
         assert!(most - least < 1e-8, "{variant:?}: from {least} to {most} of the fall");
         assert!((least - 1.0).abs() <= exact, "{variant:?}: {least} of the fall");
+    }
+}
+
+/// The share of its velocity that a body keeps which is damped by the mass at this rate in 1/s: at nodes with mass, and without.
+fn kept_share(scheme: &str, rate: f64) -> [f64; 2] {
+    let drop = rate * STEP;
+    let [mut now, mut before, mut massless] = [1.0, 1.0, 1.0];
+    for step in 0..STEPS {
+        let after = match scheme {
+            "midpoint" => {
+                massless = now / (1.0 + 0.5 * drop);
+                2.0 * massless - now
+            }
+            "bdf2" if step > 0 => (4.0 * now - before) / (3.0 + 2.0 * drop),
+            _ => now / (1.0 + drop),
+        };
+        (now, before) = (after, now);
+    }
+    [now, if scheme == "midpoint" { massless } else { now }]
+}
+
+/// A body that is thrown, and damped by its mass, moves rigidly and slows down as the formula of the scheme says.
+fn slows_down<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>, variant: Variant) {
+    let run = run::<D, S>(session, mesh, Variant { extra: "[material.damping]\nmass = 8", ..variant });
+    let shares = kept_share(variant.scheme, 8.0);
+    assert!((shares[0] - (-8.0 * STEP * STEPS as f64).exp()).abs() < 0.05, "{variant:?}: {shares:?}");
+    let velocity = run.state.velocity.owned().expect("velocity");
+    for (node, place) in run.body.mesh.nodes[..run.body.mesh.owned].iter().enumerate() {
+        let massless = run.body.redistributed_mass.as_ref().is_some_and(|mass| mass.is_massless(node));
+        for (i, start) in thrown(place).into_iter().enumerate() {
+            let (found, expected) = (velocity[node * D + i], shares[usize::from(massless)] * start);
+            assert!((found - expected).abs() < 1e-9, "{variant:?}: {found} at {place:?}, not {expected}");
+        }
+    }
+    let totals = &run.totals;
+    assert!(totals.energy_imbalance < 1e-10, "{variant:?}: imbalance {:e}", totals.energy_imbalance);
+    if variant.scheme == "midpoint" {
+        let left = totals.energy[KINETIC] / (totals.energy[KINETIC] + totals.energy[VISCOUS]);
+        assert!((left - shares[0] * shares[0]).abs() < 1e-10, "{variant:?}: {left} of the energy is left");
     }
 }
 
@@ -246,6 +288,10 @@ fn all(session: &Session) {
     }
     for variant in variants(several, pulled[0]) {
         flies_rigidly::<2, 4>(session, &plane, variant, [1.0, -2.0]);
+    }
+    for variant in variants(one, "") {
+        slows_down::<2, 4>(session, &plane, variant);
+        slows_down::<3, 6>(session, &space, variant);
     }
     for variant in variants(one, "friction.coulomb.coefficient = 0.4") {
         flies_rigidly::<2, 4>(session, &plane, variant, [0.0; 2]);

@@ -32,7 +32,9 @@ fn laws() -> Vec<NormalResponse> {
     };
     let graph =
         |points, slope_before, slope_after| NormalLaw::Graph(Graph { points, slope_before, slope_after });
-    let springs = |stiffness, exponent| NormalLaw::Compliance(Compliance { stiffness, exponent, gap: None });
+    let springs = |stiffness, exponent, damping| {
+        NormalLaw::Compliance(Compliance { stiffness, exponent, damping, gap: None })
+    };
     let laws = [
         damped(Symmetry::Even),
         damped(Symmetry::Odd),
@@ -40,8 +42,8 @@ fn laws() -> Vec<NormalResponse> {
         graph(vec![[-0.4, -3.0], [0.0, -3.0], [0.3, 9.0]], 12.0, -8.0),
         graph(vec![[-0.4, -3.0], [-0.4, 20.0], [0.1, 2.0], [0.1, 40.0]], 12.0, f64::INFINITY),
         NormalLaw::ExponentialDamper(ExponentialDamper { limit: 30.0, velocity: 0.2 }),
-        springs(300.0, 1.0),
-        springs(4000.0, 2.0),
+        springs(300.0, 1.0, 0.0),
+        springs(4000.0, 2.0, 6.0),
         NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap: None }),
         written("30*v*exp(-v/0.3) + 2*sign(v)"),
         written("if(d < 0.002, 4e3*max(d, 0), 8 + 300*(d - 0.002)^1.5)"),

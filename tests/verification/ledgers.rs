@@ -1,13 +1,16 @@
 //! The energies of a run have the order of its scheme; `midpoint` conserves that of bodies, elastic foundations and obstacles.
 
 use super::run_on;
-use super::scenes::{any_mesh, crossed, simulation};
+use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::fem::effect::{
     CONTACT, DAMAGE, ELASTIC, ENERGIES, EnergyKind, KINETIC, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
     OBSTACLE_WORK, Role, STORED_IN_CONTACT, VISCOPLASTIC, VISCOUS, WORK,
 };
 use clarke::{
-    mesh::generate::{Diagonal, rectangle},
+    mesh::{
+        GlobalMesh,
+        generate::{Diagonal, rectangle},
+    },
     parallel::session::Session,
 };
 
@@ -25,7 +28,7 @@ fn sliding(scheme: &str, steps: usize) -> String {
          viscoplasticity.maxwell = {{ relaxation_time = 0.2, volumetric_relaxation_time = 0.4 }}\n{more}\
          [[support]]\non = [\"left\"]\nstiffness = {{ normal = 80, tangential = 20 }}\ndamping = {{ normal = 4 }}\n\
          [[traction]]\non = [\"top\"]\nvalue = [\"3*sin(12*t)\", \"-5*cos(8*t)\"]\n[[body_force]]\nvalue = [0.5, -3]\n\
-         [[contact]]\non = [\"bottom\"]\nredistribute_mass = true\nnormal.compliance = {{ stiffness = 400, exponent = 1.5 }}\n\
+         [[contact]]\non = [\"bottom\"]\nredistribute_mass = true\nnormal.compliance = {{ stiffness = 400, exponent = 1.5, damping = 6 }}\n\
          friction.coulomb.coefficient = 0.3\n\
          obstacle.plane = {{ point = [\"3*t\", \"0.05 + 0.02*sin(10*t)\"], normal = [0, 1] }}\n\
          [time]\nscheme = \"{scheme}\"\nend = 0.096\nstep = {}\n[solver]\ntolerance = 1e-13\n",
@@ -210,6 +213,68 @@ fn bounces(session: &Session) {
     ] {
         bounce(session, law, ends_free);
     }
+}
+
+/// Velocity in m/s and dissipation in J/m^(D-1) of a rigid body of 1 kg/m^(D-1) after its impact with 2 m/s on springs with dashpots that do not pull.
+fn rebound<const D: usize, const S: usize>(
+    session: &Session,
+    scheme: &str,
+    steps: usize,
+    mesh: &GlobalMesh<D>,
+) -> [f64; 2] {
+    let (hypothesis, velocity, [length, area]) = match D {
+        2 => ("hypothesis = \"plane_strain\"", "2, 0", [1.2, 0.9]),
+        _ => ("", "2, 0, 0", [1.0, 0.8 * 1.1]),
+    };
+    let massless = if scheme == "midpoint" { "redistribute_mass = true\n" } else { "" };
+    let text = format!(
+        "{}[material]\n{hypothesis}\ndensity = {}\nviscosity = {{ volumetric = 0, shear = 1e6 }}\n\
+         [[contact]]\non = [\"right\"]\n{massless}normal.compliance = {{ stiffness = 100, damping = 5, gap = 0.011 }}\n\
+         [initial]\nvelocity = [{velocity}]\n[time]\nscheme = \"{scheme}\"\nend = 0.4\nstep = {}\n[solver]\ntolerance = 1e-12\n",
+        any_mesh::<D>(),
+        1.0 / length,
+        0.4 / steps as f64
+    );
+    let mut run = simulation::<D, S>(session, &text, mesh);
+    let mut lost = 0.0;
+    while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {
+        assert!(run.totals.energy_imbalance < 1e-10, "{scheme}: {:e}", run.totals.energy_imbalance);
+        let before = std::mem::replace(&mut lost, run.totals.energy[CONTACT]);
+        assert!(lost >= before - 1e-12, "{scheme}: dashpots give {:e} J back", before - lost);
+    }
+    let kept = run.totals.energy[KINETIC];
+    assert!(run.totals.energy[STORED_IN_CONTACT].abs() < 1e-12);
+    [(2.0 * kept / area).sqrt(), lost / area]
+}
+
+fn rebounds(session: &Session) {
+    // With z = 1/4, the coefficient of restitution is exp(-z / sqrt(1 - z^2) atan2(2 z sqrt(1 - z^2), 2 z^2 - 1)).
+    let root = (1.0 - 0.0625f64).sqrt();
+    let exact = 2.0 * (-0.25 / root * (0.5 * root).atan2(0.125 - 1.0)).exp();
+    assert!((exact - 2.0 * 0.506_276_552_5).abs() < 1e-9, "{exact}");
+    let square = crossed([3, 2]);
+    let lost = 2.0 - 0.5 * exact * exact;
+    // The error of the velocity, and that of the energy: the power of dashpots jumps when the body touches.
+    for (scheme, shares) in [
+        ("lagged_euler", [5e-3, 5e-3]),
+        ("implicit_euler", [5e-3, 5e-3]),
+        ("bdf2", [1e-5, 5e-3]),
+        ("midpoint", [1e-3, 1e-3]),
+    ] {
+        let found = rebound::<2, 4>(session, scheme, 1600, &square);
+        let off = [(found[0] - exact).abs() / exact, (found[1] - lost).abs() / lost];
+        if session.is_first() {
+            println!("{scheme}: {off:?}");
+        }
+        assert!(off[0] < shares[0] && off[1] < shares[1], "{scheme}: {found:?} for {exact}, {lost}");
+    }
+    let [velocity, _] = rebound::<3, 6>(session, "midpoint", 400, &brick([2, 2, 2]));
+    assert!((velocity - exact).abs() < 1e-3 * exact, "in space: {velocity} for {exact}");
+}
+
+#[test]
+fn a_body_rebounds_from_springs_with_dashpots_as_their_closed_form() {
+    run_on(&[1, 2], |world| rebounds(&world.session));
 }
 
 #[test]

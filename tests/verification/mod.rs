@@ -13,6 +13,7 @@ mod callbacks;
 mod closed_forms;
 mod creep;
 mod damage;
+mod damping;
 mod effects;
 mod energy;
 mod fast_flow;

@@ -39,7 +39,7 @@ pub const EFFECTS: [Acting; 7] = [
     },
     Acting {
         name: "flow by a power, with hardening",
-        material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5, exponent = 2.0, hardening_modulus = 1.5 }",
+        material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5, exponent = 2.0, hardening_modulus = 1.5, kinematic_modulus = 1.0 }",
         contact: "",
         sign: |totals| totals.energy[VISCOPLASTIC],
     },

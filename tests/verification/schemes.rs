@@ -148,6 +148,7 @@ fn creep<const D: usize, const S: usize>(
         yield_stress,
         exponent: 1.0,
         hardening_modulus: None,
+        kinematic_modulus: None,
         metric: Metric::Compliance,
     };
     let elasticity = Elasticity { youngs_modulus: modulus, poisson_ratio: 0.3 };

@@ -68,7 +68,8 @@ fn to_and_fro(session: &Session, law: &str) {
     let (mut limited, mut dissipated) = (0, 0.0);
     while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{job}")).is_some() {
         assert!(run.totals.max_energy_imbalance < 1e-9, "{law}: {}", run.totals.max_energy_imbalance);
-        assert!(run.totals.energy[VISCOPLASTIC] >= dissipated, "{law}: negative dissipation");
+        let gives_back = law.contains("kinematic");
+        assert!(gives_back || run.totals.energy[VISCOPLASTIC] >= dissipated, "{law}: negative dissipation");
         dissipated = run.totals.energy[VISCOPLASTIC];
         limited += usize::from(tangent(session, &mut run, law));
     }
@@ -121,6 +122,7 @@ fn all(session: &Session) {
     for law in [
         "perzyna = { relaxation = 0.5, yield_stress = 10 }",
         "perzyna = { relaxation = 1e-6, yield_stress = 10, hardening_modulus = 300 }",
+        "perzyna = { relaxation = 1e-6, yield_stress = 10, kinematic_modulus = 300 }",
         "perzyna = { relaxation = 1.0, yield_stress = 10, hardening_modulus = 300, exponent = 2 }",
         "drucker_prager = { relaxation = 0.5, friction_coefficient = 0.3, cohesion = 6 }",
     ] {

@@ -255,6 +255,7 @@ mod tests {
             yield_stress: 3.0,
             exponent: 1.0,
             hardening_modulus: Some(50.0),
+            kinematic_modulus: None,
             metric: Metric::Elasticity,
         };
         let law = Viscoplasticity::Perzyna(perzyna).prepare(&material, hypothesis);

@@ -22,6 +22,7 @@ mod interior;
 mod isotropic;
 mod load;
 mod mass;
+mod mass_damping;
 mod node_history;
 mod outcome;
 mod peaks;
@@ -63,6 +64,7 @@ pub use inertia::{Inertia, KINETIC};
 pub use initial_stress::InitialStress;
 pub use interior::{Effect, Phases};
 pub use load::{Gravity, Load, Traction, WORK};
+pub use mass_damping::MassDamping;
 pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use redistributed_mass::RedistributedMass;
@@ -108,8 +110,11 @@ pub fn effects<const D: usize, const S: usize>(
     if let Some(law) = by_material(materials, elastic_law::<S>) {
         effects.push(Box::new(Elasticity { law }));
     }
-    if let Some(tensor) = by_material(materials, |m| Some(m.viscosity?.tensor())) {
+    if let Some(tensor) = by_material(materials, |m| m.viscosity_tensor(Hypothesis::of(S))) {
         effects.push(Box::new(ViscousStress { tensor }));
+    }
+    if let Some(drag) = by_material(materials, Material::drag) {
+        effects.push(Box::new(MassDamping { drag }));
     }
     let flow = materials.iter().map(flow_law::<S>).collect::<Result<_>>()?;
     if let Some(laws) = ByMaterial::new(flow) {

@@ -11,7 +11,7 @@ use crate::{
 pub enum Form {
     /// `integral of density w . w`.
     Mass,
-    /// `integral of A e(w) : e(w)`.
+    /// `integral of A e(w) : e(w)`, with `drag w . w` where forces in proportion to the mass damp the velocity.
     Viscosity,
     /// `integral of E e(w) : e(w)`.
     Elasticity,
@@ -44,6 +44,8 @@ pub struct FlowProperties {
 pub enum Term<'a> {
     /// Inertia, with the density in kg/m^d.
     Mass(&'a ByMaterial<f64>),
+    /// Forces on the velocity, with their coefficient in kg/(m^d s).
+    Drag(&'a ByMaterial<f64>),
     /// Viscosity, with its tensor in Pa s.
     Viscosity(&'a ByMaterial<Isotropic>),
     /// Elasticity.
@@ -59,19 +61,19 @@ impl Term<'_> {
     pub fn form(&self) -> Option<Form> {
         match self {
             Self::Mass(_) => Some(Form::Mass),
-            Self::Viscosity(_) => Some(Form::Viscosity),
+            Self::Viscosity(_) | Self::Drag(_) => Some(Form::Viscosity),
             Self::Elasticity(_) => Some(Form::Elasticity),
             Self::Flow(_) | Self::Absent => None,
         }
     }
 
-    /// Whether its form extends over every material of the body.
+    /// Whether it makes its form positive definite over every material of the body, up to rigid motions.
     pub fn is_everywhere(&self) -> bool {
         match self {
             Self::Mass(density) => density.is_everywhere(),
             Self::Viscosity(tensor) => tensor.is_everywhere(),
             Self::Elasticity(law) => law.is_everywhere(),
-            Self::Flow(_) | Self::Absent => false,
+            Self::Drag(_) | Self::Flow(_) | Self::Absent => false,
         }
     }
 
@@ -80,7 +82,16 @@ impl Term<'_> {
         match self {
             Self::Viscosity(tensor) => tensor.get(material).copied(),
             Self::Elasticity(law) => law.get(material).map(|law| law.tensor),
-            Self::Mass(_) | Self::Flow(_) | Self::Absent => None,
+            Self::Mass(_) | Self::Drag(_) | Self::Flow(_) | Self::Absent => None,
+        }
+    }
+
+    /// The coefficient of a term without derivatives, and the factor of its matrix in a step of this length in s.
+    fn of_values(&self, length: f64) -> Option<(&ByMaterial<f64>, f64)> {
+        match self {
+            Self::Mass(density) => Some((density, 1.0 / length)),
+            Self::Drag(drag) => Some((drag, 1.0)),
+            _ => None,
         }
     }
 
@@ -93,9 +104,9 @@ impl Term<'_> {
         length: f64,
         matrix: &mut CellMatrix<D>,
     ) {
-        if let Self::Mass(density) = self {
-            if let Some(density) = density.get(material) {
-                matrix.add_mass(cell, density / length);
+        if let Some((coefficient, factor)) = self.of_values(length) {
+            if let Some(coefficient) = coefficient.get(material) {
+                matrix.add_mass(cell, factor * coefficient);
             }
         } else if let Some(tensor) = self.tensor(material) {
             let factor = if matches!(self, Self::Elasticity(_)) { length } else { 1.0 };
@@ -105,8 +116,8 @@ impl Term<'_> {
 
     /// Adds the force of its form to the batch, given velocity and strain rate: nodal forces, or minus the stress.
     pub fn add_force<const D: usize, const S: usize>(&self, batch: &mut Batch<D, S>) {
-        if let Self::Mass(density) = self {
-            mass::add_to_batch(density, 1.0, batch);
+        if let Some((coefficient, _)) = self.of_values(1.0) {
+            mass::add_to_batch(coefficient, 1.0, batch);
         } else if let Some(tensor) = self.tensor(batch.material) {
             isotropic::add_stresses(&tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
         }
@@ -130,7 +141,9 @@ mod tests {
         let v: Vec<f64> = (0..mesh.nodes.len() * D).map(number).collect();
         let density = ByMaterial::uniform(1.7);
         let tensor = ByMaterial::uniform(Isotropic { volumetric: 7.0, shear: 3.0 });
-        for (term, size) in [(Term::Mass(&density), 0), (Term::Viscosity(&tensor), 1)] {
+        for (term, size) in
+            [(Term::Mass(&density), 0), (Term::Drag(&density), 0), (Term::Viscosity(&tensor), 1)]
+        {
             let (mut found, mut expected) = (vec![0.0; v.len()], vec![0.0; v.len()]);
             let mut matrix = CellMatrix::new(mesh);
             for (number, cell) in geometry.cells().enumerate() {

@@ -122,6 +122,7 @@ fn name(job: &Job, source: Source) -> String {
         Source::Against(at) => ("against", &job.contact[at].against),
         Source::Traction(at) => ("traction", &job.traction[at].on),
         Source::BodyForce => return "body_force".into(),
+        Source::Damping => return "damping".into(),
         Source::Momentum => return "momentum".into(),
     };
     format!("{kind} {}", on.join("+"))
@@ -144,7 +145,7 @@ pub(crate) fn source_names(job: &Job) -> Vec<String> {
     let against =
         (0..job.contact.len()).filter(|at| job.contact[*at].obstacle.is_none()).map(Source::Against);
     let tractions = (0..job.traction.len()).map(Source::Traction);
-    let others = [Source::BodyForce, Source::Momentum];
+    let others = [Source::BodyForce, Source::Damping, Source::Momentum];
     supports
         .chain(contacts)
         .chain(against)

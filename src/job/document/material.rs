@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::mesh::Mesh;
 use crate::job::findings::Table;
 use crate::laws::law::header;
-use crate::laws::material::{Hypothesis, Material};
+use crate::laws::material::{Damping, Hypothesis, Material};
 
 /// A part of the body with its own material. The region inherits no effect from the table `[material]`: its own table contains all
 /// effects.
@@ -35,6 +35,9 @@ pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>,
         if material.elasticity.is_none() {
             table.fault(key, message, format!("add {}", named(table, "elasticity")));
         }
+    }
+    if material.is_damped_by_mass() && material.density.is_none() {
+        table.fault("damping.mass", Damping::WITHOUT_DENSITY, format!("add {}", table.path("density")));
     }
     table.refuse(material.constant().fault_of_flow());
 }

@@ -105,7 +105,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn springs(exponent: f64) -> NormalResponse {
-        NormalLaw::Compliance(Compliance { stiffness: 300.0, exponent, gap: None }).response().unwrap()
+        NormalLaw::Compliance(Compliance { stiffness: 300.0, exponent, damping: 0.0, gap: None })
+            .response()
+            .unwrap()
     }
 
     fn graph(points: &[[f64; 2]], slope_after: f64) -> NormalResponse {
@@ -127,20 +129,25 @@ mod tests {
     }
 
     fn node(before: f64, growth: f64) -> NodeContext {
-        NodeContext { penetration: before - growth, step_length: 0.02, mean_from: Some(before), erosion: 0.0 }
+        NodeContext {
+            penetration: before - growth,
+            step_length: 0.02,
+            mean_from: Some(before),
+            ..NodeContext::AT_THE_GAP
+        }
     }
 
     #[test]
     fn means_of_springs_by_hand() {
         // From 0.1 m beside the obstacle to 0.3 m beyond it: 300 / 2 0.3^2 J/m^2 over 0.4 m.
-        let law = Compliance { stiffness: 300.0, exponent: 1.0, gap: None };
+        let law = Compliance { stiffness: 300.0, exponent: 1.0, damping: 0.0, gap: None };
         let [mean, slope] = law.mean(-0.1, 0.3);
         assert!((mean - 33.75).abs() < 1e-12 && (slope - (90.0 - 33.75) / 0.4).abs() < 1e-12);
         assert_eq!(law.mean(0.3, -0.1)[0], mean);
         assert_eq!(law.mean(-1.0, -2.0), [0.0; 2]);
         assert!((law.mean(0.2, 0.2)[0] - 60.0).abs() < 1e-12);
         // A step that ends where it began has the pressure of the law and half its slope.
-        let law = Compliance { stiffness: 300.0, exponent: 2.0, gap: None };
+        let law = Compliance { stiffness: 300.0, exponent: 2.0, damping: 0.0, gap: None };
         let [mean, slope] = law.mean(0.5, 0.5);
         assert!((mean - 75.0).abs() < 1e-12 && (slope - 150.0).abs() < 1e-12);
     }

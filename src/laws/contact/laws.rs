@@ -120,15 +120,16 @@ mod tests {
     use proptest::prelude::*;
 
     const NOWHERE: NodeContext =
-        NodeContext { penetration: f64::NEG_INFINITY, step_length: 0.5, mean_from: None, erosion: 0.0 };
+        NodeContext { penetration: f64::NEG_INFINITY, step_length: 0.5, ..NodeContext::AT_THE_GAP };
 
     fn wall(bound: Bound) -> NormalResponse {
         NormalResponse::Unilateral(Unilateral { bound, gap: None })
     }
 
     fn laws() -> [NormalResponse; 3] {
-        let springs =
-            |exponent| NormalResponse::Compliance(Compliance { stiffness: 100.0, exponent, gap: None });
+        let springs = |exponent| {
+            NormalResponse::Compliance(Compliance { stiffness: 100.0, exponent, damping: 0.0, gap: None })
+        };
         [wall(Bound::Displacement), springs(1.0), springs(1.5)]
     }
 

@@ -21,11 +21,15 @@ pub struct NodeContext {
     /// Depth of wear in the step per contact pressure, in m/Pa. It is not part of the graph of a law: see
     /// [`NormalResponse::resolve_worn`](super::NormalResponse::resolve_worn).
     pub erosion: f64,
+    /// Depth in m at the start of the step from which a dashpot moves: that of the penetration, at least 0, or its blend in a two-step
+    /// scheme. 0 for laws without [`damping`](Response::damping).
+    pub depth_before: f64,
 }
 
 impl NodeContext {
     /// A point with closed gap at the start of a step of 1 s, in which velocity in m/s and penetration in m are equal.
-    pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0, mean_from: None, erosion: 0.0 };
+    pub const AT_THE_GAP: Self =
+        Self { penetration: 0.0, step_length: 1.0, mean_from: None, erosion: 0.0, depth_before: 0.0 };
 
     /// The penetration in m at the end of the step, at a normal velocity in m/s.
     pub(super) fn penetration_at(&self, velocity: f64) -> f64 {
@@ -146,6 +150,16 @@ pub trait Response {
         None
     }
 
+    /// The coefficient in Pa s/m of a dashpot beside a law of the penetration; 0 without one.
+    fn damping(&self) -> f64 {
+        0.0
+    }
+
+    /// The pressure in Pa by which a dashpot changes that of the law, at a penetration in m at the end of the step.
+    fn damping_pressure(&self, _penetration: f64, _node: NodeContext) -> f64 {
+        0.0
+    }
+
     /// The corners of the graph: velocity or penetration, and pressure.
     fn corners(&self) -> &[[f64; 2]] {
         &[[0.0; 2]]
@@ -191,6 +205,8 @@ macro_rules! normal_laws {
                 monotonicity_constant(step_length: f64) -> f64;
                 greatest_pressure() -> f64;
                 energy(penetration: f64) -> Option<f64>;
+                damping() -> f64;
+                damping_pressure(penetration: f64, node: NodeContext) -> f64;
                 corners() -> &[[f64; 2]];
             }
         }

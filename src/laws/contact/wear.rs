@@ -126,8 +126,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn laws() -> [NormalResponse; 3] {
-        let springs =
-            |exponent| NormalResponse::Compliance(Compliance { stiffness: 100.0, exponent, gap: None });
+        let springs = |exponent| {
+            NormalResponse::Compliance(Compliance { stiffness: 100.0, exponent, damping: 0.0, gap: None })
+        };
         let wall = NormalResponse::Unilateral(Unilateral { bound: Bound::Displacement, gap: None });
         [wall, springs(1.0), springs(1.5)]
     }
@@ -147,7 +148,8 @@ mod tests {
     fn an_error_of_the_pressure_is_measured_by_the_range_of_pressures_however_much_it_wears_off() {
         let [wall, ..] = laws();
         for erosion in [0.0, 1e-3, 10.0] {
-            let node = NodeContext { penetration: -0.3, step_length: 0.5, mean_from: None, erosion };
+            let node =
+                NodeContext { penetration: -0.3, step_length: 0.5, erosion, ..NodeContext::AT_THE_GAP };
             let velocity = |pressure: f64| (0.3 + erosion * pressure) / 0.5;
             let range = [0.01, 5.0];
             assert!(wall.distance_worn(velocity(4.0), 4.0, node, range) < 1e-12);
@@ -161,7 +163,8 @@ mod tests {
     fn a_rigid_obstacle_wears_a_surface_by_hand() {
         let [wall, ..] = laws();
         // From 0.3 m before the obstacle with 2 m/s over 0.5 s: 0.7 m are worn off at 0.1 m/Pa.
-        let node = NodeContext { penetration: -0.3, step_length: 0.5, mean_from: None, erosion: 0.1 };
+        let node =
+            NodeContext { penetration: -0.3, step_length: 0.5, erosion: 0.1, ..NodeContext::AT_THE_GAP };
         let found = wall.resolve_worn(3.0 * 2.0 + 7.0, 3.0, node);
         assert!((found.pressure - 7.0).abs() < 1e-14 && (found.velocity - 2.0).abs() < 1e-14, "{found:?}");
         // 1 / (c + k / e).
@@ -179,7 +182,7 @@ mod tests {
         fn the_pressure_belongs_to_the_penetration_that_wear_leaves(
             penetration in -0.5f64..0.5, erosion in 0.001f64..10.0, length in 0.01f64..2.0, s in -50.0f64..50.0, c in 0.1f64..20.0,
         ) {
-            let node = NodeContext { penetration, step_length: length, mean_from: None, erosion };
+            let node = NodeContext { penetration, step_length: length, erosion, ..NodeContext::AT_THE_GAP };
             for law in laws() {
                 let found = law.resolve_worn(s, c, node);
                 prop_assert!((c * found.velocity + found.pressure - s).abs() < 1e-12 * (1.0 + s.abs()));

@@ -41,6 +41,17 @@ impl Isotropic {
         out
     }
 
+    /// `T U^-1`.
+    #[inline(always)]
+    pub fn over<const S: usize>(&self, other: &Self) -> Self {
+        let n = normal_components::<S>() as f64;
+        let [along, across] = [
+            (self.shear + n * self.volumetric) / (other.shear + n * other.volumetric),
+            self.shear / other.shear,
+        ];
+        Self { volumetric: (along - across) / n, shear: across }
+    }
+
     /// `t : T^-1(t)`.
     #[inline(always)]
     pub fn inverse_square<const S: usize>(&self, t: &Mandel<S>) -> f64 {
@@ -75,6 +86,9 @@ mod tests {
         }
         let t = tensor.apply(&e);
         assert!((tensor.inverse_square(&t) - dot(&t, &e)).abs() < 1e-13);
+        let other = Isotropic { volumetric: -3.0, shear: 20.0 };
+        let (found, expected) = (tensor.over::<6>(&other).apply(&e), tensor.apply(&other.solve(&e)));
+        assert!((0..6).all(|c| (found[c] - expected[c]).abs() < 1e-14));
     }
 
     #[test]

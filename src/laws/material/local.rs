@@ -103,6 +103,7 @@ impl Material {
                 .map(|(law, youngs_modulus)| Elasticity { youngs_modulus, poisson_ratio: law.poisson_ratio }),
             viscosity: viscosity.map(|(volumetric, shear)| Viscosity { volumetric, shear }),
             viscoplasticity: flow.map(|law| law.with_yield_stress(yield_stress.unwrap_or(0.0))),
+            damping: self.damping,
             damage: self.damage,
         }
     }
@@ -150,6 +151,7 @@ mod tests {
             density: Some(Scalar::Number(3.0)),
             elasticity: Some(Elasticity { youngs_modulus: of("10 - y"), poisson_ratio: 0.25 }),
             viscosity: Some(Viscosity { volumetric: of("-x"), shear: of("4") }),
+            damping: None,
             viscoplasticity: None,
             damage: None,
         }
@@ -174,6 +176,7 @@ mod tests {
                 yield_stress,
                 exponent,
                 hardening_modulus: Some(7.0),
+                kinematic_modulus: None,
                 metric: Metric::Compliance,
             };
             Material { viscoplasticity: Some(Viscoplasticity::Perzyna(parameters)), ..graded() }
@@ -184,6 +187,7 @@ mod tests {
             yield_stress: 1.5,
             exponent: 1.0,
             hardening_modulus: Some(7.0),
+            kinematic_modulus: None,
             metric: Metric::Compliance,
         };
         assert_eq!(there, Some(Viscoplasticity::Perzyna(expected)));

@@ -6,6 +6,7 @@
 
 mod by_material;
 mod damage;
+mod damping;
 mod elasticity;
 mod isotropic;
 mod local;
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 pub use by_material::ByMaterial;
 pub use damage::Damage;
+pub use damping::Damping;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
 pub use isotropic::Isotropic;
 pub use local::Numbers;
@@ -47,6 +49,9 @@ pub struct Material<N = Scalar> {
     /// Linear viscosity. Absent: no viscous stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscosity: Option<Viscosity<N>>,
+    /// Rayleigh damping. Absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damping: Option<Damping>,
     /// Viscoplastic flow, which relaxes the elastic stress; requires elasticity. Absent: no viscoplastic flow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscoplasticity: Option<Viscoplasticity<N>>,
@@ -68,6 +73,92 @@ impl Material {
     pub fn laws_that_require_elasticity(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let flow =
             self.viscoplasticity.as_ref().map(|_| ("viscoplasticity", Viscoplasticity::WITHOUT_ELASTICITY));
-        flow.into_iter().chain(self.damage.map(|_| ("damage", Damage::WITHOUT_ELASTICITY)))
+        let damping = self.damping.filter(|damping| damping.stiffness > 0.0);
+        let damping = damping.map(|_| ("damping.stiffness", Damping::WITHOUT_ELASTICITY));
+        let damage = self.damage.map(|_| ("damage", Damage::WITHOUT_ELASTICITY));
+        flow.into_iter().chain(damping).chain(damage)
+    }
+}
+
+impl<N> Material<N> {
+    /// The factor in s of the elastic stiffness in the viscosity.
+    fn stiffness_damping(&self) -> f64 {
+        self.damping.map_or(0.0, |damping| damping.stiffness)
+    }
+
+    /// The factor in 1/s of the mass in forces on the velocity.
+    fn mass_damping(&self) -> f64 {
+        self.damping.map_or(0.0, |damping| damping.mass)
+    }
+
+    /// Whether it has a viscous stress.
+    pub fn is_viscous(&self) -> bool {
+        self.viscosity.is_some() || self.stiffness_damping() > 0.0
+    }
+
+    /// Whether forces in proportion to the mass damp it.
+    pub fn is_damped_by_mass(&self) -> bool {
+        self.mass_damping() > 0.0
+    }
+}
+
+impl Material<f64> {
+    /// The viscosity tensor `A` in Pa s, with the part of the damping.
+    pub fn viscosity_tensor(&self, hypothesis: Hypothesis) -> Option<Isotropic> {
+        let own = self.viscosity.map(|viscosity| viscosity.tensor());
+        let factor = self.stiffness_damping();
+        let Some(elasticity) = self.elasticity.filter(|_| factor > 0.0) else { return own };
+        let (own, elastic) = (own.unwrap_or_default(), elasticity.tensor(hypothesis));
+        Some(Isotropic {
+            volumetric: own.volumetric + factor * elastic.volumetric,
+            shear: own.shear + factor * elastic.shear,
+        })
+    }
+
+    /// The force per volume and velocity in kg/(m^d s).
+    pub fn drag(&self) -> Option<f64> {
+        self.density.filter(|_| self.is_damped_by_mass()).map(|density| self.mass_damping() * density)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn material(mass: f64, stiffness: f64) -> Material<f64> {
+        Material {
+            hypothesis: None,
+            density: Some(3.0),
+            elasticity: Some(Elasticity { youngs_modulus: 100.0, poisson_ratio: 0.25 }),
+            viscosity: None,
+            damping: Some(Damping { mass, stiffness }),
+            viscoplasticity: None,
+            damage: None,
+        }
+    }
+
+    #[test]
+    fn damping_by_the_stiffness_is_a_viscosity_with_the_moduli_of_elasticity() {
+        // Lame's moduli are 40 Pa, and in plane stress 80/3 Pa in place of the first.
+        let damped = material(0.0, 0.5);
+        assert!(damped.is_viscous() && damped.drag().is_none());
+        let close = |found: Option<Isotropic>, [volumetric, shear]: [f64; 2]| {
+            let found = found.expect("a viscosity");
+            assert!((found.volumetric - volumetric).abs() < 1e-13 && (found.shear - shear).abs() < 1e-13);
+        };
+        close(damped.viscosity_tensor(Hypothesis::Space), [20.0, 40.0]);
+        close(damped.viscosity_tensor(Hypothesis::PlaneStress), [40.0 / 3.0, 40.0]);
+        let viscosity = Some(Viscosity { volumetric: -1.0, shear: 5.0 });
+        close(Material { viscosity, ..damped }.viscosity_tensor(Hypothesis::PlaneStrain), [19.0, 45.0]);
+    }
+
+    #[test]
+    fn what_is_zero_or_absent_damps_nothing() {
+        for damped in [material(0.0, 0.0), Material { damping: None, ..material(1.0, 1.0) }] {
+            assert!(!damped.is_viscous() && !damped.is_damped_by_mass());
+            assert_eq!((damped.viscosity_tensor(Hypothesis::Space), damped.drag()), (None, None));
+        }
+        assert_eq!(material(0.5, 0.0).drag(), Some(1.5));
+        assert_eq!(Material { density: None, ..material(0.5, 0.0) }.drag(), None);
     }
 }

@@ -96,6 +96,13 @@ macro_rules! laws {
                 }
             }
 
+            /// See [`Parameters::has_back_stress`].
+            pub fn has_back_stress(&self) -> bool {
+                match self {
+                    $(Self::$law(law) => law.has_back_stress(),)*
+                }
+            }
+
             /// See [`Parameters::keeps_volume`].
             pub fn keeps_volume(&self) -> bool {
                 match self {
@@ -148,6 +155,8 @@ macro_rules! delegate {
 impl Flow for FlowLaw {
     delegate! {
         elasticity() -> &Isotropic;
+        back_stress::<S>() -> Option<Isotropic>;
+        stiffness::<S>() -> Isotropic;
         rate::<S>(s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64);
         rates::<S>(s: &Pack<S>, accumulated: &[f64; LANES], growths: &mut [f64; LANES]) -> Option<Pack<S>>;
         flow_to_end::<S>(trial: &Mandel<S>, length: f64, accumulated: f64, tangent: Option<&mut Tangent<S>>)

@@ -523,7 +523,7 @@ mod tests {
             sliding: Sliding::Small,
             part: Some(Scalar::Expression(Expression::parse(part).expect("expression"))),
             quadrature: Quadrature::Nodal,
-            normal: NormalLaw::Compliance(Compliance { stiffness, exponent: 1.0, gap: None }),
+            normal: NormalLaw::Compliance(Compliance { stiffness, exponent: 1.0, damping: 0.0, gap: None }),
             redistribute_mass: false,
             obstacle: None,
             obstacle_load: None,

@@ -67,7 +67,10 @@ impl Law {
             ],
             NormalResponse::Compliance(law) => {
                 let [stiffness, exponent] = [law.stiffness, law.exponent].map(number);
-                let curve = format!("{stiffness} Pa × (penetration / m)^{exponent}");
+                let mut curve = format!("{stiffness} Pa × (penetration / m)^{exponent}");
+                if law.damping > 0.0 {
+                    curve += &format!(" beside a dashpot of {} Pa s/m", number(law.damping));
+                }
                 vec![
                     Branch::new("open", "below the gap", "no pressure"),
                     Branch::new("closed", "beyond the gap", curve),
@@ -144,7 +147,9 @@ impl Law {
             [low - room, high + room]
         };
         let (corners, [left, right], [bottom, top]) = (self.law.corners(), along(0), along(1));
-        let pressure = |x: f64| self.law.pressure(x, NodeContext::AT_THE_GAP);
+        // That of a penetration at rest.
+        let at_rest = |x: f64| NodeContext { depth_before: x.max(0.0), ..NodeContext::AT_THE_GAP };
+        let pressure = |x: f64| self.law.pressure(x, at_rest(x));
         let is_straight = |branch| matches!(self.slopes(branch), [one, other] if one == other);
         if !(0..=corners.len()).all(is_straight) {
             let at = |n: usize| left + (right - left) * n as f64 / SAMPLES as f64;
@@ -232,11 +237,15 @@ mod tests {
 
     #[test]
     fn springs_are_felt_beyond_their_gap() {
-        let spring = Compliance { stiffness: 100.0, exponent: 2.0, gap: Some(Scalar::Number(0.1)) };
+        let spring =
+            Compliance { stiffness: 100.0, exponent: 2.0, damping: 5.0, gap: Some(Scalar::Number(0.1)) };
         let law = law(NormalLaw::Compliance(spring));
         let at = |u: f64| law.abscissa(0.1 - u, 0.0);
         assert_eq!(law.branches_of(&[[at(0.3), 4.0], [at(0.05), 0.0]]), [1, 0]);
         assert_eq!(law.quantity().0, "penetration");
+        assert_eq!(law.branches()[1].slope, "100 Pa × (penetration / m)^2 beside a dashpot of 5 Pa s/m");
+        let [x, p] = law.line(&[[0.2, 4.0]])[SAMPLES];
+        assert!((p - 100.0 * x * x).abs() < 1e-12, "at rest");
         assert!(law.needs_gap());
         assert_eq!((paper().needs_gap(), paper().abscissa(0.1, 2.0)), (false, 2.0));
     }

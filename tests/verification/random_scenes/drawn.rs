@@ -398,6 +398,11 @@ fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str) 
         draw.line(format!("[{table}.viscosity]"));
         draw.key("volumetric", volumetric, viscosity);
         draw.key("shear", shear, viscosity);
+        if content.is_elastic && content.is_dynamic {
+            draw.line(format!("[{table}.damping]"));
+            draw.key("mass", 2.0, TIME.map(|x| -x));
+            draw.key("stiffness", 0.002, TIME);
+        }
     }
     if content.is_elastic && draw.chance(0.4) {
         flow(draw, table);
@@ -433,7 +438,10 @@ fn flow<const D: usize>(draw: &mut Draw<D>, table: &str) {
             draw.key("relaxation", relaxation, viscosity);
             draw.key("yield_stress", bound, pressure);
             match draw.one_of(&["perfect", "hardening", "power"]) {
-                "hardening" => draw.key("hardening_modulus", 4.0, pressure),
+                "hardening" => {
+                    draw.key("hardening_modulus", 4.0, pressure);
+                    draw.key("kinematic_modulus", 2.0, pressure);
+                }
                 "power" => draw.key("exponent", 1.5, ONE),
                 _ => draw.line(format!("metric = \"{metric}\"")),
             }
@@ -712,6 +720,9 @@ fn normal_law<const D: usize>(draw: &mut Draw<D>) -> Normal {
             let value = draw.decades(100.0, 10_000.0);
             draw.key("stiffness", value, times(pressure, [-exponent, 0.0, 0.0]));
             draw.key("exponent", exponent, ONE);
+            if exponent == 1.5 {
+                draw.key("damping", high, damping);
+            }
             Normal::Gap
         }
         _ => Normal::Gap,

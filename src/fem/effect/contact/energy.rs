@@ -24,7 +24,7 @@ pub struct ContactEnergy {
     pub numerical: f64,
     /// Work of the pressures of moving obstacles on the body, and of supports against pressures where they hold the normal.
     pub work: f64,
-    /// Power that friction and laws of the velocity dissipate.
+    /// Power that friction, laws of the velocity and dashpots of laws of the penetration dissipate.
     pub dissipated_power: f64,
     /// Power of the friction of moving obstacles on the body, and of supports against friction and laws of the velocity.
     pub driving_power: f64,
@@ -78,7 +78,9 @@ impl<const D: usize> Contact<D> {
             let given = times(mean, point.growth);
             sum.dissipated += point.weight * dissipated;
             sum.work += length * of_supports - point.weight * given;
-            sum.numerical += point.weight * (stored + dissipated + given - length * pressure * v);
+            let damped = self.damping_power(point, after, (after - before) / length);
+            sum.dissipated_power += point.weight * damped;
+            sum.numerical += point.weight * (stored + dissipated + given + length * (damped - pressure * v));
         }
         if let Some(friction) = &self.friction {
             sum.dissipated_power += friction.power(velocity);
@@ -87,12 +89,29 @@ impl<const D: usize> Contact<D> {
         sum
     }
 
+    /// Power in W/m^(D-1) that the dashpot at a point dissipates at the end of the step, at this penetration in m, which has grown by
+    /// this mean rate in m/s.
+    fn damping_power(&self, point: &Point<D>, after: f64, growth: f64) -> f64 {
+        if self.law.damping() == 0.0 || !growth.is_finite() {
+            return 0.0;
+        }
+        let rate = if self.blend.earlier == 0.0 {
+            growth
+        } else {
+            (after.max(0.0) - point.context.depth_before) / point.context.step_length
+        };
+        self.law.damping_pressure(after, point.context) * rate
+    }
+
     /// Pressure in Pa at a point before the step.
     fn pressure_before(&self, point: &Point<D>) -> f64 {
-        if self.law.has_vertical_parts() {
+        let is_stored = point.unknown.has_pressure() && self.law.damping() > 0.0;
+        if self.law.has_vertical_parts() || is_stored {
             return point.pressure_before;
         }
-        let context = NodeContext { penetration: point.penetration_before, ..NodeContext::AT_THE_GAP };
+        let penetration = point.penetration_before;
+        let context =
+            NodeContext { penetration, depth_before: penetration.max(0.0), ..NodeContext::AT_THE_GAP };
         self.law.pressure(0.0, context)
     }
 

@@ -160,6 +160,11 @@ impl<const D: usize> LoadedObstacle<D> {
         self.seen(place, |motion| motion.converged[0])
     }
 
+    /// Places as seen from the obstacle: before the last step.
+    pub(super) fn seen_earlier(&self, place: &Vector<D>) -> Vector<D> {
+        self.seen(place, |motion| motion.earlier[0])
+    }
+
     /// Places as seen from the obstacle: at the end of the current step.
     pub(super) fn seen_after(&self, place: &Vector<D>) -> Vector<D> {
         self.seen(place, |motion| motion.trial[0])

@@ -51,14 +51,40 @@ impl<const D: usize> Contact<D> {
                 step_length,
                 mean_from: means.then_some(point.penetration_before),
                 erosion: 0.0,
+                depth_before: 0.0,
             };
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
+        }
+        if self.law.damping() > 0.0 {
+            self.set_depths_before(time_before - step.previous_length)?;
         }
         self.follow_obstacle(true);
         let recent = [time_before, blend.recent / step_length];
         let earlier = [time_before - step.previous_length, blend.earlier / step_length];
         self.set_obstacle_velocities(Rate { time, before: [recent, earlier] })
+    }
+
+    /// Sets the depths from which dashpots move in the step, where `earlier` is the time in s before the last step.
+    fn set_depths_before(&mut self, earlier: f64) -> Result<()> {
+        let blend = self.blend;
+        for at in 0..self.points.len() {
+            let point = &self.points[at];
+            let recent = point.penetration_before.max(0.0);
+            let depth = if blend.earlier == 0.0 {
+                recent
+            } else {
+                let seen = self
+                    .obstacle
+                    .as_ref()
+                    .map_or(point.place, |obstacle| obstacle.seen_earlier(&point.place));
+                let moved = point.moved + point.worn[0] + point.blend_offset / blend.earlier - point.worn[1];
+                let gap = self.gap_of(point, earlier, &seen, moved)?;
+                blend.of(recent, (moved - gap).max(0.0)).max(0.0)
+            };
+            self.points[at].context.depth_before = depth;
+        }
+        Ok(())
     }
 
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.

@@ -2,7 +2,7 @@
 //!
 //! `s_{n-1} = E e(u_{n-2}) + H_{n-1}` is not stored: `u_{n-2} = u_{n-1} - k_{n-1} v_{n-1}`.
 
-use super::{VISCOPLASTIC, ViscoplasticFlow};
+use super::{VISCOPLASTIC, ViscoplasticFlow, beyond_back_stress};
 use crate::{
     fem::{
         effect::{NUMERICAL, Outcome, Step},
@@ -45,13 +45,15 @@ fn advance<const D: usize, const S: usize>(
         add_scaled(&elasticity.apply(&strain), 1.0, &converged.lane(lane))
     });
     let share = integrity.shares();
+    let beyond = beyond_back_stress(law, &lagged, converged);
+    let driving = beyond.as_ref().unwrap_or(&lagged);
     let mut overstress = 0.0f64;
     if law.is_power_law() {
         for lane in 0..LANES {
-            overstress = overstress.max(law.overstress(&lagged.lane(lane), accumulated[lane]));
+            overstress = overstress.max(law.overstress(&driving.lane(lane), accumulated[lane]));
         }
     }
-    let Some(flow) = law.rates(&lagged, accumulated, growths) else {
+    let Some(flow) = law.rates(driving, accumulated, growths) else {
         *trial = *converged;
         *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), share[lane], &converged.lane(lane)));
         return [0.0, 0.0, overstress];
@@ -189,6 +191,7 @@ mod tests {
             yield_stress: 3.0,
             exponent: 1.0,
             hardening_modulus: None,
+            kinematic_modulus: None,
             metric: Metric::Elasticity,
         };
         let laws = [

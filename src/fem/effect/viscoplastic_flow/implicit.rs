@@ -4,7 +4,7 @@
 //! finds: what does not yield keeps `H_n = H_{n-1}`. A cell that did not flow in the step before starts with implicit Euler, as a run
 //! does.
 
-use super::{VISCOPLASTIC, ViscoplasticFlow};
+use super::{VISCOPLASTIC, ViscoplasticFlow, beyond_back_stress};
 use crate::{
     fem::{
         effect::{Blend, Energy, NUMERICAL, Outcome, Step},
@@ -75,9 +75,14 @@ impl<const S: usize> ViscoplasticFlow<S> {
         batch: &Batch<D, S>,
         energy: &mut Energy,
     ) {
-        let Some(elasticity) = self.laws.get(batch.material).map(FlowLaw::elasticity) else { return };
+        let Some(law) = self.laws.get(batch.material) else { return };
         let Some(histories) = self.stress.both(batch.number) else { return };
-        let taken = Taken { elasticity, length: step.length, is_trapezoidal: blend.earlier != 0.0 };
+        let taken = Taken {
+            elasticity: law.elasticity(),
+            length: step.length,
+            is_trapezoidal: blend.earlier != 0.0,
+            least: if law.back_stress::<S>().is_some() { f64::NEG_INFINITY } else { 0.0 },
+        };
         let strains = [&batch.strain_before, &batch.strain, &batch.strain_rate];
         let share = batch.integrity.shares();
         let weights = std::array::from_fn(|lane| share[lane] * batch.cells.volume[lane]);
@@ -94,6 +99,8 @@ struct Taken<'a> {
     length: f64,
     /// Whether the dissipation is that of the trapezoidal rule, of second order as the formula is.
     is_trapezoidal: bool,
+    /// The least that flow may take up: it gives back what kinematic hardening has stored.
+    least: f64,
 }
 
 /// The energy that cells of these weights dissipate, and the terms of the scheme, given the strains before and after the step and its
@@ -105,7 +112,7 @@ fn energies<const S: usize>(
     [converged, trial]: [&Pack<S>; 2],
     weights: &[f64; LANES],
 ) -> [f64; 2] {
-    let Taken { elasticity, length, is_trapezoidal } = *taken;
+    let Taken { elasticity, length, is_trapezoidal, least } = *taken;
     let [mut viscoplastic, mut numerical] = [[0.0; LANES]; 2];
     for lane in 0..LANES {
         let [history, after] = [converged.lane(lane), trial.lane(lane)];
@@ -117,8 +124,8 @@ fn energies<const S: usize>(
         let mismatch = add_scaled(&change, -length, &rate.lane(lane));
         let flow = elasticity.solve(&add_scaled(&history, -1.0, &after));
         let work = dot(&stress, &flow);
-        // Never negative: the difference is a term of the scheme.
-        let dissipated = if is_trapezoidal { 0.5 * (work + dot(&before, &flow)) } else { work }.max(0.0);
+        // Not less than what it may be: the difference is a term of the scheme.
+        let dissipated = if is_trapezoidal { 0.5 * (work + dot(&before, &flow)) } else { work }.max(least);
         viscoplastic[lane] = weights[lane] * dissipated;
         let own = dot(&stress, &mismatch) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - work);
         numerical[lane] = weights[lane] * own;
@@ -126,7 +133,7 @@ fn energies<const S: usize>(
     [sum(&viscoplastic), sum(&numerical)]
 }
 
-/// The stresses of a batch if nothing flowed, and where they may flow.
+/// The stresses on which the law acts in a batch if nothing flowed, and where they may flow.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn elastic_stresses<const S: usize>(
     law: &FlowLaw,
@@ -137,6 +144,7 @@ fn elastic_stresses<const S: usize>(
     let elasticity = *law.elasticity();
     let stresses =
         Pack::from_lanes(|lane| add_scaled(&elasticity.apply(&strain.lane(lane)), 1.0, &history.lane(lane)));
+    let stresses = beyond_back_stress(law, &stresses, history).unwrap_or(stresses);
     (stresses, law.yielding(&stresses, accumulated))
 }
 
@@ -149,9 +157,16 @@ fn add_to<const S: usize>(stresses: &mut Pack<S>, lane: usize, factor: f64, adde
 /// `(T - I) k' E`: the change by flow of the derivative of the stress with respect to the strain rate.
 fn tangent_change<const S: usize>(law: &FlowLaw, tangent: &Tangent<S>, length: f64) -> Tangent<S> {
     // E is symmetric, so that it may be applied to the rows.
-    std::array::from_fn(|i| {
+    let change = std::array::from_fn(|i| {
         let mut row = tangent[i];
         row[i] -= 1.0;
         law.elasticity().apply(&row).map(|value| length * value)
-    })
+    });
+    if law.back_stress::<S>().is_none() {
+        return change;
+    }
+    // The stress falls by a part only of what the stress beyond the back stress does.
+    let share = law.elasticity().over::<S>(&law.stiffness::<S>());
+    let columns: Tangent<S> = std::array::from_fn(|j| share.apply(&change.map(|row: Mandel<S>| row[j])));
+    std::array::from_fn(|i| columns.map(|column| column[i]))
 }

@@ -8,6 +8,7 @@ use super::{
 use crate::{
     fem::space::{Batch, Geometry, Integrity, Needs},
     laws::material::{ByMaterial, Flow, FlowLaw},
+    linear_algebra::{simd::Pack, tensor::add_scaled},
 };
 
 /// Absorbed by viscoplastic flow: dissipated, or stored by hardening.
@@ -24,6 +25,13 @@ pub struct ViscoplasticFlow<const S: usize> {
     properties: FlowProperties,
     stress: CellHistory<S>,
     accumulated: Option<CellHistory<1>>,
+}
+
+/// The stresses beyond the back stresses, given those that flow leaves; `None` for laws without a back stress.
+#[inline(always)]
+fn beyond_back_stress<const S: usize>(law: &FlowLaw, stress: &Pack<S>, history: &Pack<S>) -> Option<Pack<S>> {
+    let back = law.back_stress::<S>()?;
+    Some(Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), 1.0, &back.apply(&history.lane(lane)))))
 }
 
 impl<const S: usize> ViscoplasticFlow<S> {

@@ -179,6 +179,7 @@ mod tests {
             NormalLaw::Compliance(crate::laws::contact::Compliance {
                 stiffness: 300.0,
                 exponent: 1.5,
+                damping: 0.0,
                 gap: None,
             }),
         ];

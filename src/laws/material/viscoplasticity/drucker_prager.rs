@@ -258,6 +258,7 @@ mod tests {
             yield_stress: 10.0 * 3f64.sqrt(),
             exponent: 1.0,
             hardening_modulus: None,
+            kinematic_modulus: None,
             metric: Metric::Frobenius,
         }
         .prepare(&SOIL, Hypothesis::Space);

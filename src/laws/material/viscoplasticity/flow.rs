@@ -27,6 +27,11 @@ pub trait Parameters {
 
     /// Whether the flow preserves volume.
     fn keeps_volume(&self) -> bool;
+
+    /// Whether the law acts on the stress beyond a back stress.
+    fn has_back_stress(&self) -> bool {
+        false
+    }
 }
 
 /// The parameters of a law in a body, where the yield stress of type `N` may vary with place. The defaults are those of a law
@@ -68,10 +73,23 @@ pub trait Flow {
         Some(one_by_one(self, stresses, accumulated, growths))
     }
 
+    /// `C` in the stress `s + C H` on which the law acts in place of `s`, with the stress `H` that flow leaves: the stress beyond the back
+    /// stress of kinematic hardening. `None`: the stress itself.
+    #[inline(always)]
+    fn back_stress<const S: usize>(&self) -> Option<Isotropic> {
+        None
+    }
+
+    /// The tensor in Pa by which flow in a step changes the stress on which the law acts: `E`, and more if there is a back stress.
+    #[inline(always)]
+    fn stiffness<const S: usize>(&self) -> Isotropic {
+        *self.elasticity()
+    }
+
     /// Flow `k X(s)` of a step of `length` s that ends in `s = s* - k E X(s)`, and growth of the accumulated strain, from the
     /// stress
     /// `trial` of a step without flow; `None` without flow. On request, the tangent `ds/ds*` is
-    /// written.
+    /// written. Stresses are those on which the law acts, and `E` is its [`stiffness`](Self::stiffness).
     fn flow_to_end<const S: usize>(
         &self,
         trial: &Mandel<S>,

@@ -16,6 +16,7 @@
 //! chapter 11), with a viscosity that does not depend on `n` at `f = yield stress`.
 
 mod hardening;
+mod kinematic;
 mod overstress;
 mod plane_projection;
 mod plane_stress;
@@ -51,8 +52,8 @@ impl<N> InPlaces<N> for Perzyna<N> {
     }
 
     fn with_yield_stress(&self, yield_stress: f64) -> Perzyna {
-        let Self { relaxation, exponent, hardening_modulus, metric, .. } = *self;
-        Perzyna { relaxation, yield_stress, exponent, hardening_modulus, metric }
+        let Self { relaxation, exponent, hardening_modulus, kinematic_modulus, metric, .. } = *self;
+        Perzyna { relaxation, yield_stress, exponent, hardening_modulus, kinematic_modulus, metric }
     }
 }
 
@@ -73,12 +74,26 @@ impl Parameters for Perzyna {
     fn keeps_volume(&self) -> bool {
         true
     }
+
+    fn has_back_stress(&self) -> bool {
+        self.kinematic_modulus.is_some_and(|modulus| modulus > 0.0)
+    }
 }
 
 impl Flow for Elastic<Perzyna> {
     #[inline(always)]
     fn elasticity(&self) -> &Isotropic {
         &self.elasticity
+    }
+
+    #[inline(always)]
+    fn back_stress<const S: usize>(&self) -> Option<Isotropic> {
+        self.back_stress::<S>()
+    }
+
+    #[inline(always)]
+    fn stiffness<const S: usize>(&self) -> Isotropic {
+        self.stiffness::<S>()
     }
 
     #[inline]
@@ -145,9 +160,9 @@ impl Flow for Elastic<Perzyna> {
         let n = self.parameters.exponent;
         let modulus = if S == 3 {
             let power = if n == 1.0 { 0.0 } else { (n - 1.0) * (1.0 + 1.0 / (1.0 + overstress)) };
-            self.elasticity.largest_modulus::<S>() * (1.0 + power)
+            self.stiffness::<S>().largest_modulus::<S>() * (1.0 + power)
         } else {
-            self.elasticity.shear * n
+            self.stiffness::<S>().shear * n
         };
         self.rate_factor(overstress) * modulus + self.hardening_rate::<S>(overstress)
     }

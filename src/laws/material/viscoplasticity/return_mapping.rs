@@ -19,7 +19,7 @@ use crate::linear_algebra::tensor::{Mandel, add_scaled};
 /// The end of a step with flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Returned<const S: usize> {
-    /// `s`, the stress at the end in Pa.
+    /// `s`, the stress at the end in Pa, less the back stress.
     pub stress: Mandel<S>,
     /// `k X(s)`, the viscoplastic strain of the step.
     pub flow: Mandel<S>,
@@ -39,7 +39,7 @@ impl FlowLaw {
         tangent: Option<&mut Tangent<S>>,
     ) -> Option<Returned<S>> {
         let (flow, growth) = self.flow_to_end(trial, length, accumulated, tangent)?;
-        let stress = add_scaled(trial, -1.0, &self.elasticity().apply(&flow));
+        let stress = add_scaled(trial, -1.0, &self.stiffness::<S>().apply(&flow));
         Some(Returned { stress, flow, accumulated: accumulated + growth })
     }
 }

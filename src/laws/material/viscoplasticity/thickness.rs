@@ -245,6 +245,7 @@ mod tests {
             yield_stress: 10.0 * 3f64.sqrt(),
             exponent: 1.0,
             hardening_modulus: None,
+            kinematic_modulus: None,
             metric: Metric::Frobenius,
         };
         let plastic = plastic.prepare(&BODY, Hypothesis::PlaneStress);

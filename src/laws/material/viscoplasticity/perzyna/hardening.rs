@@ -48,6 +48,7 @@ mod tests {
             yield_stress: 19.0,
             exponent: 1.0,
             hardening_modulus: Some(modulus),
+            kinematic_modulus: None,
             metric: Metric::Compliance,
         };
         perzyna.prepare(&elasticity, hypothesis)

@@ -45,6 +45,12 @@ pub struct Perzyna<N = f64> {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0), extend("unit" = "Pa"), example = 100.0)]
     pub hardening_modulus: Option<f64>,
+    /// Kinematic hardening (Prager): the yield surface moves with the viscoplastic strain, in uniaxial stress by this modulus times the
+    /// strain, so that a material that has flowed one way flows back sooner. Absent: none. The energy stored by it is part of
+    /// viscoplastic_dissipation, which falls where it is given back. Not together with [initial.stress].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 100.0)]
+    pub kinematic_modulus: Option<f64>,
     /// The norm in which the projection on the yield set is the nearest stress.
     #[serde(default)]
     pub metric: Metric,
@@ -178,9 +184,9 @@ impl Elastic<Perzyna> {
         }
     }
 
-    /// Inverse eigenvalue of the metric and eigenvalue of `E` in plane stress: on `p`, and on `q` and `r`.
-    pub(super) fn metric_and_elasticity(&self) -> [(f64, f64); 2] {
-        let Isotropic { volumetric, shear } = self.elasticity;
+    /// Inverse eigenvalue of the metric and eigenvalue of the stiffness of flow in plane stress: on `p`, and on `q` and `r`.
+    pub(super) fn metric_and_stiffness(&self) -> [(f64, f64); 2] {
+        let Isotropic { volumetric, shear } = self.stiffness::<3>();
         let (along, across) = self.inverse_metric();
         [(along, shear + 2.0 * volumetric), (across, shear)]
     }

@@ -81,7 +81,7 @@ pub(super) fn flow<const S: usize>(
     Overstressed { norm, yield_stress }: Overstressed,
     tangent: Option<&mut Tangent<S>>,
 ) -> (Mandel<S>, f64) {
-    let [along, across] = law.metric_and_elasticity();
+    let [along, across] = law.metric_and_stiffness();
     let step = Step {
         trial: turned(&[trial[0], trial[1], trial[2]]),
         compliance: [along.0, 3.0 * across.0, 3.0 * across.0],

@@ -35,7 +35,7 @@ pub(super) fn flow<const S: usize>(
     tangent: Option<&mut Tangent<S>>,
 ) -> (Mandel<S>, f64) {
     let Perzyna { relaxation, exponent: power, .. } = law.parameters;
-    let (shear, hardening) = (law.elasticity.shear, law.hardening_modulus());
+    let (shear, hardening) = (law.stiffness::<S>().shear, law.hardening_modulus());
     let stiffness = 1.5 * shear + hardening;
     let excess = norm - yield_stress;
     let rate = length / (3.0 * relaxation);

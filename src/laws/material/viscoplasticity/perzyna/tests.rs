@@ -6,8 +6,15 @@ const PAPER: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.
 const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
 
 fn law(metric: Metric, hypothesis: Hypothesis) -> Elastic<Perzyna> {
-    Perzyna { relaxation: 100.0, yield_stress: 19.0, exponent: 1.0, hardening_modulus: None, metric }
-        .prepare(&PAPER, hypothesis)
+    Perzyna {
+        relaxation: 100.0,
+        yield_stress: 19.0,
+        exponent: 1.0,
+        hardening_modulus: None,
+        kinematic_modulus: None,
+        metric,
+    }
+    .prepare(&PAPER, hypothesis)
 }
 
 #[test]

@@ -53,7 +53,7 @@ impl FlowLaw {
         accumulated: f64,
         mut tangent: Option<&mut Tangent<S>>,
     ) -> Option<(Returned<S>, bool)> {
-        let release = self.elasticity().apply(&last.flow);
+        let release = self.stiffness::<S>().apply(&last.flow);
         let share = self.share(elastic, last, &release, accumulated)?;
         let trial = add_scaled(elastic, -share.value, &release);
         let before = accumulated + share.value * last.growth;
@@ -72,7 +72,7 @@ impl FlowLaw {
             }
         }
         let flow = add_scaled(&found.flow, share.value, &last.flow);
-        let stress = add_scaled(elastic, -1.0, &self.elasticity().apply(&flow));
+        let stress = add_scaled(elastic, -1.0, &self.stiffness::<S>().apply(&flow));
         Some((Returned { stress, flow, ..found }, share.gradient.is_none()))
     }
 

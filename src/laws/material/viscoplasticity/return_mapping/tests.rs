@@ -13,7 +13,14 @@ const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Fr
 const SOIL: DruckerPrager = DruckerPrager { relaxation: 100.0, friction_coefficient: 0.6, cohesion: 10.0 };
 
 fn perzyna(metric: Metric, exponent: f64) -> Perzyna {
-    Perzyna { relaxation: 100.0, yield_stress: 19.0, exponent, hardening_modulus: None, metric }
+    Perzyna {
+        relaxation: 100.0,
+        yield_stress: 19.0,
+        exponent,
+        hardening_modulus: None,
+        kinematic_modulus: None,
+        metric,
+    }
 }
 
 fn flow(law: Perzyna, hypothesis: Hypothesis) -> FlowLaw {
@@ -28,6 +35,7 @@ fn laws(hypothesis: Hypothesis) -> Vec<FlowLaw> {
         for law in [1.0, 1.6, 3.0].map(|exponent| perzyna(metric, exponent)).into_iter().chain([free]) {
             laws.push(Viscoplasticity::Perzyna(law));
             laws.push(Viscoplasticity::Perzyna(Perzyna { hardening_modulus: Some(300.0), ..law }));
+            laws.push(Viscoplasticity::Perzyna(Perzyna { kinematic_modulus: Some(200.0), ..law }));
         }
     }
     let maxwell = Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: Some(4.0) };
@@ -62,7 +70,7 @@ fn by_force<const S: usize>(law: &FlowLaw, trial: &Mandel<S>, length: f64, accum
     let (mut s, mut p) = (*trial, accumulated);
     for _ in 0..200_000 {
         let (rate, growth) = law.rate(&s, p);
-        let open = add_scaled(&add_scaled(trial, -length, &law.elasticity().apply(&rate)), -1.0, &s);
+        let open = add_scaled(&add_scaled(trial, -length, &law.stiffness::<S>().apply(&rate)), -1.0, &s);
         let behind = accumulated + length * growth - p;
         s = add_scaled(&s, 1.0 / stiff, &open);
         p += behind / stiff;
@@ -115,7 +123,7 @@ fn check<const S: usize>(hypothesis: Hypothesis, trial: &Mandel<S>, length: f64,
             let product = |i: usize, j: usize| {
                 let mut unit = [0.0; S];
                 unit[j] = 1.0;
-                dot(&tangent[i], &law.elasticity().apply(&unit))
+                dot(&tangent[i], &law.stiffness::<S>().apply(&unit))
             };
             for i in 0..S {
                 for j in 0..i {
