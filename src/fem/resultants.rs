@@ -9,7 +9,10 @@ use super::{
 use crate::{
     error::Result,
     job::Support,
-    linear_algebra::{petsc::DistributedVector, tensor::Vector},
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{Vector, add_scaled},
+    },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -28,6 +31,11 @@ pub struct Resultant<const D: usize> {
 impl<const D: usize> Resultant<D> {
     /// Number of entries in an array of sums.
     const WIDTH: usize = D + 3;
+
+    /// The moment about a point in N m; in the plane only the last component, in N.
+    pub fn moment_about(&self, point: &Vector<D>) -> Vector<3> {
+        add_scaled(&self.moment, -1.0, &moment_of(point, &self.force))
+    }
 
     fn read(sums: &[f64]) -> Self {
         Self { force: std::array::from_fn(|i| sums[i]), moment: std::array::from_fn(|i| sums[D + i]) }
@@ -414,5 +422,8 @@ mod tests {
     fn moments_are_those_about_the_origin() {
         assert_eq!(moment_of(&[2.0, 3.0], &[5.0, 7.0]), [0.0, 0.0, -1.0]);
         assert_eq!(moment_of(&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.5]), [-2.0, 5.5, -3.0]);
+        // A force at [3, 1] about [1, 1]: its arm is 2 m.
+        let resultant = Resultant { force: [5.0, 7.0], moment: moment_of(&[3.0, 1.0], &[5.0, 7.0]) };
+        assert_eq!(resultant.moment_about(&[1.0, 1.0]), [0.0, 0.0, 14.0]);
     }
 }

@@ -144,9 +144,14 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             written = history.row(state.step, state.time, state.step_length, outcome, totals);
         }
         session.agree(written)?;
-        self.resultants.write(session, body, state, scheme.balanced_motion(state), scheme.load())?;
-        if !self.probes.is_empty() {
-            session.agree(self.probes.write(session, state))?;
+        let motion = scheme.balanced_motion(state);
+        self.resultants.write(session, body, state, motion, scheme.load())?;
+        if self.probes.needs_stress() {
+            let stress = session.agree(body.stress(state))?;
+            let at = Converged { session, body, state, stress: &stress };
+            self.probes.write(session, state, Some((at, motion)))?;
+        } else if !self.probes.is_empty() {
+            self.probes.write::<S>(session, state, None)?;
         }
         self.write_state(session, body, state, [due(&self.every, state), due(&self.profiles_every, state)])?;
         self.fields.write_out_if_due()?;

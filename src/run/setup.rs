@@ -48,8 +48,11 @@ pub(super) fn setup<const D: usize, const S: usize>(
         session.agree(set_option(name, value))?;
     }
     let paired = pairs::find(session, job, &mut mesh)?;
-    let probes = session.agree(Probes::locate(session, &mesh, &job.output.probe))?;
+    let probes = session.agree(Probes::locate(session, &mesh, &job.output))?;
     let (mut body, mut state) = build::body::<D, S>(session, job, mesh, paired)?;
+    let fault = probes.fault(&body);
+    let fault = fault.map(|[message, help]| loaded.fault("output.probe_also", message, help));
+    session.agree(fault.map_or(Ok(()), Err))?;
     let began_from = transfer(session, loaded, &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;

@@ -17,7 +17,7 @@ fn cylinder() -> Case {
         .set("traction", "[{ on = ['top'], value = [0, 50] }]")
         .set("output.folder", "'out'")
         .set("output.probe", "[{ name = 'rim', point = [1, 2] }, { name = 'axis', point = [0, 1] }]")
-        .set("output.profile", "[{ on = 'top' }]")
+        .set("output.probe_also", "['stress', 'strain', 'von_mises', 'principal_stress', 'pressure']")
 }
 
 /// The value of a column in the last row with this word in another one.
@@ -49,6 +49,22 @@ fn a_cylinder_under_tension_is_exact_without_a_support_at_its_axis() {
             close(probe("rim", "displacement_y"), 0.1);
             close(probe("rim", "displacement_x"), -0.3 * 0.05);
             close(probe("axis", "displacement_x"), 0.0);
+            for (name, expected) in [
+                ("stress_xx", 0.0),
+                ("stress_yy", 50.0),
+                ("stress_zz", 0.0),
+                ("stress_xy", 0.0),
+                ("von_mises", 50.0),
+                ("principal_stress_1", 50.0),
+                ("principal_stress_3", 0.0),
+                ("pressure", -50.0 / 3.0),
+                ("strain_xx", -0.015),
+                ("strain_yy", 0.05),
+                ("strain_zz", -0.015),
+            ] {
+                let found = probe("axis", name);
+                assert!((found - expected).abs() < 1e-9, "{order} {ranks}: {name} {found} {expected}");
+            }
             let force = |source: &str, what: &str| last(&case, ("resultants.csv", "source", source), what);
             close(force("traction top", "force_y"), 50.0 * std::f64::consts::PI);
             close(force("support bottom", "force_y"), -50.0 * std::f64::consts::PI);
@@ -88,6 +104,7 @@ fn a_ball_falls_and_flies_without_straining() {
             let case = ball()
                 .set("mesh.order", order)
                 .set("gravity", "{ acceleration = [0, -10] }")
+                .set("output.probe_also", "['acceleration', 'contact_pressure', 'gap']")
                 .set("material.elasticity.youngs_modulus", "2e6")
                 .set("contact.0.obstacle.plane.point", "[0, -1]")
                 .set("time.scheme", &format!("'{scheme}'"))
@@ -99,7 +116,9 @@ fn a_ball_falls_and_flies_without_straining() {
             let probe = |what: &str| last(&case, ("probes.csv", "probe", "centre"), what);
             let velocity = probe("velocity_y");
             assert!((velocity + 1.0 + 10.0 * end).abs() < 1e-9, "{scheme} {order}: {velocity}");
-            assert!(probe("velocity_x") == 0.0);
+            assert!(probe("velocity_x") == 0.0 && probe("contact_pressure") == 0.0);
+            let acceleration = probe("acceleration_y");
+            assert!((acceleration + 10.0).abs() < 1e-5, "{scheme} {order}: {acceleration}");
             let strained = at_end(&case.results(), "elastic_energy");
             assert!(strained.abs() < 1e-9, "{scheme} {order}: {strained} J");
         }

@@ -22,6 +22,11 @@ impl Column {
         Self { axes: [&["x", "y"], &["x", "y", "z"]], ..Self::number(name, unit) }
     }
 
+    const fn tensor(name: &'static str, unit: &'static str) -> Self {
+        let axes: [&[&str]; 2] = [&["xx", "yy", "zz", "xy"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
+        Self { axes, ..Self::number(name, unit) }
+    }
+
     /// The same with another unit in the plane.
     const fn in_plane(self, unit: &'static str) -> Self {
         Self { units: [unit, self.units[1]], ..self }
@@ -108,12 +113,28 @@ pub(crate) const RESULTANTS: RunTable = RunTable {
     ],
 };
 
-/// One row per step and probe.
+/// One row per step and probe: displacement and velocity, and a group for each [`ProbedQuantity`](crate::job::ProbedQuantity) in their order.
 pub(crate) const PROBES: RunTable = RunTable {
     file: "probes.csv",
     word: "probe",
     keys: &["step", "time", "probe"],
-    groups: &[&[Column::vector("displacement", "m"), Column::vector("velocity", "m/s")]],
+    groups: &[
+        &[Column::vector("displacement", "m"), Column::vector("velocity", "m/s")],
+        &[Column::tensor("stress", "Pa")],
+        &[Column::number("von_mises", "Pa")],
+        &[Column { axes: [&["1", "2", "3"]; 2], ..Column::number("principal_stress", "Pa") }],
+        &[Column::number("pressure", "Pa")],
+        &[Column::tensor("strain", "")],
+        &[Column::vector("acceleration", "m/s²")],
+        &[Column::number("equivalent_viscoplastic_strain", "")],
+        &[Column::number("damage", "")],
+        &[Column::number("contact_pressure", "Pa")],
+        &[Column::vector("contact_traction", "Pa")],
+        &[Column::number("gap", "m")],
+        &[Column::vector("sliding_velocity", "m/s")],
+        &[Column::number("slip", "m")],
+        &[Column::number("wear", "m")],
+    ],
 };
 
 /// One row per output time, profile and node: with a gap, with friction.

@@ -88,7 +88,8 @@ pub(super) fn pad(vector: &[f64]) -> [f64; 3] {
     std::array::from_fn(|axis| vector.get(axis).copied().unwrap_or(0.0))
 }
 
-fn plain_components<const S: usize>(mandel: &[f64]) -> [f64; 6] {
+/// The components xx xy xz yy yz zz of a tensor in Mandel form.
+pub(super) fn plain_components<const S: usize>(mandel: &[f64]) -> [f64; 6] {
     const POSITION: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
     let mut plain = [0.0; 6];
     for (c, value) in mandel.iter().enumerate() {

@@ -1,19 +1,21 @@
-//! `probes.csv`: displacement and velocity at points of the body, with one row per step and probe.
+//! `probes.csv`: displacement, velocity and what else a job asks for at points of the body, with one row per step and probe.
 
 use super::{
     columns::PROBES,
     csv::{CsvFile, Numbers, Time, entry},
+    output_field::Converged,
+    probed::{ProbePlace, Probed, groups, places},
 };
 use crate::{
     error::{Error, Result},
-    fem::{space::Simplex, state::State},
-    job::Probe,
+    fem::{body::Body, resultants::BalancedMotion, space::Simplex, state::State},
+    job::{Output, Probe},
     linear_algebra::tensor::Vector,
     mesh::{
         Mesh,
         shape::{quadratic_values, tangent_corners},
     },
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
 };
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
 use std::path::Path;
@@ -28,6 +30,10 @@ pub(crate) struct Probes<const D: usize> {
     names: Vec<String>,
     /// Local nodes and the values of their shape functions, on the rank that evaluates.
     places: Vec<Option<Vec<(u32, f64)>>>,
+    /// What else is recorded, where, and the groups of columns.
+    probed: Probed,
+    probe_places: Vec<ProbePlace>,
+    with: Vec<bool>,
     file: Option<CsvFile>,
     /// Values of this rank and of all ranks.
     room: [Vec<f64>; 2],
@@ -36,9 +42,9 @@ pub(crate) struct Probes<const D: usize> {
 impl<const D: usize> Probes<D> {
     /// Finds the probes in the mesh; one outside the body is refused. Of several cells around a point, that of the lowest id counts,
     /// so that where bodies touch the choice does not depend on the partition. Collective.
-    pub(crate) fn locate(session: &Session, mesh: &Mesh<D>, probes: &[Probe]) -> Result<Self> {
-        let mut places = Vec::new();
-        for Probe { name, point } in probes {
+    pub(crate) fn locate(session: &Session, mesh: &Mesh<D>, output: &Output) -> Result<Self> {
+        let mut found = Vec::new();
+        for Probe { name, point } in &output.probe {
             let point = std::array::from_fn(|i| point.get(i).copied().unwrap_or(0.0));
             let here = find(mesh, &point);
             let mine = here.as_ref().map_or(f64::MAX, |(cell, _)| f64::from(mesh.cell_ids[*cell]));
@@ -48,11 +54,14 @@ impl<const D: usize> Probes<D> {
                     "probe \"{name}\" at {point:?} m lies outside the body; move its point inside"
                 )));
             }
-            places.push(here.filter(|_| lowest == mine).map(|(_, shares)| shares));
+            found.push(here.filter(|_| lowest == mine));
         }
         Ok(Self {
-            names: probes.iter().map(|probe| entry(&probe.name)).collect(),
-            places,
+            probe_places: places(session, mesh, &found)?,
+            probed: Probed::new(&output.probe_also),
+            with: groups(&output.probe_also),
+            names: output.probe.iter().map(|probe| entry(&probe.name)).collect(),
+            places: found.into_iter().map(|place| place.map(|(_, shares)| shares)).collect(),
             file: None,
             room: Default::default(),
         })
@@ -63,6 +72,16 @@ impl<const D: usize> Probes<D> {
         self.names.is_empty()
     }
 
+    /// Whether quantities besides displacement and velocity are recorded.
+    pub(crate) fn needs_stress(&self) -> bool {
+        !self.probed.is_empty() && !self.is_empty()
+    }
+
+    /// What is wrong with quantities that the body does not have: message and advice.
+    pub(crate) fn fault<const S: usize>(&self, body: &Body<D, S>) -> Option<[String; 2]> {
+        self.probed.fault(body)
+    }
+
     /// Opens the file on rank 0, if there are probes; continues it after this step if one is given.
     pub(crate) fn open(&mut self, folder: &Path, goes_on_after: Option<u64>) -> Result<()> {
         if self.is_empty() {
@@ -70,18 +89,24 @@ impl<const D: usize> Probes<D> {
         }
         let path = folder.join(PROBES.file);
         self.file =
-            Some(CsvFile::open(&path, &PROBES.header(D, &[true]), goes_on_after.map(|step| step as f64))?);
+            Some(CsvFile::open(&path, &PROBES.header(D, &self.with), goes_on_after.map(|step| step as f64))?);
         Ok(())
     }
 
-    /// Finds the values at all probes on all ranks: displacement, then velocity. Collective.
-    fn values(&mut self, session: &Session, state: &State) -> Result<()> {
+    /// Numbers of each probe.
+    fn width(&self) -> usize {
+        2 * D + self.probed.width(D)
+    }
+
+    /// Finds the displacements and velocities at the probes that this rank evaluates.
+    fn evaluate(&mut self, state: &State) -> Result<()> {
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
+        let width = self.width();
         let [mine, all] = &mut self.room;
         mine.clear();
-        mine.resize(self.names.len() * 2 * D, 0.0);
+        mine.resize(self.names.len() * width, 0.0);
         all.clone_from(mine);
-        for (place, values) in self.places.iter().zip(mine.chunks_exact_mut(2 * D)) {
+        for (place, values) in self.places.iter().zip(mine.chunks_exact_mut(width)) {
             for &(node, share) in place.iter().flatten() {
                 for i in 0..D {
                     values[i] += share * displacement[node as usize * D + i];
@@ -89,15 +114,32 @@ impl<const D: usize> Probes<D> {
                 }
             }
         }
-        session.world().all_reduce_into(&mine[..], &mut all[..], SystemOperation::sum());
         Ok(())
     }
 
-    /// Writes the rows of a step. Collective.
-    pub(crate) fn write(&mut self, session: &Session, state: &State) -> Result<()> {
-        self.values(session, state)?;
+    /// Writes the rows of a step; `also` is what further quantities are computed from. Collective.
+    pub(crate) fn write<const S: usize>(
+        &mut self,
+        session: &Session,
+        state: &State,
+        also: Option<(Converged<D, S>, BalancedMotion<'_>)>,
+    ) -> Result<(), Agreed> {
+        let evaluated = self.evaluate(state);
+        session.agree(evaluated)?;
+        let width = self.width();
+        let [mine, all] = &mut self.room;
+        if let Some(also) = also {
+            self.probed.add(also, &self.probe_places, (2 * D, width), mine)?;
+        }
+        session.world().all_reduce_into(&mine[..], &mut all[..], SystemOperation::sum());
+        let written = self.write_rows(state);
+        session.agree(written)
+    }
+
+    fn write_rows(&mut self, state: &State) -> Result<()> {
+        let width = self.width();
         let Some(file) = &mut self.file else { return Ok(()) };
-        for (name, values) in self.names.iter().zip(self.room[1].chunks_exact(2 * D)) {
+        for (name, values) in self.names.iter().zip(self.room[1].chunks_exact(width)) {
             file.row(format_args!("{},{},{name},{}", state.step, Time(state.time), Numbers(values)))?;
         }
         Ok(())

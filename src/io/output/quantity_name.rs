@@ -137,6 +137,7 @@ impl RunOf<'_> {
                 let has_gap = contacts.iter().any(|contact| contact.normal.has_gap());
                 vec![true, has_gap, contacts.iter().any(|contact| contact.friction.is_some()), true]
             }
+            "probe" => super::probed::groups(&self.job.output.probe_also),
             _ => vec![true; 2],
         }
     }

@@ -13,7 +13,7 @@ use crate::{
         state::State,
     },
     job::Job,
-    linear_algebra::petsc::DistributedVector,
+    linear_algebra::{petsc::DistributedVector, tensor::Vector},
     mesh::other_side,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -28,6 +28,8 @@ pub(crate) struct ResultantTable<const D: usize> {
     resultants: Resultants<D>,
     /// A name for each source, no two alike, as entries of the table.
     names: Vec<String>,
+    /// The point about which moments are, in m.
+    about: Vector<D>,
     /// The groups of columns that there are.
     with: [bool; 5],
     file: Option<CsvFile>,
@@ -49,7 +51,10 @@ impl<const D: usize> ResultantTable<D> {
             names.extend((1..).map(same).find(|name| !names.contains(name)));
         }
         let names = names.iter().map(|name| entry(name)).collect();
-        Ok(Self { resultants, names, with: groups(job), file: None })
+        let about =
+            job.output.moments_about.as_deref().filter(|_| !body.mesh.is_revolved).unwrap_or_default();
+        let about = std::array::from_fn(|i| about.get(i).copied().unwrap_or(0.0));
+        Ok(Self { resultants, names, about, with: groups(job), file: None })
     }
 
     /// Opens the file on rank 0; continues it after this step if one is given.
@@ -70,7 +75,7 @@ impl<const D: usize> ResultantTable<D> {
     ) -> Result<(), Agreed> {
         let time = motion.time;
         self.resultants.update(session, body, state, motion, load)?;
-        let Self { resultants, names, with, file } = self;
+        let Self { resultants, names, about, with, file } = self;
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
             let rows = resultants.sources().iter().zip(resultants.rows());
             for (name, (source, (resultant, areas))) in names.iter().zip(rows) {
@@ -80,7 +85,7 @@ impl<const D: usize> ResultantTable<D> {
                 };
                 let motions = obstacle.map_or([None; 2], |obstacle| obstacle.motions());
                 let [path, turn] = [0, 1].map(|number| motions[number].map(|motion| motion.balanced()));
-                let moment = &resultant.moment[if D == 2 { 2 } else { 0 }..];
+                let moment = &resultant.moment_about(about)[if D == 2 { 2 } else { 0 }..];
                 let [_, of_contacts, of_friction, of_path, of_turn] = *with;
                 file.row(format_args!(
                     "{},{},{name},{},{}{}{}{}{}",

@@ -27,7 +27,7 @@ pub use mesh::{
     Blocks, Cuboid, CuboidGrading, Diagonal, Mesh, MeshSource, Partition, Rectangle, RectangleGrading,
     Rotation, boundary_of_block, region_of_block,
 };
-pub use output::{Checkpoint, Every, FurtherField, Output, Probe, Profile};
+pub use output::{Checkpoint, Every, FurtherField, Output, Probe, ProbedQuantity, Profile};
 pub use parameters::Parameter;
 pub use time::{Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Solver, Time};
 

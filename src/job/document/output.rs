@@ -39,6 +39,16 @@ pub struct Output {
     /// Points whose displacement and velocity are written to probes.csv in every step.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub probe: Vec<Probe>,
+    /// Further quantities of all probes in probes.csv. Each costs a pass over the body in every step. Those of nodes are interpolated in
+    /// the cell around the probe, those of cells are the ones of this cell, as in fields.vtkhdf; contact quantities are 0 off the
+    /// contact boundaries.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(example = ["stress", "contact_pressure"])]
+    pub probe_also: Vec<ProbedQuantity>,
+    /// The point of the undeformed body about which the moments in resultants.csv are, one coordinate per axis. Absent: the origin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m"), example = [0.5, 1.0])]
+    pub moments_about: Option<Vec<f64>>,
     /// Boundaries whose displacements, velocities and pressures are written to profiles.csv at the times of profiles.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<Profile>,
@@ -74,6 +84,40 @@ pub enum FurtherField {
     Branch,
     /// The velocity relative to the obstacle along the boundary at the nodes of contacts with friction in m/s; zero at other nodes.
     SlidingVelocity,
+}
+
+/// A quantity of probes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProbedQuantity {
+    /// The components of the stress in Pa.
+    Stress,
+    /// The von Mises norm of the stress in Pa.
+    VonMises,
+    /// The principal stresses in Pa: principal_stress_1, the largest, to principal_stress_3.
+    PrincipalStress,
+    /// Minus the mean of the three normal stresses in Pa.
+    Pressure,
+    /// The components of the strain of the displacement.
+    Strain,
+    /// The acceleration in m/s^2 in the equations of the step.
+    Acceleration,
+    /// The equivalent viscoplastic strain that has accumulated.
+    EquivalentViscoplasticStrain,
+    /// The damage.
+    Damage,
+    /// The contact pressure in Pa.
+    ContactPressure,
+    /// The contact traction in Pa.
+    ContactTraction,
+    /// The distance to the obstacle along the normal in m.
+    Gap,
+    /// The velocity relative to the obstacle along the boundary in m/s.
+    SlidingVelocity,
+    /// The slip distance of friction laws that depend on it in m.
+    Slip,
+    /// The depth of wear in m.
+    Wear,
 }
 
 /// The times of outputs.
@@ -164,6 +208,11 @@ impl Output {
             table.fault_at_key("profiles", "there are no profiles to write", help);
         }
         table.refuse_repeats("also", "field");
+        table.refuse_repeats("probe_also", "quantity");
+        if !self.probe_also.is_empty() && self.probe.is_empty() {
+            let help = "add [[output.probe]] with `name` and `point`, or leave the key out";
+            table.fault_at_key("probe_also", "there are no probes to write", help);
+        }
     }
 
     /// Checks the keys with the names in the mesh and the blocks of a generated one.
@@ -174,6 +223,9 @@ impl Output {
         blocks: &[Block<'_>],
     ) {
         let is_known = !blocks.is_empty() && blocks.iter().all(Block::is_known);
+        if let Some(point) = &self.moments_about {
+            table.check_length("moments_about", point, mesh.dimension);
+        }
         table.each("probe", &self.probe, |Probe { point, .. }, table| {
             if point.len() != mesh.dimension {
                 let message = format!("`{}` has {} coordinate(s)", table.path("point"), point.len());

@@ -1,0 +1,265 @@
+//! Further quantities of probes: fields and histories at their points.
+
+use super::{
+    contact_points::fill_corners,
+    field::{Place, Shape, plain_components},
+    field_list::{FIELDS, computations},
+    output_field::Converged,
+};
+use crate::{
+    error::Result,
+    fem::{body::Body, effect::History, resultants::BalancedMotion, space::omits_corners},
+    job::ProbedQuantity,
+    mesh::Mesh,
+    parallel::{agreement::Agreed, exchange::gather, session::Session},
+};
+
+/// Number of the quantities.
+const COUNT: usize = 14;
+
+/// The quantities, in the order of their columns in `probes.csv`, each with what it is made of.
+const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
+    (ProbedQuantity::Stress, &[Source::Field("stress")]),
+    (ProbedQuantity::VonMises, &[Source::Field("von_mises")]),
+    (
+        ProbedQuantity::PrincipalStress,
+        &[
+            Source::Field("principal_stress_1"),
+            Source::Field("principal_stress_2"),
+            Source::Field("principal_stress_3"),
+        ],
+    ),
+    (ProbedQuantity::Pressure, &[Source::Field("pressure")]),
+    (ProbedQuantity::Strain, &[Source::Field("strain")]),
+    (ProbedQuantity::Acceleration, &[Source::Acceleration]),
+    (
+        ProbedQuantity::EquivalentViscoplasticStrain,
+        &[Source::OfCells("equivalent_viscoplastic_strain", "viscoplastic flow")],
+    ),
+    (ProbedQuantity::Damage, &[Source::OfCells("damage", "[material.damage]")]),
+    (ProbedQuantity::ContactPressure, &[Source::Field("contact_pressure")]),
+    (ProbedQuantity::ContactTraction, &[Source::Field("contact_traction")]),
+    (ProbedQuantity::Gap, &[Source::Field("gap")]),
+    (ProbedQuantity::SlidingVelocity, &[Source::Field("sliding_velocity")]),
+    (ProbedQuantity::Slip, &[Source::OfNodes("slip", "a friction law that depends on the slip")]),
+    (ProbedQuantity::Wear, &[Source::OfNodes("wear", "[contact.wear]")]),
+];
+
+/// What a quantity is made of.
+#[derive(Debug, Clone, Copy)]
+enum Source {
+    /// An output field of this name.
+    Field(&'static str),
+    /// A scalar history of nodes of this name, and what a job needs to have it.
+    OfNodes(&'static str, &'static str),
+    /// A scalar history of cells, likewise.
+    OfCells(&'static str, &'static str),
+    /// The change of the velocity in the equations of the step.
+    Acceleration,
+}
+
+/// The groups of columns of `probes.csv` that a job with these quantities has.
+pub(super) fn groups(wanted: &[ProbedQuantity]) -> Vec<bool> {
+    let of_quantities = QUANTITIES.iter().map(|(quantity, _)| wanted.contains(quantity));
+    std::iter::once(true).chain(of_quantities).collect()
+}
+
+/// The point of a probe, as far as this rank knows it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct ProbePlace {
+    /// The cell around it, on the rank that evaluates.
+    pub cell: Option<usize>,
+    /// The nodes owned here of this cell, with the values of their shape functions.
+    pub owned: Vec<(u32, f64)>,
+}
+
+/// The places of probes, given the cell and its local nodes with their shares on the ranks that evaluate. Collective.
+pub(super) fn places<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    found: &[Option<(usize, Vec<(u32, f64)>)>],
+) -> Result<Vec<ProbePlace>, Agreed> {
+    let mut records = Vec::new();
+    for (number, place) in found.iter().enumerate() {
+        for (node, share) in place.iter().flat_map(|(_, shares)| shares) {
+            records.extend([number as f64, f64::from(mesh.global_node(*node)), *share]);
+        }
+    }
+    let cell = |place: &Option<(usize, Vec<(u32, f64)>)>| place.as_ref().map(|(cell, _)| *cell);
+    let mut places: Vec<ProbePlace> =
+        found.iter().map(|place| ProbePlace { cell: cell(place), owned: Vec::new() }).collect();
+    for record in gather(session.world(), &records)?.chunks_exact(3) {
+        let node = record[1] as u32;
+        if mesh.owner(node) == session.rank() {
+            places[record[0] as usize].owned.push((mesh.owned_node(node) as u32, record[2]));
+        }
+    }
+    Ok(places)
+}
+
+/// Further quantities of the probes of a run.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Probed {
+    sources: Vec<Source>,
+}
+
+impl Probed {
+    /// These quantities.
+    pub(super) fn new(wanted: &[ProbedQuantity]) -> Self {
+        let chosen = QUANTITIES.iter().filter(|(quantity, _)| wanted.contains(quantity));
+        Self { sources: chosen.flat_map(|(_, sources)| *sources).copied().collect() }
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.sources.is_empty()
+    }
+
+    /// Numbers of a probe.
+    pub(super) fn width(&self, dimension: usize) -> usize {
+        self.sources.iter().map(|source| source.width(dimension)).sum()
+    }
+
+    /// What is wrong with quantities that the body does not have: message and advice.
+    pub(super) fn fault<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Option<[String; 2]> {
+        for source in &self.sources {
+            let (name, needed, is_there) = match *source {
+                Source::OfNodes(name, needed) => {
+                    (name, needed, body.node_histories().any(|history| history.name() == name))
+                }
+                Source::OfCells(name, needed) => {
+                    (name, needed, body.cell_histories().any(|history| history.name() == name))
+                }
+                Source::Field(name @ "contact_traction") => {
+                    (name, "a contact", body.contacts.iter().any(|contact| !contact.needs_ghosts()))
+                }
+                Source::Field(_) | Source::Acceleration => continue,
+            };
+            if !is_there {
+                return Some([
+                    format!("the body has no {name}"),
+                    format!("it needs {needed}; or delete \"{name}\" from the list"),
+                ]);
+            }
+        }
+        None
+    }
+
+    /// Adds the part of this rank to the values of the probes, `stride` numbers each, from `first` on. Collective.
+    pub(super) fn add<const D: usize, const S: usize>(
+        &self,
+        (at, motion): (Converged<D, S>, BalancedMotion<'_>),
+        places: &[ProbePlace],
+        (first, stride): (usize, usize),
+        values: &mut [f64],
+    ) -> Result<(), Agreed> {
+        let mut column = first;
+        for source in &self.sources {
+            let width = source.width(D);
+            let mut visit = |place: Place, shape: Shape, field: &[f64]| {
+                for (probe, values) in places.iter().zip(values.chunks_exact_mut(stride)) {
+                    add_value::<D, S>(probe, (place, shape), field, &mut values[column..][..width]);
+                }
+            };
+            match *source {
+                Source::Field(name) => {
+                    let number = FIELDS.iter().position(|field| field.name == name);
+                    let Some(number) = number else { continue };
+                    let computed = at.session.agree(computations::<D, S>()[number](at))?;
+                    if let Some(computed) = computed {
+                        visit(FIELDS[number].place, FIELDS[number].shape, &computed.values);
+                    }
+                }
+                Source::OfNodes(name, _) => {
+                    let found = at.body.node_histories().find(|history| history.name() == name);
+                    if let Some(History { quantity, mut values, .. }) = found {
+                        if omits_corners(&at.body.mesh) {
+                            at.session.agree(fill_corners(at, quantity, values.to_mut()))?;
+                        }
+                        visit(Place::Node, Shape::Scalar, &values);
+                    }
+                }
+                Source::OfCells(name, _) => {
+                    if let Some(history) = at.body.cell_histories().find(|history| history.name() == name) {
+                        visit(Place::Cell, Shape::Scalar, &history.values);
+                    }
+                }
+                Source::Acceleration => {
+                    let acceleration = at.session.agree(acceleration(motion))?;
+                    visit(Place::Node, Shape::Vector, &acceleration);
+                }
+            }
+            column += width;
+        }
+        Ok(())
+    }
+}
+
+impl Source {
+    fn width(self, dimension: usize) -> usize {
+        let shape = match self {
+            Self::Field(name) => FIELDS.iter().find(|field| field.name == name).map(|field| field.shape),
+            Self::Acceleration => Some(Shape::Vector),
+            Self::OfNodes(..) | Self::OfCells(..) => Some(Shape::Scalar),
+        };
+        match shape {
+            Some(Shape::Vector) => dimension,
+            Some(Shape::Tensor) => [4, 6][dimension - 2],
+            _ => 1,
+        }
+    }
+}
+
+/// At the nodes owned here.
+fn acceleration(motion: BalancedMotion<'_>) -> Result<Vec<f64>> {
+    let (now, before) = (motion.velocity.owned()?, motion.before.owned()?);
+    Ok(now.iter().zip(&*before).map(|(now, before)| (now - before) / motion.length).collect())
+}
+
+/// Adds the value of a field at a probe, as far as this rank has it.
+fn add_value<const D: usize, const S: usize>(
+    probe: &ProbePlace,
+    (place, shape): (Place, Shape),
+    field: &[f64],
+    value: &mut [f64],
+) {
+    let own = if shape == Shape::Tensor { S } else { value.len() };
+    match place {
+        Place::Node => {
+            for (node, share) in &probe.owned {
+                let of_node = &field[*node as usize * own..][..own];
+                value.iter_mut().zip(of_node).for_each(|(sum, value)| *sum += share * value);
+            }
+        }
+        Place::Cell => {
+            let Some(of_cell) = probe.cell.map(|cell| &field[cell * own..][..own]) else { return };
+            if shape == Shape::Tensor {
+                let [xx, xy, xz, yy, yz, zz] = plain_components::<S>(of_cell);
+                value.iter_mut().zip([xx, yy, zz, xy, yz, xz]).for_each(|(sum, value)| *sum += value);
+            } else {
+                value.iter_mut().zip(of_cell).for_each(|(sum, value)| *sum += value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::output::columns::PROBES;
+
+    #[test]
+    fn each_quantity_has_its_columns() {
+        for dimension in [2, 3] {
+            for (quantity, _) in &QUANTITIES {
+                let with = groups(std::slice::from_ref(quantity));
+                let columns = PROBES.header(dimension, &with).split(',').count() - 3 - 2 * dimension;
+                assert_eq!(columns, Probed::new(&[*quantity]).width(dimension), "{quantity:?}");
+            }
+            let all: Vec<ProbedQuantity> = QUANTITIES.iter().map(|(quantity, _)| *quantity).collect();
+            let header = PROBES.header(dimension, &groups(&all));
+            let expected = ["pressure", "stress_zz", "principal_stress_2", "slip", "contact_traction_y"];
+            expected.iter().for_each(|name| assert!(header.split(',').any(|n| n == *name), "{header}"));
+        }
+    }
+}
