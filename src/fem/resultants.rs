@@ -122,7 +122,11 @@ impl<const D: usize> Resultants<D> {
                 holder[node] = holder[node].or(Some(at as u32));
             }
         }
-        let is_held_alone = |(component, _): &(usize, &Option<u32>)| body.held.flags()[*component];
+        // Forces on the axis of a body of revolution across it are balanced all around.
+        let is_held_alone = |(component, _): &(usize, &Option<u32>)| {
+            let is_balanced = component % D == 0 && mesh.is_on_axis(&mesh.nodes[component / D]);
+            body.held.flags()[*component] && !is_balanced
+        };
         let held: Vec<(u32, u32)> = first
             .iter()
             .enumerate()

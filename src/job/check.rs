@@ -7,7 +7,7 @@ use super::findings::{MeshNames, Table, number_of_group};
 use crate::laws::contact::Gap;
 use crate::laws::expression::Scalar;
 use crate::laws::law::header;
-use crate::laws::material::{Hypothesis, Material};
+use crate::laws::material::Material;
 
 impl Job {
     /// All materials with their paths: the main one, then those of the regions.
@@ -94,7 +94,7 @@ fn check_hypothesis(job: &Job, table: &mut Table<'_>, dimension: usize) {
     if dimension == 3 && is_given {
         table.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
     }
-    if job.material.hypothesis == Some(Hypothesis::Axisymmetric) {
+    if job.is_revolved() {
         check_revolved(job, table);
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Blocks, Job, MeshSource};
 use crate::error::{Error, Result};
+use crate::laws::material::Hypothesis;
 
 /// Keys that, like all keys below them, do not affect the results, without positions in lists. The file of a mesh, its place and the
 /// file of a start state are among them, because several files may have the same contents: the code that reads them compares these.
@@ -51,6 +52,11 @@ impl Job {
             MeshSource::Box(_) => Some(3),
             MeshSource::File(_) => None,
         }
+    }
+
+    /// Whether the body is one of revolution.
+    pub fn is_revolved(&self) -> bool {
+        self.material.hypothesis == Some(Hypothesis::Axisymmetric)
     }
 
     /// The mesh file, if there is one.

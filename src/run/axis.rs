@@ -4,7 +4,6 @@ use crate::{
     error::Result,
     fem::space::{facets, longest_side},
     job::Loaded,
-    laws::material::Hypothesis,
     linear_algebra::tensor::larger,
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -16,7 +15,7 @@ const ON_AXIS: f64 = 1e-9;
 /// Makes the mesh that of a body of revolution if the job is about one: moves nodes that are on the axis up to rounding to it. Refuses
 /// cells beyond the axis, and contact on it. Collective.
 pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) -> Result<(), Agreed> {
-    if loaded.job.material.hypothesis != Some(Hypothesis::Axisymmetric) {
+    if !loaded.job.is_revolved() {
         return Ok(());
     }
     mesh.is_revolved = true;

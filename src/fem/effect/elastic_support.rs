@@ -15,6 +15,8 @@ use crate::{
 
 /// A direction with a smaller length is a rounding error.
 const ROUNDING: f64 = 1e-9;
+/// A weight for points without one, such as corners of quadratic facets in space, so that reactions have shares there.
+const LEAST: f64 = 1e-100;
 
 /// A stiffness in Pa/m or a damping in Pa s/m, along the normal and along the boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -173,8 +175,9 @@ impl<const D: usize> ElasticSupport<D> {
         }
         let mut areas = vec![[0.0; D]; self.reactions.len() / D];
         // The least share keeps forces along a flat boundary.
-        let area =
-            |at: &ElasticPoint<D>| at.point.normal.map(|n| at.point.weight * larger(n.abs(), ROUNDING));
+        let area = |at: &ElasticPoint<D>| {
+            at.point.normal.map(|n| larger(at.point.weight, LEAST) * larger(n.abs(), ROUNDING))
+        };
         for at in &self.points {
             let sum = &mut areas[at.point.node as usize];
             *sum = add_scaled(sum, 1.0, &area(at));

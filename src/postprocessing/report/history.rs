@@ -70,7 +70,8 @@ struct ChartColumns<'a> {
 }
 
 /// The components of the force of each source; of each contact the area by state, the pressure and the motion of its obstacle.
-pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
+/// Components are those of the first of these dimensions, units those of the second.
+pub(super) fn resultants(table: &Table, [dimension, of_units]: [usize; 2]) -> Result<Pictures> {
     let axes = ["x", "y", "z"];
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
     let forces: Vec<&str> = forces.iter().map(String::as_str).collect();
@@ -85,7 +86,7 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
         let is_felt =
             |force: &&str| rows.column(force).is_some_and(|values| values.iter().any(|value| *value != 0.0));
         let (felt, unfelt): (Vec<&str>, Vec<&str>) = forces.iter().copied().partition(is_felt);
-        let unit = RESULTANTS.unit("force_x", dimension);
+        let unit = RESULTANTS.unit("force_x", of_units);
         let none = unfelt.iter().map(|force| format!("{} of {what}: 0 {unit}", force.replace('_', " ")));
         out.constant.extend(none);
         let name = format!("force_{number}");
@@ -98,7 +99,7 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
                 ("obstacle_displacement", "displacement of the obstacle", &["obstacle_displacement"]),
                 ("obstacle_rotation", "rotation of the obstacle", &["obstacle_rotation"]),
             ] {
-                let unit = RESULTANTS.unit(columns[0], dimension);
+                let unit = RESULTANTS.unit(columns[0], of_units);
                 let name = format!("{name}_{number}");
                 let what = format!("{source}, {quantity}");
                 draw(
@@ -276,7 +277,7 @@ mod tests {
         let path = folder.path().join("resultants.csv");
         std::fs::write(&path, text).expect("written");
         let table = Table::read(&path, "source").expect("table").without_rounding();
-        let Pictures { pictures, constant } = resultants(&table, 2).expect("drawn");
+        let Pictures { pictures, constant } = resultants(&table, [2, 2]).expect("drawn");
         let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
         assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0"]);
         assert_eq!(

@@ -19,7 +19,7 @@ use crate::{
         field_snapshot::{History, Snapshot},
         fields::Place,
     },
-    job::Contact,
+    job::{Contact, Job},
 };
 use std::fmt::Write;
 
@@ -263,16 +263,23 @@ fn time_sections(sections: &mut Sections, found: &RunFiles) -> Result<()> {
         add("Probes", String::new(), history::probes(probes)?);
     }
     let dimension = found.dimension().unwrap_or(3);
+    let is_revolved = found.job.as_ref().is_some_and(Job::is_revolved);
+    let of_units = if is_revolved { 3 } else { dimension };
     if let Some(resultants) = found.resultants.as_ref().filter(|resultants| !resultants.is_empty()) {
-        let words = "Forces on the body. In every step they add up to the rate of change of momentum.";
-        add("Resultants", paragraph(words), history::resultants(resultants, dimension)?);
+        let words = if is_revolved {
+            "Forces on the body, all around. In every step those along the axis add up to the rate of change of momentum; stresses along the \
+             hoop balance radial ones."
+        } else {
+            "Forces on the body. In every step they add up to the rate of change of momentum."
+        };
+        add("Resultants", paragraph(words), history::resultants(resultants, [dimension, of_units])?);
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {
         add("Energy", paragraph("history.csv contains no steps yet."), Pictures::default());
         return Ok(());
     }
-    add("Energy", String::new(), history::energies(history, Energy::unit(dimension))?);
+    add("Energy", String::new(), history::energies(history, Energy::unit(of_units))?);
     let tolerance = found.job.as_ref().map(|job| job.solver.inclusion_tolerance);
     sections.push(("Steps".into(), String::new(), history::steps(history, tolerance)?));
     Ok(())

@@ -53,11 +53,12 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
     Ok(pictures)
 }
 
-/// The dimension of the bodies; that of a mesh file is found in the fields of a run.
+/// The dimension of the bodies, by which units are: 3 also of bodies of revolution; that of a mesh file is found in the fields of a run.
 fn dimension(plan: &Plan) -> usize {
     let of_run = |job: &Job| {
         let fields = || Snapshot::read(&job.output_folder().join("fields.vtkhdf")).ok();
-        job.dimension().or_else(|| Some(fields()?.dimension()))
+        let of_mesh = job.dimension().filter(|_| !job.is_revolved());
+        of_mesh.or(job.is_revolved().then_some(3)).or_else(|| Some(fields()?.dimension()))
     };
     plan.runs.iter().find_map(|run| of_run(&run.loaded.job)).unwrap_or(3)
 }
