@@ -231,7 +231,8 @@ fn sum_of_contributions<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<
         rest = next;
     }
     sums.into_iter()
-        .filter(|(_, sum)| sum.weight > LEAST_SHARE * sum.whole)
+        // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
+        .filter(|(_, sum)| sum.whole > 0.0 && sum.weight > LEAST_SHARE * sum.whole)
         .map(|(node, sum)| {
             let normal: Vector<D> = std::array::from_fn(|i| sum.normal[i]);
             let length = norm(&normal);
