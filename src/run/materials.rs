@@ -86,7 +86,7 @@ impl Materials {
                 continue;
             }
             let centre = centroid(&mesh.corners(cell)[..=D]);
-            let there = material.at(&centre).map_err(|fault| {
+            let there = material.at(&centre, if mesh.is_revolved { 3 } else { D }).map_err(|fault| {
                 Error::Refused(format!(
                     "{path}.{}: {} at {centre:?} m, the centre of cell {}; {}",
                     fault.key, fault.message, mesh.cell_ids[cell], fault.help

@@ -61,7 +61,8 @@ pub(in crate::job) fn check_in_body(
     for (key, value) in material.variables() {
         table.check_flat(&key, value, dimension);
     }
-    table.refuse(material.constant().fault_of_viscosity(dimension));
+    let normal_strains = if hypothesis == Some(Hypothesis::Axisymmetric) { 3 } else { dimension };
+    table.refuse(material.constant().fault_of_viscosity(normal_strains));
     if hypothesis == Some(Hypothesis::PlaneStress) || mesh.order == 2 {
         return;
     }

@@ -63,9 +63,9 @@ impl Material {
         self.properties().map(|value| value.map(|value| value.evaluate(0.0, place)))
     }
 
-    /// The material at a place in m with as many coordinates as the body has dimensions; refused where a property is not finite, or
+    /// The material at a place in m, in a body with as many normal strains; refused where a property is not finite, or
     /// not positive as it must be. A yield stress may be zero.
-    pub fn at(&self, place: &[f64]) -> Result<Material<f64>, LawFault> {
+    pub fn at(&self, place: &[f64], normal_strains: usize) -> Result<Material<f64>, LawFault> {
         let numbers = self.numbers_at(place);
         for (k, number) in numbers.into_iter().enumerate() {
             let Some(number) = number else { continue };
@@ -87,7 +87,7 @@ impl Material {
             ));
         }
         let material = self.with(numbers);
-        let fault = material.fault_of_viscosity(place.len()).or_else(|| material.fault_of_flow());
+        let fault = material.fault_of_viscosity(normal_strains).or_else(|| material.fault_of_flow());
         fault.map_or(Ok(material), Err)
     }
 
@@ -110,9 +110,9 @@ impl Material {
 }
 
 impl Material<f64> {
-    /// The fault of the viscosity in this dimension; its key is that of the table of the material.
-    pub fn fault_of_viscosity(&self, dimension: usize) -> Option<LawFault> {
-        Some(self.viscosity?.fault(dimension)?.within("viscosity"))
+    /// The fault of the viscosity in a body with as many normal strains: two in the plane; its key is that of the table of the material.
+    pub fn fault_of_viscosity(&self, normal_strains: usize) -> Option<LawFault> {
+        Some(self.viscosity?.fault(normal_strains)?.within("viscosity"))
     }
 
     /// The fault of the viscoplastic law; its key is that of the table of the material.
@@ -160,12 +160,15 @@ mod tests {
     #[test]
     fn properties_are_those_of_the_place() {
         assert!(graded().has_expressions());
-        let there = graded().at(&[1.0, 2.0]).expect("a material");
+        let there = graded().at(&[1.0, 2.0], 2).expect("a material");
         assert_eq!(there.numbers(), [Some(3.0), Some(8.0), Some(-1.0), Some(4.0), None]);
         assert_eq!(there.elasticity.expect("elastic").poisson_ratio, 0.25);
         let rigid = Material { elasticity: None, viscosity: None, ..graded() };
         assert!(!rigid.has_expressions());
-        assert_eq!(rigid.at(&[0.0, 0.0]).expect("a material").numbers(), [Some(3.0), None, None, None, None]);
+        assert_eq!(
+            rigid.at(&[0.0, 0.0], 2).expect("a material").numbers(),
+            [Some(3.0), None, None, None, None]
+        );
     }
 
     #[test]
@@ -181,7 +184,7 @@ mod tests {
             };
             Material { viscoplasticity: Some(Viscoplasticity::Perzyna(parameters)), ..graded() }
         };
-        let there = law(of("2 - y"), 1.0).at(&[0.0, 0.5]).expect("a material").viscoplasticity;
+        let there = law(of("2 - y"), 1.0).at(&[0.0, 0.5], 2).expect("a material").viscoplasticity;
         let expected = Perzyna {
             relaxation: 100.0,
             yield_stress: 1.5,
@@ -191,13 +194,14 @@ mod tests {
             metric: Metric::Compliance,
         };
         assert_eq!(there, Some(Viscoplasticity::Perzyna(expected)));
-        let refused = |exponent, y: f64| law(of("2 - y"), exponent).at(&[0.0, y]).expect_err("refused").key;
-        assert!(law(of("2 - y"), 1.0).at(&[0.0, 2.0]).is_ok(), "zero");
+        let refused =
+            |exponent, y: f64| law(of("2 - y"), exponent).at(&[0.0, y], 2).expect_err("refused").key;
+        assert!(law(of("2 - y"), 1.0).at(&[0.0, 2.0], 2).is_ok(), "zero");
         assert_eq!(refused(1.0, 3.0), "viscoplasticity.perzyna.yield_stress");
         assert_eq!(refused(2.0, 2.0), "viscoplasticity.perzyna.exponent");
         let cone = DruckerPrager { relaxation: 1.0, friction_coefficient: 0.5, cohesion: of("1 + x") };
         let cone = Material { viscoplasticity: Some(Viscoplasticity::DruckerPrager(cone)), ..graded() };
-        assert_eq!(cone.at(&[1.0, 0.0]).expect("a material").numbers()[4], Some(2.0));
+        assert_eq!(cone.at(&[1.0, 0.0], 2).expect("a material").numbers()[4], Some(2.0));
         assert_eq!(cone.key(4), "viscoplasticity.drucker_prager.cohesion");
         let keys: Vec<String> = cone.variables().map(|(key, _)| key).collect();
         assert_eq!(keys.last().map(String::as_str), Some("viscoplasticity.drucker_prager.cohesion"));
@@ -206,7 +210,7 @@ mod tests {
 
     #[test]
     fn what_is_not_positive_there_is_refused_with_its_key() {
-        let refused = |material: Material, place: &[f64]| material.at(place).expect_err("refused");
+        let refused = |material: Material, place: &[f64]| material.at(place, place.len()).expect_err("refused");
         let fault = refused(graded(), &[0.0, 10.0]);
         assert_eq!(
             (&*fault.key, &*fault.message),
@@ -216,6 +220,6 @@ mod tests {
         assert_eq!((&*fault.key, &*fault.message), ("density", "the value NaN is not finite"));
         // 3 volumetric + shear is 4 - 3 x, in the plane 4 - 2 x.
         assert_eq!(refused(graded(), &[1.5, 0.0, 0.0]).key, "viscosity.volumetric");
-        assert!(graded().at(&[1.5, 0.0]).is_ok());
+        assert!(graded().at(&[1.5, 0.0], 2).is_ok());
     }
 }
