@@ -131,14 +131,6 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     let displacement = session.agree(local(&state.displacement))?;
     let mut open = residual(session, body, state)?;
     session.agree(open.add_scaled(-1.0, &of_form(Form::Viscosity, &|at| velocity[at])?))?;
-    if body.elastic_support.has_reactions {
-        let add = |open: &mut DistributedVector| {
-            let mut values = open.owned_mut()?;
-            values.iter_mut().zip(&body.elastic_support.reactions).for_each(|(sum, force)| *sum += force);
-            Ok::<_, Error>(())
-        };
-        session.agree(add(&mut open))?;
-    }
     let change = of_form(Form::Elasticity, &|at| length * velocity[at])?;
     let mass = of_form(Form::Mass, &|at| velocity[at])?;
     // The size of the forces of the cells, which cancel where the body is not strained.
