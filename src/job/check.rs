@@ -99,15 +99,15 @@ fn check_hypothesis(job: &Job, table: &mut Table<'_>, dimension: usize) {
     }
 }
 
+/// Whether this is 0 always and everywhere.
+fn is_zero(value: &Scalar) -> bool {
+    !value.depends_on_time() && !value.depends_on_position() && value.evaluate(0.0, &[]) == 0.0
+}
+
 /// What acts on a body of revolution acts in its section, and all around alike.
 fn check_revolved(job: &Job, table: &mut Table<'_>) {
     let mut refuse = |key: String, message: &str, help: &str| table.fault(&key, message, help);
-    if job
-        .gravity
-        .as_ref()
-        .and_then(|gravity| gravity.acceleration.first())
-        .is_some_and(|x| *x != Scalar::default())
-    {
+    if job.gravity.as_ref().and_then(|gravity| gravity.acceleration.first()).is_some_and(|x| !is_zero(x)) {
         let message = "the weight of a body of revolution acts along its axis, y";
         refuse("gravity.acceleration".into(), message, "give 0 as the first component");
     }

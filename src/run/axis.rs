@@ -3,7 +3,7 @@
 use crate::{
     error::Result,
     fem::space::{facets, longest_side},
-    job::Loaded,
+    job::{Loaded, Support},
     linear_algebra::tensor::larger,
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -13,7 +13,7 @@ use crate::{
 const ON_AXIS: f64 = 1e-9;
 
 /// Makes the mesh that of a body of revolution if the job is about one: moves nodes that are on the axis up to rounding to it. Refuses
-/// cells beyond the axis, and contact on it. Collective.
+/// cells beyond the axis, and contact, loads and springs on it. Collective.
 pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) -> Result<(), Agreed> {
     if !loaded.job.is_revolved() {
         return Ok(());
@@ -36,22 +36,45 @@ pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) ->
     } else {
         Ok(())
     })?;
-    for (number, contact) in loaded.job.contact.iter().enumerate() {
+    let job = &loaded.job;
+    for (number, contact) in job.contact.iter().enumerate().filter(|(_, contact)| contact.part.is_none()) {
         let names = contact.on.iter().chain(&contact.against);
-        let is_inside = |facet: &u32| {
-            mesh.facets[*facet as usize].iter().all(|&node| mesh.is_on_axis(&mesh.nodes[node as usize]))
-        };
-        let inside = facets(mesh, names).iter().filter(|facet| is_inside(facet)).count();
-        let is_refused = contact.part.is_none() && session.total(inside) > 0;
-        session.agree(if is_refused {
-            Err(loaded.fault(
-                &format!("contact.{number}.on"),
-                "a part of the boundary is the axis, which is inside the body of revolution",
-                "choose a boundary off the axis, or exclude it with `where`",
-            ))
-        } else {
-            Ok(())
-        })?;
+        let [inside, _] = facets_on_axis(session, mesh, names);
+        session.agree(refusal(loaded, &format!("contact.{number}.on"), inside > 0))?;
+    }
+    for (number, traction) in job.traction.iter().enumerate() {
+        let [inside, all] = facets_on_axis(session, mesh, &traction.on);
+        session.agree(refusal(loaded, &format!("traction.{number}.on"), inside > 0 && inside == all))?;
+    }
+    let gives_way =
+        |support: &Support| support.stiffness.is_some() || support.damping.is_some() || support.absorbing;
+    for (number, support) in job.support.iter().enumerate().filter(|(_, support)| gives_way(support)) {
+        let [inside, all] = facets_on_axis(session, mesh, &support.on);
+        session.agree(refusal(loaded, &format!("support.{number}.on"), inside > 0 && inside == all))?;
     }
     Ok(())
+}
+
+/// How many of the facets of these boundaries are on the axis, and how many there are. Collective.
+fn facets_on_axis<'a>(
+    session: &Session,
+    mesh: &Mesh<2>,
+    names: impl IntoIterator<Item = &'a String>,
+) -> [usize; 2] {
+    let all = facets(mesh, names);
+    let is_inside = |facet: &&u32| {
+        mesh.facets[**facet as usize].iter().all(|&node| mesh.is_on_axis(&mesh.nodes[node as usize]))
+    };
+    [all.iter().filter(is_inside).count(), all.len()].map(|count| session.total(count))
+}
+
+fn refusal(loaded: &Loaded, key: &str, is_refused: bool) -> Result<()> {
+    if !is_refused {
+        return Ok(());
+    }
+    Err(loaded.fault(
+        key,
+        "this boundary or a part of it is the axis, which is inside the body of revolution and has no area",
+        "choose a boundary off the axis; contact may exclude it with `where`",
+    ))
 }

@@ -368,6 +368,12 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, held: &Held<D>, state: &mu
                         ["x", "y", "z"][i]
                     )));
                 }
+                if i == 0 && number != 0.0 && mesh.is_on_axis(&point) {
+                    return Err(Error::Refused(format!(
+                        "{what}: component x is {number} at {point:?} m, on the axis of the body of revolution, where it is 0; correct the \
+                         expression, for example by the factor x"
+                    )));
+                }
                 *target = number;
             }
         }

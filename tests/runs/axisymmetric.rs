@@ -182,9 +182,46 @@ fn a_flat_ring_of_large_radius_is_a_section_in_plane_strain() {
 }
 
 #[test]
-fn a_mesh_beyond_the_axis_and_contact_on_the_axis_are_refused() {
+fn a_rough_platen_moves_along_the_axis() {
+    let platen = |y: &str| {
+        let support = format!(
+            "[{{ on = ['bottom'], fix = 'all' }}, {{ on = ['top'], fix = 'all', displacement = [0, '{y}'] }}]"
+        );
+        cylinder().without("traction").set("support", &support)
+    };
+    let case = platen("-0.01*t").set("mesh.order", "2").run_and_keep(2);
+    let force = |source: &str, what: &str| last(&case, ("resultants.csv", "source", source), what);
+    let pressed = force("support bottom", "force_y");
+    // Between the block that is free to expand and the one that is not.
+    let free = 1000.0 * 0.005 * std::f64::consts::PI;
+    assert!(pressed > 1.01 * free && pressed < 1.35 * free, "{pressed} {free}");
+    assert!((pressed + force("support top", "force_y")).abs() < 1e-9 * free);
+    assert_eq!(last(&case, ("probes.csv", "probe", "axis"), "displacement_x"), 0.0);
+}
+
+#[test]
+fn springs_take_over_reactions_of_a_side_that_begins_at_the_axis() {
+    let first = cylinder().set("mesh.order", "2").set("checkpoint", "{ at = [1.0] }").run_and_keep(1);
+    let from = format!("{{ from = '{}' }}", first.folder().join("out").display());
+    let second = cylinder()
+        .set("mesh.order", "2")
+        .set("support", "[{ on = ['bottom'], stiffness = { normal = 1e3, tangential = 1e3 } }]")
+        .set("initial", &from)
+        .run_and_keep(2);
+    let force = last(&second, ("resultants.csv", "source", "support bottom"), "force_y");
+    let expected = -50.0 * std::f64::consts::PI;
+    assert!((force - expected).abs() < 1e-9 * expected.abs(), "{force} {expected}");
+    assert!(!second.results().text("run.log").contains("out of balance"));
+}
+
+#[test]
+fn a_mesh_beyond_the_axis_and_what_acts_on_the_axis_are_refused() {
     let beyond = cylinder().without("output.probe").set("mesh.rectangle.corner", "[-0.5, 0]");
     beyond.run_with(2, &[]).expect(2).says("reaches x = -0.5 m, beyond the axis");
     let inside = cylinder().set("contact", "[{ on = ['left'], normal = { unilateral = {} } }]");
     inside.run_with(2, &[]).expect(2).says("is inside the body of revolution");
+    let loaded = cylinder().set("traction", "[{ on = ['left'], value = [1, 0] }]");
+    loaded.run_with(2, &[]).expect(2).says("is inside the body of revolution");
+    let moved = cylinder().set("initial", "{ displacement = [0.001, 0] }");
+    moved.run_with(2, &[]).expect(2).says("on the axis of the body of revolution, where it is 0");
 }

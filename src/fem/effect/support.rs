@@ -246,7 +246,13 @@ impl<const D: usize> SupportMotion<D> {
             for (node, directions) in nodes {
                 // A support along the normal has one value for all normals of a node.
                 let number = |at: usize| numbers.get(at).or(numbers.first()).copied();
-                let all = directions.iter().enumerate().map(|(at, direction)| (*direction, number(at)));
+                // The axis of a body of revolution does not leave its place.
+                let is_on_axis = mesh.is_on_axis(&mesh.nodes[*node as usize]);
+                let moves = |direction: &Vector<D>| !(is_on_axis && direction[0] != 0.0);
+                let all = directions
+                    .iter()
+                    .enumerate()
+                    .map(|(at, direction)| (*direction, number(at).filter(|_| moves(direction))));
                 moved.entry(*node).or_default().extend(all);
             }
         }

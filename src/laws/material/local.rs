@@ -210,7 +210,8 @@ mod tests {
 
     #[test]
     fn what_is_not_positive_there_is_refused_with_its_key() {
-        let refused = |material: Material, place: &[f64]| material.at(place, place.len()).expect_err("refused");
+        let refused =
+            |material: Material, place: &[f64]| material.at(place, place.len()).expect_err("refused");
         let fault = refused(graded(), &[0.0, 10.0]);
         assert_eq!(
             (&*fault.key, &*fault.message),

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Viscosity")]
 pub struct Viscosity<N = f64> {
-    /// Factor of the trace of the strain rate. It may be negative if d volumetric + shear is positive, with the dimension d. An
-    /// expression in x, y, z is evaluated at the centre of each cell.
+    /// Factor of the trace of the strain rate. It may be negative if d volumetric + shear is positive, with the dimension d, 3 of
+    /// bodies of revolution. An expression in x, y, z is evaluated at the centre of each cell.
     #[schemars(extend("variables" = "x, y, z", "unit" = "Pa s"), example = 25.0)]
     pub volumetric: N,
     /// Factor of the strain rate. An expression in x, y, z is evaluated at the centre of each cell.

@@ -533,7 +533,12 @@ fn loads<const D: usize>(draw: &mut Draw<D>, content: &Content) {
     }
     let mut velocity = draw.direction().map(|x| 0.5 * x);
     velocity[D - 1] -= 0.5;
-    let gradient: [[f64; D]; D] = std::array::from_fn(|_| draw.direction().map(|x| 0.3 * x));
+    let mut gradient: [[f64; D]; D] = std::array::from_fn(|_| draw.direction().map(|x| 0.3 * x));
+    if draw.is_revolved() {
+        // The axis remains where it is.
+        velocity[0] = 0.0;
+        gradient[0][1] = 0.0;
+    }
     // A held boundary does not move, and one that is moved starts from rest.
     let velocity = if kind == "all" || kind == "moved" || kind == "normal" {
         draw.linear(
