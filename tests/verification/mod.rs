@@ -50,6 +50,7 @@ mod subspace;
 mod supports;
 mod tolerance;
 mod uniqueness;
+mod units;
 mod unloading;
 mod wave;
 
