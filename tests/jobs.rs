@@ -10,7 +10,7 @@ use clarke::{
 };
 
 /// All jobs of the repository, without studies, and all cases.
-fn jobs() -> Vec<PathBuf> {
+pub fn jobs() -> Vec<PathBuf> {
     let mut found = Vec::new();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![root.join("jobs"), root.join("tests/cases")];

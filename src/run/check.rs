@@ -10,6 +10,7 @@ use super::{
     steps,
     summary::PartitionQuality,
     trial::{self, TimeEstimate},
+    units::{self, BodySize},
 };
 use crate::{
     error::{Error, Result},
@@ -61,6 +62,9 @@ pub struct Report {
     partition: PartitionQuality,
     cell_quality: Quality,
     extent: Vec<[f64; 2]>,
+    bodies: Vec<BodySize>,
+    #[serde(skip)]
+    body_count: usize,
     estimate: Estimate,
     warnings: Vec<String>,
     output_folder: String,
@@ -83,6 +87,10 @@ pub(super) fn check<const D: usize, const S: usize>(
     let ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     session.agree(check_loads(&loaded.job, &ready.body, &ready.state))?;
     let mut report = session.agree(report(session, loaded, &ready, quality))?;
+    let longest = steps::longest_step(&loaded.job);
+    (report.bodies, report.body_count) = units::bodies(session, &loaded.job, &ready.body, longest)?;
+    let sizes = report.bodies.iter().enumerate();
+    report.warnings.extend(sizes.flat_map(|(at, size)| size.warnings(at + 1, loaded.job.time.end)));
     if let Some(began) = began {
         match trial::estimate(session, &loaded.job, ready, began)? {
             Ok(seconds) => report.estimate.seconds = Some(seconds),
@@ -141,6 +149,8 @@ fn report<const D: usize, const S: usize>(
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
         cell_quality: quality,
         extent: extent(session, mesh),
+        bodies: Vec::new(),
+        body_count: 0,
         estimate: Estimate {
             memory_bytes: MemoryEstimate::new(session, body, &inventory, preconditioner, problem),
             seconds: None,
@@ -236,6 +246,10 @@ impl Report {
             format!("cells      shape quality at least {} of 1", Digits(self.cell_quality.smallest)),
             format!("extent     {}", extent.join(", ")),
         ];
+        lines.extend(self.bodies.iter().enumerate().map(|(at, size)| size.line(at + 1)));
+        if self.body_count > self.bodies.len() {
+            lines.push(format!("bodies     {} in all", self.body_count));
+        }
         lines.extend(advice(self.scheme, self.certificates.explicit_step_bound, self.motion));
         if self.newton {
             lines.push(format!("contact    {} points", self.contact_points));

@@ -28,6 +28,7 @@ mod steps;
 mod summary;
 mod time_loop;
 mod trial;
+mod units;
 
 pub use build::normal_law;
 pub use check::Report;

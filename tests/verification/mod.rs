@@ -51,6 +51,7 @@ mod subspace;
 mod supports;
 mod tolerance;
 mod uniqueness;
+mod units;
 mod unloading;
 mod wave;
 

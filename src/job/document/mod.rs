@@ -91,7 +91,7 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checkpoint: Option<Checkpoint>,
     /// Expected results, by the quoted name of the quantity, such as "final_von_mises" or "probe.tip.velocity_y". The tests of the
-    /// solver compare the example jobs with them; a run ignores them.
+    /// solver compare the example jobs with them; a run only refuses names of which it will have no value.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(extend("key_help" = "quote the whole name: \"probe.tip.velocity_y\" = { value = .., relative = .. }"))]
     pub check: BTreeMap<String, Expected>,

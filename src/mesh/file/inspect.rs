@@ -64,7 +64,7 @@ mod tests {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes/clamped_square.msh");
         let words = inspect(&path).expect("a mesh");
         for part in
-            ["a valid mesh", "triangles", "extent      x from 0 to 1 m", "boundary    bottom", ": 1 m"]
+            ["a valid mesh", "triangles", "extent      x from 0 to 1 m", "boundary    bottom", "facets, 1 m"]
         {
             assert!(words.contains(part), "{part}: {words}");
         }

@@ -20,8 +20,9 @@ use serde::{Deserialize, Serialize};
 pub struct CoefficientFormula {
     /// Friction coefficient as a formula of the sliding velocity v in m/s, the slip distance l of a point since the start of the run in m,
     /// the contact pressure p in Pa, the time t in s and the undeformed coordinates x, y, z in m. It must not be negative for any v, l, p
-    /// and t from 0 on and any place, and not jump with v, l or p. Where it contains l, field files and checkpoints contain the slip as
-    /// `slip`.
+    /// and t from 0 on and any place, and not jump with v, l or p. A bound, the coefficient times p, that grows by much more than 1 Pa for
+    /// each Pa from p = 0 on, such as 300/(p + 1e-3), makes steps fail where contact opens: for a constant bound use `tresca`. Where it
+    /// contains l, field files and checkpoints contain the slip as `slip`.
     #[schemars(example = &"0.3 + 0.2*exp(-v/0.1)")]
     pub coefficient: Formula<OfSliding>,
     #[serde(skip)]
