@@ -1,6 +1,6 @@
 //! Sizes by which wrong units of a job are seen: of each body its extent, mass, waves and loads.
 
-use super::materials::Materials;
+use super::{materials::Materials, parts::centre_of};
 use crate::{
     error::Result,
     fem::body::Body,
@@ -38,8 +38,10 @@ const LARGEST_STRAIN: f64 = 1.0;
 pub(super) struct BodySize {
     /// Its size along each axis in m.
     pub extent: Vec<f64>,
-    /// In kg, in the plane in kg/m; 0 without density.
+    /// In `mass_unit`; 0 without density.
     pub mass: f64,
+    /// kg, in the plane kg/m.
+    pub mass_unit: &'static str,
     /// The largest density of its cells in kg/m^d; 0 without density.
     pub density: f64,
     /// The largest Young's modulus of its cells in Pa; 0 without elasticity.
@@ -96,12 +98,14 @@ pub(super) fn bodies<const D: usize, const S: usize>(
     for facet in body.load.tractions.iter().flat_map(|traction| &traction.facets) {
         let nodes = mesh.facets[*facet as usize];
         if let Some(sum) = sums.get_mut(of_node[nodes[0] as usize]) {
-            sum.loaded_area += norm(&facet_normal(&nodes.map(|node| mesh.nodes[node as usize])));
+            let corners = nodes.map(|node| mesh.nodes[node as usize]);
+            sum.loaded_area += norm(&facet_normal(&corners)) * mesh.turn(&centre_of(mesh, *facet));
         }
     }
     let loads = session.agree(loads(body, job.time.end, (&of_node, sums.len())))?;
-    let sizes = sums.iter().zip(loads).map(|(sum, loads)| sum.size(session, loads, step)).collect();
-    Ok((sizes, found.count))
+    let mass_unit = if D == 2 && !mesh.is_revolved { "kg/m" } else { "kg" };
+    let size = |(sum, loads): (&Measured<D>, _)| BodySize { mass_unit, ..sum.size(session, loads, step) };
+    Ok((sums.iter().zip(loads).map(size).collect(), found.count))
 }
 
 /// Sums of the magnitudes of nodal forces in N on bodies at some times, on boundaries and inside, for the body of each node.
@@ -162,6 +166,7 @@ impl<const D: usize> Measured<D> {
         BodySize {
             extent,
             mass,
+            mass_unit: "kg",
             density,
             youngs_modulus,
             wave_speed,
@@ -178,8 +183,7 @@ impl BodySize {
         let sides: Vec<String> = self.extent.iter().map(|side| format!("{} m", Digits(*side))).collect();
         let mut text = format!("body {number:<6}{}", sides.join(" x "));
         if self.mass > 0.0 {
-            let unit = if self.extent.len() == 2 { "kg/m" } else { "kg" };
-            text += &format!(", mass {} {unit}", Digits(self.mass));
+            text += &format!(", mass {} {}", Digits(self.mass), self.mass_unit);
         }
         if let (Some(speed), Some(time), Some(steps)) = (self.wave_speed, self.wave_time, self.steps_per_wave)
         {
@@ -251,6 +255,7 @@ mod tests {
         BodySize {
             extent: vec![1.0, 0.1, 0.1],
             mass: 78.5,
+            mass_unit: "kg",
             density: 7850.0,
             youngs_modulus: 2.1e11,
             wave_speed: Some(5172.19),
