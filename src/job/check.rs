@@ -188,6 +188,13 @@ fn check_density_and_elasticity(job: &Job, table: &mut Table<'_>) {
         let message = "an initial stress requires an elastic material";
         table.fault_at_key("initial.stress", message, "add [material.elasticity]");
     }
+    if has_stress
+        && let Some((path, _)) = job.materials().find(|(_, material)| material.orthotropic.is_some())
+    {
+        let message = "an initial stress requires isotropic elasticity";
+        let help = format!("delete it, or replace {} by elasticity", header(&format!("{path}.orthotropic")));
+        table.fault_at_key("initial.stress", message, help);
+    }
     let has_back_stress = |material: &Material| {
         material.viscoplasticity.as_ref().is_some_and(|law| law.with_yield_stress(0.0).has_back_stress())
     };

@@ -35,6 +35,7 @@ mod midsides;
 mod obstacles;
 mod one_cell;
 mod orders;
+mod orthotropic;
 mod patch;
 mod petsc_boundary;
 mod profiles;

@@ -6,6 +6,8 @@
 //! An effect is called only in the phases that it declares in [`Effect::phases`].
 
 mod adhesion;
+mod anisotropic;
+mod anisotropic_elasticity;
 mod carriers;
 mod cell_history;
 mod contact;
@@ -48,6 +50,7 @@ use crate::{
 use crate::laws::step::quantity;
 pub use crate::laws::step::{Blend, Evaluation, Moment, Quantity, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
+pub use anisotropic_elasticity::AnisotropicElasticity;
 pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
     Decrease, Freedom, Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
@@ -109,6 +112,10 @@ pub fn effects<const D: usize, const S: usize>(
     }
     if let Some(law) = by_material(materials, elastic_law::<S>) {
         effects.push(Box::new(Elasticity { law }));
+    }
+    let orthotropic = |m: &Material<f64>| Some(m.orthotropic?.tensor(Hypothesis::of(S)));
+    if let Some(law) = by_material(materials, orthotropic) {
+        effects.push(Box::new(AnisotropicElasticity { law }));
     }
     if let Some(tensor) = by_material(materials, |m| m.viscosity_tensor(Hypothesis::of(S))) {
         effects.push(Box::new(ViscousStress { tensor }));

@@ -1,9 +1,9 @@
 //! Effects as terms of the linearised equation of motion: its matrix and the certificates are made of them.
 
-use super::{isotropic, mass};
+use super::{anisotropic, isotropic, mass};
 use crate::{
     fem::space::{Batch, Cell, CellMatrix},
-    laws::material::{ByMaterial, Isotropic},
+    laws::material::{Anisotropic, ByMaterial, Isotropic},
 };
 
 /// A quadratic form of the velocity.
@@ -50,6 +50,8 @@ pub enum Term<'a> {
     Viscosity(&'a ByMaterial<Isotropic>),
     /// Elasticity.
     Elasticity(&'a ByMaterial<ElasticLaw>),
+    /// Elasticity that is not isotropic, with its tensor in Pa.
+    Anisotropic(&'a ByMaterial<Anisotropic>),
     /// Flow.
     Flow(FlowProperties),
     /// Nothing that the matrix or a certificate contains.
@@ -62,7 +64,7 @@ impl Term<'_> {
         match self {
             Self::Mass(_) => Some(Form::Mass),
             Self::Viscosity(_) | Self::Drag(_) => Some(Form::Viscosity),
-            Self::Elasticity(_) => Some(Form::Elasticity),
+            Self::Elasticity(_) | Self::Anisotropic(_) => Some(Form::Elasticity),
             Self::Flow(_) | Self::Absent => None,
         }
     }
@@ -73,15 +75,19 @@ impl Term<'_> {
             Self::Mass(density) => density.is_everywhere(),
             Self::Viscosity(tensor) => tensor.is_everywhere(),
             Self::Elasticity(law) => law.is_everywhere(),
+            Self::Anisotropic(law) => law.is_everywhere(),
             Self::Drag(_) | Self::Flow(_) | Self::Absent => false,
         }
     }
 
-    /// The tensor of a material: of elasticity in Pa, of viscosity in Pa s.
+    /// The tensor of a material: of elasticity in Pa, of viscosity in Pa s; a bound of it from above where it is not isotropic.
     pub fn tensor(&self, material: usize) -> Option<Isotropic> {
         match self {
             Self::Viscosity(tensor) => tensor.get(material).copied(),
             Self::Elasticity(law) => law.get(material).map(|law| law.tensor),
+            Self::Anisotropic(law) => {
+                law.get(material).map(|law| Isotropic { volumetric: 0.0, shear: law.most() })
+            }
             Self::Mass(_) | Self::Drag(_) | Self::Flow(_) | Self::Absent => None,
         }
     }
@@ -108,6 +114,12 @@ impl Term<'_> {
             if let Some(coefficient) = coefficient.get(material) {
                 matrix.add_mass(cell, factor * coefficient);
             }
+        } else if let Self::Anisotropic(law) = self {
+            if let Some(tensor) = law.get(material) {
+                matrix.add_form(cell, |slopes, volume| {
+                    tensor.block(slopes).map(|row| row.map(|entry| length * volume * entry))
+                });
+            }
         } else if let Some(tensor) = self.tensor(material) {
             let factor = if matches!(self, Self::Elasticity(_)) { length } else { 1.0 };
             matrix.add_isotropic(cell, factor * tensor.volumetric, factor * tensor.shear);
@@ -118,6 +130,10 @@ impl Term<'_> {
     pub fn add_force<const D: usize, const S: usize>(&self, batch: &mut Batch<D, S>) {
         if let Some((coefficient, _)) = self.of_values(1.0) {
             mass::add_to_batch(coefficient, 1.0, batch);
+        } else if let Self::Anisotropic(law) = self {
+            if let Some(tensor) = law.get(batch.material) {
+                anisotropic::add_stresses(tensor, -1.0, &batch.strain_rate, &mut batch.stress);
+            }
         } else if let Some(tensor) = self.tensor(batch.material) {
             isotropic::add_stresses(&tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
         }
@@ -132,7 +148,16 @@ mod tests {
             Geometry, Needs, Nodal,
             samples::{number, quadratic, revolved, row},
         },
+        laws::material::{Hypothesis, Orthotropic},
         mesh::Mesh,
+    };
+
+    const WOOD: Orthotropic = Orthotropic {
+        youngs_moduli: [12.0, 0.8, 0.5],
+        poisson_ratios: [0.4, 0.3, 0.45],
+        shear_moduli: [0.7, 0.05, 0.6],
+        angle: Some(30.0),
+        axes: None,
     };
 
     /// The matrix of cells times a velocity is the force of the same term.
@@ -141,9 +166,13 @@ mod tests {
         let v: Vec<f64> = (0..mesh.nodes.len() * D).map(number).collect();
         let density = ByMaterial::uniform(1.7);
         let tensor = ByMaterial::uniform(Isotropic { volumetric: 7.0, shear: 3.0 });
-        for (term, size) in
-            [(Term::Mass(&density), 0), (Term::Drag(&density), 0), (Term::Viscosity(&tensor), 1)]
-        {
+        let wood = ByMaterial::uniform(WOOD.tensor(Hypothesis::of(S)));
+        for (term, size) in [
+            (Term::Mass(&density), 0),
+            (Term::Anisotropic(&wood), 2),
+            (Term::Drag(&density), 0),
+            (Term::Viscosity(&tensor), 1),
+        ] {
             let (mut found, mut expected) = (vec![0.0; v.len()], vec![0.0; v.len()]);
             let mut matrix = CellMatrix::new(mesh);
             for (number, cell) in geometry.cells().enumerate() {

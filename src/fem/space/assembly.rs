@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    linear_algebra::petsc::BlockRows,
+    linear_algebra::{petsc::BlockRows, tensor::Vector},
     mesh::Mesh,
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
@@ -90,15 +90,50 @@ impl<const D: usize> CellMatrix<D> {
     /// Adds `integral of e(w) : T(e(v))` with `T` isotropic.
     #[inline]
     pub fn add_isotropic(&mut self, cell: Cell<'_, D>, volumetric: f64, shear: f64) {
-        let linear = |cell: &Simplex<D>| {
+        if let CellShape::Linear | CellShape::LinearRing(_) = cell.shape() {
+            add_linear(&mut self.blocks, &cell.point(0), volumetric, shear);
+            return;
+        }
+        self.add_products_of(cell, |cell| {
             let mut blocks = [[[[0.0; D]; D]; 4]; 4];
             add_linear(&mut blocks, cell, volumetric, shear);
             blocks
-        };
-        match cell.shape() {
-            CellShape::Linear | CellShape::LinearRing(_) => {
-                add_linear(&mut self.blocks, &cell.point(0), volumetric, shear);
+        });
+    }
+
+    /// Adds a form of the strains of velocities, given its block for the gradients of two barycentric coordinates, each with the hoop
+    /// strain of its radial velocity, and the volume.
+    pub fn add_form(&mut self, cell: Cell<'_, D>, block: impl Fn([(Vector<D>, f64); 2], f64) -> Block<D>) {
+        let linear = |cell: &Simplex<D>| {
+            let slope = |a: usize| (cell.gradient(a), cell.hoop.get(a).copied().unwrap_or(0.0));
+            let mut blocks = [[[[0.0; D]; D]; 4]; 4];
+            for (a, row) in blocks.iter_mut().enumerate().take(D + 1) {
+                for (b, entry) in row.iter_mut().enumerate().take(D + 1) {
+                    *entry = block([slope(a), slope(b)], cell.volume);
+                }
             }
+            blocks
+        };
+        if !matches!(cell.shape(), CellShape::Linear | CellShape::LinearRing(_)) {
+            self.add_products_of(cell, linear);
+            return;
+        }
+        let added = linear(&cell.point(0));
+        for (row, added) in self.blocks.iter_mut().zip(&added) {
+            for (block, added) in row.iter_mut().zip(added) {
+                for i in 0..D {
+                    for j in 0..D {
+                        block[i][j] += added[i][j];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the matrix of a quadratic cell, given those of linear ones.
+    fn add_products_of(&mut self, cell: Cell<'_, D>, linear: impl Fn(&Simplex<D>) -> [[Block<D>; 4]; 4]) {
+        match cell.shape() {
+            CellShape::Linear | CellShape::LinearRing(_) => {}
             CellShape::Straight => add_products(&mut self.blocks, &self.products, &linear(&cell.whole())),
             CellShape::Curved(_) => {
                 for (point, products) in self.products_at.iter().enumerate() {

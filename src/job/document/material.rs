@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::mesh::Mesh;
 use crate::job::findings::Table;
 use crate::laws::law::header;
-use crate::laws::material::{Damping, Hypothesis, Material};
+use crate::laws::material::{Damping, Hypothesis, Material, Orthotropic};
 
 /// A part of the body with its own material. The region inherits no effect from the table `[material]`: its own table contains all
 /// effects.
@@ -32,9 +32,16 @@ pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>,
         table.fault("", message, format!("add density, {elasticity} or {viscosity}"));
     }
     for (key, message) in material.laws_that_require_elasticity() {
-        if material.elasticity.is_none() {
+        if material.orthotropic.is_some() {
+            let help = format!("delete it, or replace {} by elasticity", named(table, "orthotropic"));
+            table.fault(key, Orthotropic::NOT_ISOTROPIC, help);
+        } else if material.elasticity.is_none() {
             table.fault(key, message, format!("add {}", named(table, "elasticity")));
         }
+    }
+    if material.orthotropic.is_some() && material.elasticity.is_some() {
+        let message = "the material has two kinds of elasticity";
+        table.fault_at_key("orthotropic", message, format!("delete it, or {}", named(table, "elasticity")));
     }
     if material.is_damped_by_mass() && material.density.is_none() {
         table.fault("damping.mass", Damping::WITHOUT_DENSITY, format!("add {}", table.path("density")));
@@ -63,6 +70,8 @@ pub(in crate::job) fn check_in_body(
     }
     let normal_strains = if hypothesis == Some(Hypothesis::Axisymmetric) { 3 } else { dimension };
     table.refuse(material.constant().fault_of_viscosity(normal_strains));
+    let orthotropic = material.orthotropic.iter().flat_map(|law| law.faults(dimension));
+    orthotropic.for_each(|fault| table.refuse(Some(fault.within("orthotropic"))));
     if hypothesis == Some(Hypothesis::PlaneStress) || mesh.order == 2 {
         return;
     }

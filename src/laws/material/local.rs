@@ -104,6 +104,7 @@ impl Material {
             viscosity: viscosity.map(|(volumetric, shear)| Viscosity { volumetric, shear }),
             viscoplasticity: flow.map(|law| law.with_yield_stress(yield_stress.unwrap_or(0.0))),
             damping: self.damping,
+            orthotropic: self.orthotropic,
             damage: self.damage,
         }
     }
@@ -151,6 +152,7 @@ mod tests {
             density: Some(Scalar::Number(3.0)),
             elasticity: Some(Elasticity { youngs_modulus: of("10 - y"), poisson_ratio: 0.25 }),
             viscosity: Some(Viscosity { volumetric: of("-x"), shear: of("4") }),
+            orthotropic: None,
             damping: None,
             viscoplasticity: None,
             damage: None,

@@ -4,12 +4,14 @@
 //! the combinations that are refused. This file is the list of all: modules and the keys of the table `[material]`. Viscoplastic
 //! laws are listed in `viscoplasticity.rs`.
 
+mod anisotropic;
 mod by_material;
 mod damage;
 mod damping;
 mod elasticity;
 mod isotropic;
 mod local;
+mod orthotropic;
 mod viscoplasticity;
 mod viscosity;
 
@@ -17,12 +19,14 @@ use crate::laws::expression::Scalar;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use anisotropic::Anisotropic;
 pub use by_material::ByMaterial;
 pub use damage::Damage;
 pub use damping::Damping;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
 pub use isotropic::Isotropic;
 pub use local::Numbers;
+pub use orthotropic::Orthotropic;
 pub use viscoplasticity::*;
 pub use viscosity::Viscosity;
 
@@ -46,6 +50,10 @@ pub struct Material<N = Scalar> {
     /// Isotropic linear elasticity. Absent: no elastic stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elasticity: Option<Elasticity<N>>,
+    /// Orthotropic linear elasticity, in place of isotropic elasticity; without viscoplasticity, damage and damping by the stiffness.
+    /// Absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orthotropic: Option<Orthotropic>,
     /// Linear viscosity. Absent: no viscous stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscosity: Option<Viscosity<N>>,
@@ -66,10 +74,13 @@ pub struct Material<N = Scalar> {
 impl Material {
     /// Whether it resists motion: no body consists of a material without density, elasticity and viscosity.
     pub fn resists(&self) -> bool {
-        self.density.is_some() || self.elasticity.is_some() || self.viscosity.is_some()
+        self.density.is_some()
+            || self.elasticity.is_some()
+            || self.orthotropic.is_some()
+            || self.viscosity.is_some()
     }
 
-    /// The keys of its laws that require elasticity, with the message where it is absent.
+    /// The keys of its laws that require isotropic elasticity, with the message where it is absent.
     pub fn laws_that_require_elasticity(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let flow =
             self.viscoplasticity.as_ref().map(|_| ("viscoplasticity", Viscoplasticity::WITHOUT_ELASTICITY));
@@ -130,6 +141,7 @@ mod tests {
             hypothesis: None,
             density: Some(3.0),
             elasticity: Some(Elasticity { youngs_modulus: 100.0, poisson_ratio: 0.25 }),
+            orthotropic: None,
             viscosity: None,
             damping: Some(Damping { mass, stiffness }),
             viscoplasticity: None,

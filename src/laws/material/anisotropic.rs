@@ -1,0 +1,166 @@
+//! Linear elastic tensors of any symmetry.
+
+use super::elasticity::Hypothesis;
+use crate::linear_algebra::tensor::{Mandel, Vector, dot};
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+
+/// A square matrix over the components of tensors in space.
+pub(super) type Matrix = [[f64; 6]; 6];
+
+/// Rows and columns of the components in Mandel form, with the axes of each.
+const AXES: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]];
+/// The component across the thickness.
+const ACROSS: usize = 2;
+
+/// A symmetric map `T` of strains to stresses in Pa. Its matrix is that of tensors in space, of which plane problems use a part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Anisotropic {
+    matrix: Matrix,
+}
+
+/// The component in space of component `c` of tensors with `S` components.
+fn in_space<const S: usize>(c: usize) -> usize {
+    match (S, c) {
+        (3, 2) | (4, 3) => 5,
+        _ => c,
+    }
+}
+
+/// A symmetric tensor as a matrix.
+fn as_matrix(mandel: &Mandel<6>) -> [Vector<3>; 3] {
+    let mut out = [[0.0; 3]; 3];
+    for (c, [i, j]) in AXES.into_iter().enumerate() {
+        let value = if i == j { mandel[c] } else { FRAC_1_SQRT_2 * mandel[c] };
+        (out[i][j], out[j][i]) = (value, value);
+    }
+    out
+}
+
+/// The components of `R t R^T`, where `rows` are those of `R`.
+fn turned(rows: &[Vector<3>; 3], mandel: &Mandel<6>) -> Mandel<6> {
+    let matrix = as_matrix(mandel);
+    AXES.map(|[i, j]| {
+        let value = dot(&rows[i], &matrix.map(|row| dot(&row, &rows[j])));
+        if i == j { value } else { SQRT_2 * value }
+    })
+}
+
+impl Anisotropic {
+    /// The tensor with this matrix along these orthogonal unit axes, under a hypothesis.
+    pub(super) fn along(axes: &[Vector<3>; 3], matrix: &Matrix, hypothesis: Hypothesis) -> Self {
+        let back: [Vector<3>; 3] = std::array::from_fn(|i| axes.map(|axis| axis[i]));
+        let column = |c: usize| {
+            let unit = std::array::from_fn(|i| f64::from(u8::from(i == c)));
+            let strain = turned(axes, &unit);
+            turned(&back, &matrix.map(|row| dot(&row, &strain)))
+        };
+        let columns: Matrix = std::array::from_fn(column);
+        // Symmetric to the last bit.
+        let mut matrix: Matrix =
+            std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (columns[j][i] + columns[i][j])));
+        if hypothesis == Hypothesis::PlaneStress {
+            let across = matrix[ACROSS];
+            for (i, row) in matrix.iter_mut().enumerate() {
+                for (j, entry) in row.iter_mut().enumerate() {
+                    *entry -= across[i] * across[j] / across[ACROSS];
+                }
+            }
+        }
+        Self { matrix }
+    }
+
+    /// `T(e)`.
+    #[inline(always)]
+    pub fn apply<const S: usize>(&self, e: &Mandel<S>) -> Mandel<S> {
+        let mut out = [0.0; S];
+        for (c, value) in out.iter_mut().enumerate() {
+            let row = &self.matrix[in_space::<S>(c)];
+            for d in 0..S {
+                *value += row[in_space::<S>(d)] * e[d];
+            }
+        }
+        out
+    }
+
+    /// `e_i : T(e_j)` for the strains `e_i = sym(a_i g^T)` and `e_j = sym(a_j h^T)` along the axes `a`, given `g` and `h`, each with the
+    /// hoop strain that comes with the first axis in a body of revolution.
+    #[inline]
+    pub fn block<const D: usize>(&self, [g, h]: [(Vector<D>, f64); 2]) -> [[f64; D]; D] {
+        let strains: [Mandel<6>; D] = std::array::from_fn(|j| product(j, &h));
+        let stresses = strains.map(|strain| self.matrix.map(|row| dot(&row, &strain)));
+        std::array::from_fn(|i| std::array::from_fn(|j| dot(&product(i, &g), &stresses[j])))
+    }
+
+    /// A bound of its eigenvalues from above, in Pa.
+    pub fn most(&self) -> f64 {
+        let sums = self.matrix.map(|row| row.iter().map(|entry| entry.abs()).sum());
+        sums.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// `sym(a_i g^T)`, with the hoop strain of the first axis.
+#[inline]
+fn product<const D: usize>(i: usize, (g, hoop): &(Vector<D>, f64)) -> Mandel<6> {
+    let mut strain = AXES.map(|[a, b]| {
+        let part = |own: usize, other: usize| if own == i && other < D { g[other] } else { 0.0 };
+        if a == b { part(a, a) } else { FRAC_1_SQRT_2 * (part(a, b) + part(b, a)) }
+    });
+    if i == 0 {
+        strain[ACROSS] += hoop;
+    }
+    strain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::material::Elasticity;
+
+    const GLASS: Elasticity = Elasticity { youngs_modulus: 70.0, poisson_ratio: 0.25 };
+
+    /// That of an isotropic material, whatever its axes.
+    fn isotropic(hypothesis: Hypothesis) -> Anisotropic {
+        let tensor = GLASS.tensor(Hypothesis::Space);
+        let column =
+            |c: usize| tensor.apply(&std::array::from_fn::<f64, 6, _>(|i| f64::from(u8::from(i == c))));
+        let (c, s) = (0.6, 0.8);
+        let axes = if hypothesis == Hypothesis::Space {
+            [[c, s, 0.0], [0.0, 0.0, 1.0], [s, -c, 0.0]]
+        } else {
+            [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+        };
+        Anisotropic::along(&axes, &std::array::from_fn(column), hypothesis)
+    }
+
+    fn check<const S: usize>(hypothesis: Hypothesis) {
+        let strain: Mandel<S> = std::array::from_fn(|c| if S == 4 && c == 2 { 0.0 } else { 0.1 + c as f64 });
+        let (found, expected) =
+            (isotropic(hypothesis).apply(&strain), GLASS.tensor(hypothesis).apply(&strain));
+        for c in 0..S {
+            assert!((found[c] - expected[c]).abs() < 1e-11, "{found:?} {expected:?}");
+        }
+        let most = isotropic(hypothesis).most();
+        assert!(most >= GLASS.tensor(hypothesis).largest_modulus::<S>() * (1.0 - 1e-12), "{most}");
+    }
+
+    #[test]
+    fn turning_an_isotropic_material_changes_nothing() {
+        check::<3>(Hypothesis::PlaneStress);
+        check::<4>(Hypothesis::PlaneStrain);
+        check::<6>(Hypothesis::Space);
+    }
+
+    #[test]
+    fn blocks_are_tractions_of_the_stress() {
+        let tensor = GLASS.tensor(Hypothesis::PlaneStress);
+        let (g, h) = ([0.3, -2.0], [1.5, 0.7]);
+        let found = isotropic(Hypothesis::PlaneStress).block([(g, 0.0), (h, 0.0)]);
+        for i in 0..2 {
+            for j in 0..2 {
+                let same = if i == j { g[0] * h[0] + g[1] * h[1] } else { 0.0 };
+                let expected = tensor.volumetric * g[i] * h[j] + 0.5 * tensor.shear * (g[j] * h[i] + same);
+                assert!((found[i][j] - expected).abs() < 1e-11, "{i} {j}: {} {expected}", found[i][j]);
+            }
+        }
+    }
+}
