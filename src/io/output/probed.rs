@@ -145,15 +145,14 @@ impl Probed {
         None
     }
 
-    /// Adds the part of this rank to the values of the probes, `stride` numbers each, from `first` on. Collective.
+    /// Adds the part of this rank to the values of the probes, after displacement and velocity. Collective.
     pub(super) fn add<const D: usize, const S: usize>(
         &self,
         (at, motion): (Converged<D, S>, BalancedMotion<'_>),
         places: &[ProbePlace],
-        (first, stride): (usize, usize),
         values: &mut [f64],
     ) -> Result<(), Agreed> {
-        let mut column = first;
+        let (mut column, stride) = (2 * D, 2 * D + self.width(D));
         for source in &self.sources {
             let width = source.width(D);
             let mut visit = |place: Place, shape: Shape, field: &[f64]| {

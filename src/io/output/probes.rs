@@ -126,10 +126,9 @@ impl<const D: usize> Probes<D> {
     ) -> Result<(), Agreed> {
         let evaluated = self.evaluate(state);
         session.agree(evaluated)?;
-        let width = self.width();
         let [mine, all] = &mut self.room;
         if let Some(also) = also {
-            self.probed.add(also, &self.probe_places, (2 * D, width), mine)?;
+            self.probed.add(also, &self.probe_places, mine)?;
         }
         session.world().all_reduce_into(&mine[..], &mut all[..], SystemOperation::sum());
         let written = self.write_rows(state);
