@@ -118,7 +118,7 @@ def write(path, nodes, triangles, edges):
 
 
 here = Path(__file__).parent
-nodes, triangles, arc, equator = section(16, 10, 6)
+nodes, triangles, arc, equator = section(24, 14, 16)
 write(here / "half_ball.msh", nodes, triangles, {"surface": arc, "equator": equator})
 nodes, triangles, arc, _ = section(16, 8, 8)
 nodes, triangles, arc = mirrored(nodes, triangles, arc)

@@ -1,10 +1,11 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{Summary, setup::Setup, step_line::Short, steps};
+use super::{Summary, setup::Setup, steps};
 use crate::{
     error::Result,
     io::output::{field_list::FIELDS, log::Log, output_field::Figures},
     job::{Job, Loaded, Method},
+    laws::digits::Digits,
     parallel::session::Session,
 };
 
@@ -89,8 +90,8 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
     }
     log.line(format!(
         "stress     von Mises at most {} Pa, at the end {} Pa",
-        Short(summary.peaks.von_mises),
-        Short(summary.final_von_mises)
+        Digits(summary.peaks.von_mises),
+        Digits(summary.final_von_mises)
     ));
     for Figures { names, line, .. } in FIELDS.iter().filter_map(|field| field.figures) {
         let found: Option<Vec<f64>> = names.iter().map(|name| summary.of_fields.get(name).copied()).collect();
