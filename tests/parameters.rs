@@ -256,6 +256,7 @@ scheme = "implicit_euler"
 inclusion_tolerance = 1e-7
 max_newton_iterations = 30
 [output]
+moments_about = [1, 2, 3]
 compression = 3
 fields = { at = [0, 0.5] }
 profile = [{ on = "top" }]

@@ -63,7 +63,9 @@ fn a_cylinder_under_tension_is_exact_without_a_support_at_its_axis() {
                 ("strain_zz", -0.015),
             ] {
                 let found = probe("axis", name);
-                assert!((found - expected).abs() < 1e-9, "{order} {ranks}: {name} {found} {expected}");
+                // Two equal principal values are exact to the root of the rounding only.
+                let bound = if name.starts_with("principal") { 1e-5 } else { 1e-9 };
+                assert!((found - expected).abs() < bound, "{order} {ranks}: {name} {found} {expected}");
             }
             let force = |source: &str, what: &str| last(&case, ("resultants.csv", "source", source), what);
             close(force("traction top", "force_y"), 50.0 * std::f64::consts::PI);
@@ -92,7 +94,7 @@ fn uniform_stress_passes_between_bodies_of_revolution_whose_meshes_do_not_match(
             let pressures = table.only("time", &last).numbers("contact_pressure");
             assert!(pressures.len() > 8);
             for pressure in pressures {
-                assert!((pressure - 5.0).abs() < 1e-9, "{law}, order {order}, {ranks} ranks: {pressure} Pa");
+                assert!((pressure - 5.0).abs() < 1e-8, "{law}, order {order}, {ranks} ranks: {pressure} Pa");
             }
         }
     }
@@ -216,7 +218,7 @@ fn springs_take_over_reactions_of_a_side_that_begins_at_the_axis() {
 
 #[test]
 fn a_mesh_beyond_the_axis_and_what_acts_on_the_axis_are_refused() {
-    let beyond = cylinder().without("output.probe").set("mesh.rectangle.corner", "[-0.5, 0]");
+    let beyond = cylinder().without("output").set("mesh.rectangle.corner", "[-0.5, 0]");
     beyond.run_with(2, &[]).expect(2).says("reaches x = -0.5 m, beyond the axis");
     let inside = cylinder().set("contact", "[{ on = ['left'], normal = { unilateral = {} } }]");
     inside.run_with(2, &[]).expect(2).says("is inside the body of revolution");
