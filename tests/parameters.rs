@@ -210,7 +210,7 @@ fn numbers(root: &serde_json::Value, schema: &serde_json::Value, path: &str, key
 }
 
 /// Jobs with the keys of numbers that no job of the repository has.
-const RARE: [&str; 4] = [
+const RARE: [&str; 5] = [
     r#"
 [mesh.box]
 corner = [1, 2, 3]
@@ -336,6 +336,30 @@ viscoplasticity.expression = { rate = 0, reference_stress = 5 }
 [time]
 end = 1
 step = 0.25
+"#,
+    r#"
+[mesh.box]
+size = [1, 1, 1]
+cells = [2, 2, 2]
+[material.orthotropic]
+youngs_moduli = [3, 2, 1]
+poisson_ratios = [0.1, 0.2, 0.3]
+shear_moduli = [1, 2, 3]
+axes = [[1, 0, 0], [0, 1, 0]]
+[[region]]
+name = "body"
+[region.material.orthotropic]
+youngs_moduli = [3, 2, 1]
+poisson_ratios = [0.1, 0.2, 0.3]
+shear_moduli = [1, 2, 3]
+axes = [[1, 0, 0], [0, 1, 0]]
+[[support]]
+on = ["left"]
+fix = "all"
+[time]
+end = 1
+step = 0.25
+scheme = "implicit_euler"
 "#,
 ];
 

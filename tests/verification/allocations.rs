@@ -68,7 +68,7 @@ fn steps<const D: usize, const S: usize>(session: &Session, loaded: &Loaded, mes
 fn counted(session: &Session, job: &str, changes: &[&str]) -> Vec<u64> {
     let mut loaded = loaded(job, changes);
     match Scene::of(session, &mut loaded).expect("a mesh") {
-        Scene::Two(mesh) if loaded.job.material.hypothesis == Some(Hypothesis::PlaneStrain) => {
+        Scene::Two(mesh) if loaded.job.material.hypothesis != Some(Hypothesis::PlaneStress) => {
             steps::<2, 4>(session, &loaded, mesh)
         }
         Scene::Two(mesh) => steps::<2, 3>(session, &loaded, mesh),
