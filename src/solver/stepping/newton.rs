@@ -50,6 +50,8 @@ pub(super) struct Newton {
     counts: SolveCounts,
     /// The velocity from which the step was started.
     start: DistributedVector,
+    /// The tolerance of residuals as a share of that of the step.
+    sharpness: f64,
     /// Whether the user has set a line search.
     has_user_search: bool,
     /// Work data for cells that flow, if there are any.
@@ -78,6 +80,11 @@ const LARGEST_RATIO_FACTOR: f64 = 0.9;
 const LAST_RATIO: f64 = 1e-3;
 /// The tolerance of these solutions relative to that of the step.
 const YIELDING_TOLERANCE: f64 = 1e5;
+
+/// Where nodes stand for little of the surface, their pressures need smaller residuals: the ratio of one tolerance to that before, and how
+/// often it is applied.
+const SHARPER: f64 = 1e-2;
+const MOST_SHARPER: i32 = 2;
 
 /// Fixed-point iterations after which an attempt fails.
 const MAX_FIXED_POINT_ITERATIONS: usize = 200;
@@ -118,6 +125,7 @@ impl Newton {
             // Longer solutions enlarge the list.
             counts: SolveCounts { sets: Vec::with_capacity(128), ..SolveCounts::default() },
             start: like.like()?,
+            sharpness: 1.0,
             has_user_search: has_option("snes_linesearch_type")?,
             flow: None,
         })
@@ -198,6 +206,20 @@ impl Newton {
                 if fallback.yields_at_first {
                     // Nothing has fallen: the energies were those of fixed friction bounds.
                     self.counts.unstable = 0;
+                }
+                for times in 1..=MOST_SHARPER {
+                    if self.lies_on_graphs(problem, trial)? {
+                        break;
+                    }
+                    self.sharpness = SHARPER.powi(times);
+                    krylov.set_tolerances(
+                        reduction,
+                        self.sharpness * share * system.tolerance,
+                        LINEAR_ITERATIONS,
+                    )?;
+                    let attempt = self.attempt(problem, system, krylov, fallback.search, trial);
+                    self.sharpness = 1.0;
+                    iterations += attempt?.iterations;
                 }
                 return self.check_inclusion(problem, trial, iterations);
             }
@@ -373,7 +395,8 @@ impl Newton {
         };
         // A tolerance relative to the first residual of the step suffices: the right-hand side is almost zero where only an obstacle
         // moves the body.
-        let tolerances = (system.tolerance.max(self.settings.tolerance * first), self.settings.tolerance);
+        let absolute = self.sharpness * system.tolerance.max(self.settings.tolerance * first);
+        let tolerances = (absolute, self.settings.tolerance);
         let limit = self.settings.max_newton_iterations as usize;
         let descent = self.descent.as_mut().filter(|_| search.minimises());
         let solved = if let Some(descent) = descent {
@@ -443,6 +466,17 @@ impl Newton {
         let mut unknowns = start.owned_mut()?;
         problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
         Ok(true)
+    }
+
+    /// Whether the velocity in `trial` and the pressures of the contacts lie on the graphs. Collective.
+    fn lies_on_graphs<const D: usize, const S: usize>(
+        &self,
+        problem: &StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<bool> {
+        trial.update_ghosts()?;
+        let inclusion = self.inclusion_residual(problem.session, problem.body, trial)?;
+        Ok(inclusion <= self.settings.inclusion_tolerance)
     }
 
     /// Checks that the velocity in `trial` and the pressures of the contacts lie on the graphs, and summarises the work of the
