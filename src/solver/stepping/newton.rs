@@ -219,7 +219,12 @@ impl Newton {
                     )?;
                     let attempt = self.attempt(problem, system, krylov, fallback.search, trial);
                     self.sharpness = 1.0;
-                    iterations += attempt?.iterations;
+                    let attempt = attempt?;
+                    iterations += attempt.iterations;
+                    // Its last iterate is no solution, even if it is on the graphs.
+                    if let Some(reason) = attempt.failure {
+                        return Err(problem.failed(&reason, INCLUSION_REMEDY));
+                    }
                 }
                 return self.check_inclusion(problem, trial, iterations);
             }
