@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     error::{Error, Exit, Result},
-    fem::effect::Form,
+    fem::effect::{Energy, Form},
     io::output::{checkpoint::Identity, log::Log, output_field::Converged},
     job::{Accept, Job, Loaded},
     laws::digits::Digits,
@@ -263,6 +263,14 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
                 "step {step}, t = {time:.6e} s: passes unstable states; a jump adds to numerical_dissipation"
             ));
         }
+        if let Some(found) = totals.unresolved.filter(|_| totals.unresolved_steps <= LOGGED_STEPS) {
+            self.log.quiet_line(format!(
+                "step {step}, t = {time:.6e} s: dissipates more energy than is available, {} instead of {} {}",
+                Digits(found.dissipated),
+                Digits(found.available),
+                Energy::unit(D)
+            ));
+        }
         let every = if self.clock.logs_every_step { 1 } else { last.div_ceil(LOGGED_STEPS).max(1) };
         if !(step.is_multiple_of(every) || step == last) {
             return;
@@ -404,6 +412,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             time: state.time,
             rejected_steps: totals.step_level.map_or(0, |level| level.rejected),
             unstable_steps: totals.unstable_steps,
+            unresolved_steps: totals.unresolved_steps,
             indefinite_solves: totals.indefinite_solves,
             set_ups: scheme.set_ups,
             newton_iterations: totals.newton_iterations,
