@@ -257,7 +257,10 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<usize> {
         let tolerance = system.tolerance.max(self.settings.tolerance * self.counts.first);
-        let system = System { tolerance: YIELDING_TOLERANCE * tolerance, ..system };
+        let enough = YIELDING_TOLERANCE * tolerance;
+        // The first residual may be much larger than all forces.
+        let tolerance = if system.floor.largest > 0.0 { enough.min(system.floor.largest) } else { enough };
+        let system = System { tolerance, ..system };
         let (mut iterations, mut reached) = (0, None);
         let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
         set_give(problem.body, ratio);
