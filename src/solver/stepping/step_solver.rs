@@ -412,7 +412,8 @@ impl StepSolver {
         let all = size.max(driving);
         let tolerance =
             (self.settings.tolerance * size).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product);
-        Ok(Accuracy { tolerance, size: all, reference: all.max(rounding.max(product) / accuracy) })
+        let reference = all.max(rounding.max(product) / accuracy).max(LEAST_FORCE / self.settings.tolerance);
+        Ok(Accuracy { tolerance, size: all, reference })
     }
 
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
