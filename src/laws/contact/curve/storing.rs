@@ -48,7 +48,8 @@ fn adaptive(
     let middle = 0.5 * (a + b);
     let halves = [gauss(function, a, middle), gauss(function, middle, b)].map(|[sum, _]| sum);
     let sum = halves[0] + halves[1];
-    if depth == 0 || (sum - whole).abs() <= slack {
+    let error = (sum - whole).abs();
+    if depth == 0 || error <= slack || error.is_nan() {
         return sum;
     }
     let next = (slack, depth - 1);
@@ -135,10 +136,14 @@ impl StoringGraph for StoringCurve {
     }
 
     fn mean(&self, before: f64, after: f64) -> [f64; 2] {
+        let advance = after - before;
+        if !advance.is_finite() {
+            // There was no obstacle along the normal, or there is none.
+            return [0.0; 2];
+        }
         let (low, high) = (before.min(after), before.max(after));
         let branch = self.curve.branch(low, NodeContext::AT_THE_GAP);
         let end = self.curve.corners.get(branch).map_or(f64::INFINITY, |corner| corner[0]);
-        let advance = after - before;
         if end < high {
             let mean = (self.potential(high) - self.potential(low)) / (high - low);
             let own = self.curve.pressure(after, NodeContext::AT_THE_GAP);
@@ -148,5 +153,53 @@ impl StoringGraph for StoringCurve {
         let at = |share: f64| self.curve.on_branch(branch, before + share * advance);
         let mean = |function: &dyn Fn(f64) -> f64| integral(function, [0.0, 1.0], 0.0);
         [mean(&|share| at(share)[0]), mean(&|share| share * at(share)[1])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::expression::{Formula, Variable};
+
+    fn storing(text: &str) -> StoringCurve {
+        let formula = Formula::parse(text).expect("a formula");
+        StoringCurve::new(Curve::new(formula, Variable::D).expect("a graph")).expect("a potential")
+    }
+
+    #[test]
+    fn potentials_are_integrals_from_the_obstacle_on_every_scale() {
+        type Case = (&'static str, fn(f64) -> f64);
+        let cases: [Case; 3] = [
+            ("if(d < 0, 0, 1e3*d)", |d| 500.0 * d.max(0.0).powi(2)),
+            ("if(d < 2e-6, 0, 5)", |d| 5.0 * (d - 2e-6).max(0.0)),
+            ("exp(1e3*min(d, 0.01))", |d| {
+                (1e3 * d.min(0.01)).exp_m1() / 1e3 + 10f64.exp() * (d - 0.01).max(0.0)
+            }),
+        ];
+        for (text, potential) in cases {
+            let curve = storing(text);
+            for d in [-1e20, -0.3, -1e-5, -1e-15, 0.0, 1e-14, 1e-9, 2e-6, 3e-6, 1e-3, 0.01, 7.0, 1e12] {
+                let [found, expected] = [curve.potential(d), potential(d)];
+                assert!(
+                    (found - expected).abs() <= 1e-12 * expected.abs(),
+                    "{text} at {d}: {found}, {expected}"
+                );
+            }
+            assert_eq!(curve.potential(f64::NEG_INFINITY), curve.potential(-REACH), "{text}");
+        }
+    }
+
+    #[test]
+    fn means_are_ratios_of_potentials_and_none_where_an_obstacle_is_met_or_lost_along_the_normal() {
+        let curve = storing("if(d < 0, 0, 1e3*d)");
+        for [before, after] in [[1e-3, 3e-3], [-1e-3, 1e-3], [4e-3, -2e-3]] {
+            let [mean, _] = curve.mean(before, after);
+            let expected = (curve.potential(after) - curve.potential(before)) / (after - before);
+            assert!((mean - expected).abs() <= 1e-12, "{before}, {after}: {mean}, {expected}");
+        }
+        let apart = f64::NEG_INFINITY;
+        for [before, after] in [[apart, apart], [apart, 0.1], [0.1, apart]] {
+            assert_eq!(curve.mean(before, after), [0.0; 2], "{before}, {after}");
+        }
     }
 }

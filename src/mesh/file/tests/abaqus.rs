@@ -110,7 +110,12 @@ fn a_flat_file_has_its_regions_boundaries_and_points() {
     assert_eq!(boundary(&mesh, "Nall"), (10.0, [0.0; 3]));
     assert_eq!(mesh.point_sets, [PointSet::new("edge", vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])]);
     assert!(notes[0].contains("not *MATERIAL, *ELASTIC, *STEP, *STATIC, *BOUNDARY:"), "{notes:?}");
-    assert_eq!(notes[1..], ["2 hexahedra were split into 12 tetrahedra"]);
+    assert_eq!(
+        notes[1..],
+        [
+            "2 hexahedra were split into 12 tetrahedra: linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not"
+        ]
+    );
 }
 
 #[test]
