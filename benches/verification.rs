@@ -300,6 +300,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "capstan",
+        name: "meshes",
+        job: "verification/capstan",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("24", &["mesh.file=../../meshes/belt_coarse.msh"]),
+            with("48", &[]),
+            with("96", &["mesh.file=../../meshes/belt_fine.msh"]),
+        ],
+    },
+    Table {
         page: "vibrating-plane",
         name: "steps",
         job: "verification/vibrating_plane",
@@ -660,6 +672,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/friction_pad", "displacement_x", 3e-3),
     ("verification/restitution", "", 1e-5),
     ("verification/spring_slider", "", 1e-6),
+    ("verification/capstan", "", 1e-3),
     ("verification/cone", "obstacle_displacement", 4e-3),
     ("verification/cone", "touching_area", 4e-3),
     ("verification/two_cylinders", "largest_pressure", 1e-3),
