@@ -386,6 +386,20 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "contact-patch",
+        name: "meshes",
+        job: "verification/contact_patch",
+        columns: Columns::Variants,
+        pictured: false,
+        runs: &[
+            with("7 on 5", &[]),
+            with("3 on 5", &["mesh.rectangle.1.cells=[3, 2]"]),
+            with("20 on 5", &["mesh.rectangle.1.cells=[20, 20]"]),
+            with("7 on 5, graded", &["mesh.rectangle.0.grading.x=2"]),
+            with("7 on 5, quadratic", &["mesh.order=2"]),
+        ],
+    },
+    Table {
         page: "cone",
         name: "meshes",
         job: "verification/cone",
@@ -537,6 +551,19 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "off-axis-strip",
+        name: "meshes",
+        job: "orthotropic_strip",
+        columns: Columns::Variants,
+        pictured: true,
+        runs: &[
+            with("8 x 2", &[]),
+            with("32 x 8", &["mesh.rectangle.cells=[32, 8]"]),
+            with("8 x 2, crossed", &["mesh.rectangle.diagonal=crossed"]),
+            with("8 x 2, quadratic", &["mesh.order=2"]),
+        ],
+    },
+    Table {
         page: "strip-footing",
         name: "meshes",
         job: "verification/strip_footing",
@@ -644,6 +671,10 @@ const ELSEWHERE: &[(&str, &[&str])] = &[
             "profile.bottom.max.contact_pressure",
             "probe.top.velocity_y",
         ],
+    ),
+    (
+        "orthotropic_strip",
+        &["probe.far.displacement_x", "probe.far.displacement_y", "probe.above.displacement_y"],
     ),
     ("permanent_set", &["probe.tip.displacement_x", "history.viscoplastic_dissipation"]),
     ("power_law_creep", &["probe.tip.velocity_x"]),
