@@ -166,7 +166,7 @@ fn report<const D: usize, const S: usize>(
             true => Dynamics::Impacts { may_conserve: may_conserve(job, body) },
             false => Dynamics::Inertia,
         },
-        header: header::lines(session, loaded, ready)?,
+        header: header::lines(session, loaded, ready, true)?,
     })
 }
 

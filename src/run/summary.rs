@@ -137,6 +137,9 @@ impl Summary {
     pub fn range_warnings(&self, surface_has_mass: bool) -> impl Iterator<Item = String> {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
+            if bound == 0.0 {
+                return "with weakening friction no step is certain to have one solution: supports leave the body a rigid motion".into();
+            }
             let remedy = if surface_has_mass {
                 "a smaller [time] step"
             } else {

@@ -73,7 +73,10 @@ pub(super) fn run<const D: usize, const S: usize>(
         log.line(&state.words);
     }
     let start_state = identity.start_state.clone();
-    session.agree(header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
+    session
+        .agree(header::lines(session, loaded, &ready, clock.logs_every_step))?
+        .iter()
+        .for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = restored.as_ref().map(|restored| restored.totals);
@@ -208,7 +211,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let mut matrix = scheme.matrix(self.session, body, range.steps[1])?;
         let renewed = Certificates::of(self.session, body, state, &mut matrix, range)?;
         let words = renewed.verdict(range.steps[1], None, &self.job.solver.accept);
-        words.words.iter().for_each(|words| self.log.line(format!("certified  {words}")));
+        words.brief.iter().for_each(|words| self.log.line(format!("certified  {words}")));
         let was_unique = self.certificates.steps_are_unique();
         self.certificates = renewed;
         if was_unique && !self.certificates.steps_are_unique() && !words.refusals.is_empty() {

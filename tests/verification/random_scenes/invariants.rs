@@ -354,7 +354,9 @@ impl<const D: usize> Trial<'_, D> {
 
     /// Whether steps may have had several solutions without unstable states, as the run says.
     fn may_choose(&self, name: &str) -> bool {
-        self.says(name, "summary.json", "a step is certain to have one solution only up to")
+        ["a step is certain to have one solution only up to", "no step is certain to have one solution"]
+            .iter()
+            .any(|words| self.says(name, "summary.json", words))
     }
 
     /// Whether a run of the same scene may fail with these words where this one does not: from where it has landed after unstable
