@@ -268,10 +268,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
         if let Some(found) = totals.unresolved.filter(|_| totals.unresolved_steps <= LOGGED_STEPS) {
             self.log.quiet_line(format!(
-                "step {step}, t = {time:.6e} s: dissipates more energy than is available, {} instead of {} {}",
-                Digits(found.dissipated),
-                Digits(found.available),
-                Energy::unit(D)
+                "step {step}, t = {time:.6e} s: fails faster than the step resolves: damage and bonds dissipate {} {} of {} that are available",
+                Digits(found.failed),
+                Energy::unit(D),
+                Digits(found.available)
             ));
         }
         let every = if self.clock.logs_every_step { 1 } else { last.div_ceil(LOGGED_STEPS).max(1) };
@@ -428,6 +428,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             max_inclusion_residual: totals.max_inclusion_residual,
             max_residual: totals.max_residual,
             max_energy_imbalance: totals.max_energy_imbalance,
+            energy_of_scheme: totals.energy_of_scheme(),
             max_slip_pressure: totals.max_slip_pressure,
             guesses: (totals.guessed_steps > 0).then_some(Guesses {
                 steps: totals.guessed_steps,

@@ -41,7 +41,7 @@ impl<'a> TableQuantity<'a> {
 }
 
 /// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 22] = [
+const OF_SUMMARY: [&str; 23] = [
     "ranks",
     "dimension",
     "cells",
@@ -52,6 +52,7 @@ const OF_SUMMARY: [&str; 22] = [
     "rejected_steps",
     "unstable_steps",
     "unresolved_steps",
+    "energy_of_scheme",
     "indefinite_solves",
     "set_ups",
     "newton_iterations",

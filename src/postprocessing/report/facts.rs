@@ -20,7 +20,7 @@ const MEMBERS: [(&str, &str, &str); 13] = [
     ("steps", "steps", ""),
     ("rejected_steps", "rejected steps", ""),
     ("unstable_steps", "steps that passed unstable states", ""),
-    ("unresolved_steps", "steps that dissipate more energy than is available", ""),
+    ("unresolved_steps", "steps in which damage or bonds fail faster than they resolve", ""),
     ("indefinite_solves", "indefinite linear systems", ""),
     ("newton_iterations", "Newton iterations", ""),
     ("linear_iterations", "linear iterations", ""),

@@ -22,7 +22,7 @@ const EQUAL: f64 = 1e-5;
 /// The same where rounding errors choose among adaptive steps, or among several solutions of a step.
 const CHOSEN: f64 = 3e-2;
 /// What the log says of a step that has passed unstable states, or is too long for what fails within it.
-const JUMPS: [&str; 2] = ["passes unstable states", "dissipates more energy than is available"];
+const JUMPS: [&str; 2] = ["passes unstable states", "fails faster than the step resolves"];
 /// What the log says of the number of linear systems that were indefinite.
 const INDEFINITE: &str = "linear systems were indefinite";
 /// Energies in J that are none: a body that moves rigidly has rounding errors alone.
