@@ -1,6 +1,6 @@
 //! Linear elastic tensors of any symmetry.
 
-use super::elasticity::Hypothesis;
+use super::{elasticity::Hypothesis, isotropic::LinearTensor};
 use crate::linear_algebra::tensor::{Mandel, Vector, dot};
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
@@ -69,19 +69,6 @@ impl Anisotropic {
         Self { matrix }
     }
 
-    /// `T(e)`.
-    #[inline(always)]
-    pub fn apply<const S: usize>(&self, e: &Mandel<S>) -> Mandel<S> {
-        let mut out = [0.0; S];
-        for (c, value) in out.iter_mut().enumerate() {
-            let row = &self.matrix[in_space::<S>(c)];
-            for d in 0..S {
-                *value += row[in_space::<S>(d)] * e[d];
-            }
-        }
-        out
-    }
-
     /// `e_i : T(e_j)` for the strains `e_i = sym(a_i g^T)` and `e_j = sym(a_j h^T)` along the axes `a`, given `g` and `h`, each with the
     /// hoop strain that comes with the first axis in a body of revolution.
     #[inline]
@@ -95,6 +82,20 @@ impl Anisotropic {
     pub fn most(&self) -> f64 {
         let sums = self.matrix.map(|row| row.iter().map(|entry| entry.abs()).sum());
         sums.into_iter().fold(0.0, f64::max)
+    }
+}
+
+impl LinearTensor for Anisotropic {
+    #[inline(always)]
+    fn stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S> {
+        let mut out = [0.0; S];
+        for (c, value) in out.iter_mut().enumerate() {
+            let row = &self.matrix[in_space::<S>(c)];
+            for d in 0..S {
+                *value += row[in_space::<S>(d)] * strain[d];
+            }
+        }
+        out
     }
 }
 
@@ -122,7 +123,7 @@ mod tests {
     fn isotropic(hypothesis: Hypothesis) -> Anisotropic {
         let tensor = GLASS.tensor(Hypothesis::Space);
         let column =
-            |c: usize| tensor.apply(&std::array::from_fn::<f64, 6, _>(|i| f64::from(u8::from(i == c))));
+            |c: usize| tensor.stress(&std::array::from_fn::<f64, 6, _>(|i| f64::from(u8::from(i == c))));
         let (c, s) = (0.6, 0.8);
         let axes = if hypothesis == Hypothesis::Space {
             [[c, s, 0.0], [0.0, 0.0, 1.0], [s, -c, 0.0]]
@@ -135,7 +136,7 @@ mod tests {
     fn check<const S: usize>(hypothesis: Hypothesis) {
         let strain: Mandel<S> = std::array::from_fn(|c| if S == 4 && c == 2 { 0.0 } else { 0.1 + c as f64 });
         let (found, expected) =
-            (isotropic(hypothesis).apply(&strain), GLASS.tensor(hypothesis).apply(&strain));
+            (isotropic(hypothesis).stress(&strain), GLASS.tensor(hypothesis).apply(&strain));
         for c in 0..S {
             assert!((found[c] - expected[c]).abs() < 1e-11, "{found:?} {expected:?}");
         }

@@ -1,6 +1,13 @@
 //! Linear isotropic tensors.
 
 use crate::linear_algebra::tensor::{Mandel, normal_components, trace};
+use std::fmt::Debug;
+
+/// A symmetric linear map `T` of strains to stresses in Pa, or of strain rates with `T` in Pa s.
+pub trait LinearTensor: Copy + Debug {
+    /// `T(e)`.
+    fn stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S>;
+}
 
 /// `T(e) = volumetric tr(e) I + shear e`, where `tr` and `I` run over the stored normal components.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -9,6 +16,13 @@ pub struct Isotropic {
     pub volumetric: f64,
     /// Factor of the tensor itself (twice the shear modulus), in Pa or Pa s.
     pub shear: f64,
+}
+
+impl LinearTensor for Isotropic {
+    #[inline(always)]
+    fn stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S> {
+        self.apply(strain)
+    }
 }
 
 impl Isotropic {
