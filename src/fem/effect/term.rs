@@ -141,13 +141,11 @@ impl Term<'_> {
             }
         } else if let Self::Anisotropic(law) = self {
             if let Some(law) = law.get(material) {
-                matrix.add_form(cell, |slopes, volume| {
-                    law.tensor.block(slopes).map(|row| row.map(|entry| length * volume * entry))
-                });
+                matrix.add_form(cell, length, &law.tensor);
             }
         } else if let Some(tensor) = self.tensor(material) {
             let factor = if matches!(self, Self::Elasticity(_)) { length } else { 1.0 };
-            matrix.add_isotropic(cell, factor * tensor.volumetric, factor * tensor.shear);
+            matrix.add_form(cell, factor, &tensor);
         }
     }
 

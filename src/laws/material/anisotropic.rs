@@ -69,15 +69,6 @@ impl Anisotropic {
         Self { matrix }
     }
 
-    /// `e_i : T(e_j)` for the strains `e_i = sym(a_i g^T)` and `e_j = sym(a_j h^T)` along the axes `a`, given `g` and `h`, each with the
-    /// hoop strain that comes with the first axis in a body of revolution.
-    #[inline]
-    pub fn block<const D: usize>(&self, [g, h]: [(Vector<D>, f64); 2]) -> [[f64; D]; D] {
-        let strains: [Mandel<6>; D] = std::array::from_fn(|j| product(j, &h));
-        let stresses = strains.map(|strain| self.matrix.map(|row| dot(&row, &strain)));
-        std::array::from_fn(|i| std::array::from_fn(|j| dot(&product(i, &g), &stresses[j])))
-    }
-
     /// A bound of its eigenvalues from above, in Pa.
     pub fn most(&self) -> f64 {
         let sums = self.matrix.map(|row| row.iter().map(|entry| entry.abs()).sum());
@@ -96,6 +87,21 @@ impl LinearTensor for Anisotropic {
             }
         }
         out
+    }
+
+    #[inline]
+    fn add_block<const D: usize>(
+        &self,
+        factor: f64,
+        volume: f64,
+        [g, h]: [&(Vector<D>, f64); 2],
+        block: &mut [[f64; D]; D],
+    ) {
+        for j in 0..D {
+            let strain = product(j, h);
+            let stress = self.matrix.map(|row| dot(&row, &strain));
+            (0..D).for_each(|i| block[i][j] += factor * volume * dot(&product(i, g), &stress));
+        }
     }
 }
 
@@ -155,7 +161,8 @@ mod tests {
     fn blocks_are_tractions_of_the_stress() {
         let tensor = GLASS.tensor(Hypothesis::PlaneStress);
         let (g, h) = ([0.3, -2.0], [1.5, 0.7]);
-        let found = isotropic(Hypothesis::PlaneStress).block([(g, 0.0), (h, 0.0)]);
+        let mut found = [[0.0; 2]; 2];
+        isotropic(Hypothesis::PlaneStress).add_block(1.0, 1.0, [&(g, 0.0), &(h, 0.0)], &mut found);
         for i in 0..2 {
             for j in 0..2 {
                 let same = if i == j { g[0] * h[0] + g[1] * h[1] } else { 0.0 };
