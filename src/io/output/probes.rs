@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, resultants::BalancedMotion, space::Simplex, state::State},
+    fem::{resultants::BalancedMotion, space::Simplex, state::State},
     job::{Output, Probe},
     linear_algebra::tensor::Vector,
     mesh::{
@@ -75,11 +75,6 @@ impl<const D: usize> Probes<D> {
     /// Whether quantities besides displacement and velocity are recorded.
     pub(crate) fn needs_stress(&self) -> bool {
         !self.probed.is_empty() && !self.is_empty()
-    }
-
-    /// What is wrong with quantities that the body does not have: message and advice.
-    pub(crate) fn fault<const S: usize>(&self, body: &Body<D, S>) -> Option<[String; 2]> {
-        self.probed.fault(body)
     }
 
     /// Opens the file on rank 0, if there are probes; continues it after this step if one is given.
