@@ -8,15 +8,13 @@ use crate::{
             Contact, ContactNode, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents,
             Term, contact_nodes,
         },
-        space::{
-            Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, linear_at, nodal_forces, offsets,
-        },
+        space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, nodal_forces, offsets},
     },
     linear_algebra::{
         simd::Pack,
         tensor::{Mandel, dot},
     },
-    mesh::Mesh,
+    mesh::{Mesh, shape::linear_at},
 };
 
 /// The cells of a body with their effects, and the effects at its surface beside contact.

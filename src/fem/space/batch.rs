@@ -412,11 +412,9 @@ fn scatter_all<const D: usize, const S: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::space::{
-        quadratic::linear_at,
-        samples::{number, quadratic, revolved, row},
-    };
+    use crate::fem::space::samples::{number, quadratic, revolved, row};
     use crate::linear_algebra::tensor::{Mandel, Vector, apply, symmetric_part};
+    use crate::mesh::shape::linear_at;
 
     fn close<const N: usize>(found: [f64; N], expected: [f64; N]) {
         for i in 0..N {

@@ -7,7 +7,7 @@
 //! multiple of the radial displacements at the corners of its linear cell.
 
 use super::{
-    quadratic::{MOST_NODES, linear_at, node_count, place_in_cell, values},
+    quadratic::{MOST_NODES, node_count, place_in_cell, values},
     quadrature::{CENTROID, MOST_POINTS, cell_rule, fine_cell_rule},
 };
 use crate::{
@@ -15,7 +15,10 @@ use crate::{
         simd::{LANES, Pack, prefetch},
         tensor::{Mandel, Vector, component, dot, symmetric_part},
     },
-    mesh::{Mesh, shape},
+    mesh::{
+        Mesh,
+        shape::{self, linear_at},
+    },
 };
 
 /// One linear cell, or a point of a quadratic one: its volume and the gradients of its linear shape functions.

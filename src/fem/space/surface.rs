@@ -1,12 +1,15 @@
 //! Points of a boundary: nodes, at which nodal quadrature evaluates a law, and Gauss points of facets.
 
 use super::{
-    quadratic::{linear_at, values},
+    quadratic::values,
     quadrature::{facet_rule, fine_facet_rule},
 };
 use crate::{
     linear_algebra::tensor::{Vector, dot, larger, norm},
-    mesh::{Mesh, shape::facet_normal},
+    mesh::{
+        Mesh,
+        shape::{facet_normal, linear_at},
+    },
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
 

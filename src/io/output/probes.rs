@@ -8,13 +8,14 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{resultants::BalancedMotion, space::Simplex, state::State},
+    fem::{
+        resultants::BalancedMotion,
+        space::{Simplex, values},
+        state::State,
+    },
     job::{Output, Probe},
     linear_algebra::tensor::Vector,
-    mesh::{
-        Mesh,
-        shape::{quadratic_values, tangent_corners},
-    },
+    mesh::{Mesh, shape::linear_at},
     parallel::{agreement::Agreed, session::Session},
 };
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
@@ -167,7 +168,7 @@ fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<Found> {
         let place = place(&nodes, point)?;
         let shares = match mesh.order() {
             1 => place.to_vec(),
-            _ => quadratic_values::<D>(&place).to_vec(),
+            _ => values(D + 1, &place).to_vec(),
         };
         Some((number, mesh.cell_nodes(number).zip(shares).collect()))
     })
@@ -196,9 +197,9 @@ fn place<const D: usize>(nodes: &[Vector<D>], point: &Vector<D>) -> Option<[f64;
         if longest.is_nan() || longest > 1e3 {
             return None;
         }
-        let shares = quadratic_values::<D>(&place);
+        let shares = values(D + 1, &place);
         at = std::array::from_fn(|i| nodes.iter().zip(shares).map(|(node, share)| share * node[i]).sum());
-        cell = Simplex::new(&tangent_corners(nodes, &place)[..=D]);
+        cell = Simplex::new(&linear_at(D + 1, &place, nodes)[..=D]);
     }
     None
 }
