@@ -46,7 +46,7 @@ pub(super) fn refuse_hanging_nodes<const D: usize>(
         if hangs {
             return Err(Error::Refused(format!(
                 "{} at {} is a hanging node on {} of {}. Mesh both sides so that they share their nodes \
-                 there",
+                 there; if two bodies touch there, give the boundary of each a name of its own",
                 tags.node(node as usize),
                 place(point),
                 if D == 2 { "an edge" } else { "a face" },

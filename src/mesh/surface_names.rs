@@ -25,15 +25,18 @@ impl SurfaceNames {
         Self { of_nodes, of_facets }
     }
 
-    /// Whether nodes at the same place are those of two surfaces: each is on a boundary that the other is not on.
+    /// Whether nodes at the same place are those of two surfaces.
     pub(super) fn are_of_two_surfaces(&self, a: u32, b: u32) -> bool {
-        let [a, b] = [a, b].map(|node| &self.of_nodes[node as usize]);
-        !a.is_subset(b) && !b.is_subset(a)
+        differ(&self.of_nodes[a as usize], &self.of_nodes[b as usize])
     }
 
-    /// Whether a node on a facet is one of another surface: both are on boundaries, and on none together.
+    /// Whether a node on a facet is one of another surface.
     pub(super) fn is_of_another_surface(&self, node: u32, facet: usize) -> bool {
-        let (node, facet) = (&self.of_nodes[node as usize], &self.of_facets[facet]);
-        !node.is_empty() && !facet.is_empty() && node.is_disjoint(facet)
+        differ(&self.of_nodes[node as usize], &self.of_facets[facet])
     }
+}
+
+/// Whether each is on a boundary that the other is not on; both may be on one of all bodies.
+fn differ(a: &BTreeSet<usize>, b: &BTreeSet<usize>) -> bool {
+    !a.is_subset(b) && !b.is_subset(a)
 }

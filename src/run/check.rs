@@ -69,6 +69,8 @@ pub struct Report {
     warnings: Vec<String>,
     output_folder: String,
     #[serde(skip)]
+    fails: bool,
+    #[serde(skip)]
     motion: Dynamics,
     #[serde(skip)]
     header: Vec<String>,
@@ -95,7 +97,8 @@ pub(super) fn check<const D: usize, const S: usize>(
         match trial::estimate(session, &loaded.job, ready, began)? {
             Ok(seconds) => report.estimate.seconds = Some(seconds),
             Err(error) => {
-                report.warnings.push(format!("a step that was tried fails, as it will in a run: {error}"))
+                report.fails = true;
+                report.warnings.push(format!("a step that was tried fails, as it will in a run: {error}"));
             }
         }
     }
@@ -151,6 +154,7 @@ fn report<const D: usize, const S: usize>(
         extent: extent(session, mesh),
         bodies: Vec::new(),
         body_count: 0,
+        fails: false,
         estimate: Estimate {
             memory_bytes: MemoryEstimate::new(session, body, &inventory, preconditioner, problem),
             seconds: None,
@@ -162,7 +166,7 @@ fn report<const D: usize, const S: usize>(
             true => Dynamics::Impacts { may_conserve: may_conserve(job, body) },
             false => Dynamics::Inertia,
         },
-        header: header::lines(session, loaded, ready)?,
+        header: header::lines(session, loaded, ready, true)?,
     })
 }
 
@@ -296,7 +300,10 @@ impl Report {
                 between(seconds.run)
             ));
         }
-        lines.push("the job can be run; nothing was written".into());
+        lines.push(match self.fails {
+            true => "a run will fail, see the warning about a step; nothing was written".into(),
+            false => "the job can be run; nothing was written".into(),
+        });
         lines
     }
 }

@@ -9,11 +9,13 @@ use crate::{
     parallel::session::Session,
 };
 
-/// Versions, title, mesh, partition, effects, solver and output folder, one line each. Collective.
+/// Versions, title, mesh, partition, effects, solver, certificates and output folder, one line each; with all details, or those that a
+/// run needs. Collective.
 pub(super) fn lines<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     ready: &Setup<D, S>,
+    has_details: bool,
 ) -> Result<Vec<String>> {
     let Setup { body, scheme, verdict, .. } = ready;
     let (job, mesh) = (&loaded.job, &body.mesh);
@@ -37,7 +39,9 @@ pub(super) fn lines<const D: usize, const S: usize>(
         mesh.total_nodes,
         mesh.total_nodes * D
     ));
-    lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
+    if session.ranks() > 1 || has_details {
+        lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
+    }
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
     let lengths = match &job.time.adaptive {
         Some(a) => format!("{} s to {} s, {} s first,", a.smallest_step, a.largest_step, job.time.step),
@@ -57,7 +61,8 @@ pub(super) fn lines<const D: usize, const S: usize>(
     ));
     let (preconditioner, reason) = scheme.preconditioner();
     lines.push(format!("solver     {}: {reason}", preconditioner.name()));
-    lines.extend(verdict.words.iter().map(|words| format!("certified  {words}")));
+    let certified = if has_details { &verdict.words } else { &verdict.brief };
+    lines.extend(certified.iter().map(|words| format!("certified  {words}")));
     lines.push(format!("output     {}", job.output_folder().display()));
     Ok(lines)
 }

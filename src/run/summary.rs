@@ -56,6 +56,8 @@ pub struct Summary {
     pub rejected_steps: u64,
     /// Steps since time 0 that passed unstable states to another equilibrium.
     pub unstable_steps: u64,
+    /// Steps since time 0 that dissipated much more energy than was available.
+    pub unresolved_steps: u64,
     /// Linear systems since time 0 that were not positive definite.
     pub indefinite_solves: u64,
     /// Matrices this run assembled, each with its preconditioner.
@@ -135,6 +137,9 @@ impl Summary {
     pub fn range_warnings(&self, surface_has_mass: bool) -> impl Iterator<Item = String> {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
+            if bound == 0.0 {
+                return "with weakening friction no step is certain to have one solution: supports leave the body a rigid motion".into();
+            }
             let remedy = if surface_has_mass {
                 "a smaller [time] step"
             } else {
@@ -153,7 +158,15 @@ impl Summary {
                 self.peaks.strain
             )
         });
-        slip.into_iter().chain(strain)
+        let unresolved = (self.unresolved_steps > 0).then(|| {
+            format!(
+                "steps that dissipate more energy than is available: {}, named in run.log; what fails in them does so faster than the \
+                 steps resolve, so that its dissipated energy is too large, and where it ends may depend on the steps: let \
+                 [time.adaptive] choose them, with a smaller tolerance and smallest_step if it does",
+                self.unresolved_steps
+            )
+        });
+        slip.into_iter().chain(strain).chain(unresolved)
     }
 }
 

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     error::{Error, Exit, Result},
-    fem::effect::Form,
+    fem::effect::{Energy, Form},
     io::output::{checkpoint::Identity, log::Log, output_field::Converged},
     job::{Accept, Job, Loaded},
     laws::digits::Digits,
@@ -73,7 +73,10 @@ pub(super) fn run<const D: usize, const S: usize>(
         log.line(&state.words);
     }
     let start_state = identity.start_state.clone();
-    session.agree(header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
+    session
+        .agree(header::lines(session, loaded, &ready, clock.logs_every_step))?
+        .iter()
+        .for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = restored.as_ref().map(|restored| restored.totals);
@@ -208,7 +211,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let mut matrix = scheme.matrix(self.session, body, range.steps[1])?;
         let renewed = Certificates::of(self.session, body, state, &mut matrix, range)?;
         let words = renewed.verdict(range.steps[1], None, &self.job.solver.accept);
-        words.words.iter().for_each(|words| self.log.line(format!("certified  {words}")));
+        words.brief.iter().for_each(|words| self.log.line(format!("certified  {words}")));
         let was_unique = self.certificates.steps_are_unique();
         self.certificates = renewed;
         if was_unique && !self.certificates.steps_are_unique() && !words.refusals.is_empty() {
@@ -261,6 +264,14 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.fallen += 1;
             self.log.quiet_line(format!(
                 "step {step}, t = {time:.6e} s: passes unstable states; a jump adds to numerical_dissipation"
+            ));
+        }
+        if let Some(found) = totals.unresolved.filter(|_| totals.unresolved_steps <= LOGGED_STEPS) {
+            self.log.quiet_line(format!(
+                "step {step}, t = {time:.6e} s: dissipates more energy than is available, {} instead of {} {}",
+                Digits(found.dissipated),
+                Digits(found.available),
+                Energy::unit(D)
             ));
         }
         let every = if self.clock.logs_every_step { 1 } else { last.div_ceil(LOGGED_STEPS).max(1) };
@@ -404,6 +415,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             time: state.time,
             rejected_steps: totals.step_level.map_or(0, |level| level.rejected),
             unstable_steps: totals.unstable_steps,
+            unresolved_steps: totals.unresolved_steps,
             indefinite_solves: totals.indefinite_solves,
             set_ups: scheme.set_ups,
             newton_iterations: totals.newton_iterations,

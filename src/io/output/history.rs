@@ -110,6 +110,12 @@ pub struct Totals {
     pub linear_iterations: u64,
     /// Number of steps that passed unstable states.
     pub unstable_steps: u64,
+    /// Number of steps that dissipated much more energy than was available.
+    #[serde(default)]
+    pub unresolved_steps: u64,
+    /// The energies of the last step, if it was one of these.
+    #[serde(skip)]
+    pub unresolved: Option<Unresolved>,
     /// Linear systems that were not positive definite.
     pub indefinite_solves: u64,
     /// Number of steps with a search for other solutions.
@@ -126,6 +132,19 @@ pub struct Totals {
     #[serde(default)]
     pub single_precision_failed: bool,
 }
+
+/// The energies of a step that is too long for what goes on in it, in J (J/m in the plane).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unresolved {
+    /// Energy dissipated according to the laws.
+    pub dissipated: f64,
+    /// Work of the step and energy that is no longer stored at its end.
+    pub available: f64,
+}
+
+/// A step is unresolved if it dissipates this multiple of the energy that is available, and the excess is this share of the turnover.
+const LARGEST_EXCESS: f64 = 2.0;
+const NOTICEABLE_SHARE: f64 = 0.01;
 
 impl Totals {
     /// The totals at time 0, with the energy of the initial state.
@@ -179,6 +198,11 @@ impl Totals {
         self.newton_iterations += outcome.newton_iterations as u64;
         self.linear_iterations += outcome.linear_iterations as u64;
         self.unstable_steps += u64::from(outcome.fell);
+        let available = larger(dissipated - numerical, 0.0);
+        let is_unresolved =
+            dissipated > LARGEST_EXCESS * available && numerical > NOTICEABLE_SHARE * self.turnover;
+        self.unresolved = is_unresolved.then_some(Unresolved { dissipated, available });
+        self.unresolved_steps += u64::from(is_unresolved);
         self.indefinite_solves += outcome.indefinite_solves as u64;
         self.guessed_steps += u64::from(outcome.solutions > 0);
         self.steps_with_several += u64::from(outcome.solutions > 1);
@@ -278,6 +302,29 @@ mod tests {
             totals.add(&StepOutcome { fell, indefinite_solves, ..StepOutcome::default() });
         }
         assert_eq!((totals.unstable_steps, totals.indefinite_solves), (2, 5));
+    }
+
+    #[test]
+    fn steps_that_dissipate_more_than_is_available_are_counted() {
+        let step = |work, viscous, numerical| StepOutcome {
+            energy: Energy::from([(WORK, work), (VISCOUS, viscous), (NUMERICAL, numerical)]),
+            ..StepOutcome::default()
+        };
+        let mut totals = Totals::default();
+        totals.add(&step(1.0, 3.0, 2.0));
+        assert_eq!(totals.unresolved, Some(Unresolved { dissipated: 3.0, available: 1.0 }));
+        // A loss of the scheme, an excess below twice what is available, and one that the run would not notice.
+        for (work, viscous, numerical) in [(1.0, 0.5, -0.5), (1.0, 1.875, 0.875), (1e-3, 2e-2, 1.9e-2)] {
+            totals.add(&step(work, viscous, numerical));
+            assert_eq!(totals.unresolved, None, "{viscous}");
+        }
+        // Nothing is available where more is stored than is supplied.
+        totals.add(&StepOutcome {
+            energy: Energy::from([(ELASTIC, 2.0), (VISCOUS, 1.0), (NUMERICAL, 3.0)]),
+            ..StepOutcome::default()
+        });
+        assert_eq!(totals.unresolved, Some(Unresolved { dissipated: 1.0, available: 0.0 }));
+        assert_eq!(totals.unresolved_steps, 2);
     }
 
     #[test]

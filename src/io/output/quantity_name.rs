@@ -41,7 +41,7 @@ impl<'a> TableQuantity<'a> {
 }
 
 /// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 21] = [
+const OF_SUMMARY: [&str; 22] = [
     "ranks",
     "dimension",
     "cells",
@@ -51,6 +51,7 @@ const OF_SUMMARY: [&str; 21] = [
     "time",
     "rejected_steps",
     "unstable_steps",
+    "unresolved_steps",
     "indefinite_solves",
     "set_ups",
     "newton_iterations",

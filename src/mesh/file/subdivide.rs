@@ -10,6 +10,9 @@ use super::document::{Block, Document, Shape};
 use crate::error::{Error, Result};
 use std::collections::HashMap;
 
+/// What the note about cells that were split adds.
+const ADVICE: &str = ": linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not";
+
 /// Divides all elements that are no simplices; notes how many cells were divided. If a cell is divided, the others lose the nodes on
 /// their edges.
 pub(super) fn into_simplices(document: &mut Document) -> Result<()> {
@@ -40,7 +43,11 @@ pub(super) fn into_simplices(document: &mut Document) -> Result<()> {
         let were = if divided.iter().map(|(_, cells)| cells).sum::<usize>() == 1 { "was" } else { "were" };
         divided.sort_unstable();
         let counts: Vec<String> = divided.iter().rev().map(|&(shape, cells)| counted(shape, cells)).collect();
-        document.notes.push(format!("{} {were} split into {}", list(&counts), counted(pieces, simplices)));
+        document.notes.push(format!(
+            "{} {were} split into {}{ADVICE}",
+            list(&counts),
+            counted(pieces, simplices)
+        ));
     }
     if has_lost_nodes {
         document.notes.push(

@@ -13,13 +13,14 @@ use serde_json::Value;
 use std::fmt::Write;
 
 /// Members of `summary.json` with their descriptions and units, in the order of the page: those before the figures of fields.
-const MEMBERS: [(&str, &str, &str); 12] = [
+const MEMBERS: [(&str, &str, &str); 13] = [
     ("status", "status", ""),
     ("error", "error", ""),
     ("time", "time reached", "s"),
     ("steps", "steps", ""),
     ("rejected_steps", "rejected steps", ""),
     ("unstable_steps", "steps that passed unstable states", ""),
+    ("unresolved_steps", "steps that dissipate more energy than is available", ""),
     ("indefinite_solves", "indefinite linear systems", ""),
     ("newton_iterations", "Newton iterations", ""),
     ("linear_iterations", "linear iterations", ""),

@@ -54,7 +54,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
             if bound == 0.0 {
                 let why = match theta_step {
-                    Some(0.0) => ", because nothing but the contact holds the body",
+                    Some(0.0) => ", because supports leave the body a rigid motion",
                     _ => "",
                 };
                 return format!("; uniqueness of steps is certified for no contact pressure{why}");

@@ -8,6 +8,8 @@ use crate::{job::Accept, laws::digits::Digits};
 pub struct Verdict {
     /// One line for each certificate: its value, its meaning, and possible changes.
     pub words: Vec<String>,
+    /// What of this a run tells: whether steps have one solution and are stable.
+    pub brief: Vec<String>,
     /// Warnings.
     pub warnings: Vec<String>,
     /// Reasons for a refusal of the run: message and advice.
@@ -58,6 +60,7 @@ impl Certificates {
         if let Some(theta) = self.theta_step {
             if self.steps_are_unique() {
                 let steps = self.steps_in_words();
+                verdict.brief.push(self.unique_steps(&steps));
                 verdict.words.push(format!(
                     "theta of a step = {}, below 1: each step{steps} has one solution{covered}",
                     Digits(theta)
@@ -79,6 +82,27 @@ impl Certificates {
             }
         }
         verdict
+    }
+
+    /// In one line, whether steps of these lengths have one solution, where theta of a step is below 1.
+    fn unique_steps(&self, steps: &str) -> String {
+        let bound = self.slip_pressure_bound.filter(|bound| *bound > 0.0);
+        let covered = bound.map_or_else(String::new, |bound| {
+            format!(" for given contact pressures up to {} Pa", Digits(bound))
+        });
+        let reasons = self.not_covered.iter().filter_map(|words| words.split([':', ',', ';']).next());
+        let reasons: Vec<&str> =
+            reasons.filter(|words| bound.is_none() || !words.contains("friction")).collect();
+        match reasons.as_slice() {
+            [] => format!("each step{steps} has one solution{covered}"),
+            _ if bound.is_none() => {
+                format!("several solutions of a step are not excluded: {}", reasons.join("; "))
+            }
+            _ => format!(
+                "each step{steps} has one solution{covered}, which does not cover: {}",
+                reasons.join("; ")
+            ),
+        }
     }
 
     /// The verdict on the growth of contact pressures with the velocity.
@@ -115,6 +139,7 @@ impl Verdict {
             if theta < 1.0 { 1.0 - Certificates::MARGIN } else { 1.0 }
         );
         self.words.push(found.clone());
+        self.brief.push(found.clone());
         let largest = unique_step.map_or_else(
             || {
                 let longer = if shortest < longest {
@@ -147,16 +172,18 @@ impl Verdict {
             } else {
                 ""
             };
+            let stable = format!("steps are stable up to {least}{least_bound} s");
             self.words.push(format!(
-                "steps are stable up to {least}{least_bound} s (elastic and viscoplastic stress, adhesion and contact memory are \
-                 explicit){power}"
+                "{stable} (elastic and viscoplastic stress, adhesion and contact memory are explicit){power}"
             ));
+            self.brief.push(stable);
             return;
         }
         let found = format!(
             "the step of {step} s exceeds {least_bound} s, above which explicit stresses amplify errors"
         );
         self.words.push(found.clone());
+        self.brief.push(found.clone());
         let remedy = format!(
             "use a step below {least_bound} s, [time] scheme = \"implicit_euler\", or accept it with \
              [solver] accept = [\"explicit_stability\"]"
@@ -204,6 +231,25 @@ mod tests {
         let verdict = paper().verdict(1.0 / 64.0, None, &[]);
         assert!(verdict.refusals.is_empty() && verdict.warnings.is_empty());
         assert!(verdict.words[2].contains("> m_j |gamma|^2 = 22.4"));
+    }
+
+    #[test]
+    fn a_run_tells_whether_steps_have_one_solution_and_why_not() {
+        let brief = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).brief;
+        let stable = "steps are stable up to 0.12 s";
+        assert_eq!(brief(paper()), ["each step has one solution", stable]);
+        let weakens = || vec!["the friction traction decreases: theta does not cover this".into()];
+        let known = Certificates { not_covered: weakens(), slip_pressure_bound: Some(1.8e5), ..paper() };
+        assert_eq!(brief(known)[0], "each step has one solution for given contact pressures up to 180000 Pa");
+        let mut both = weakens();
+        both.push("damage may soften the body: theta does not take it into account".into());
+        let known = Certificates { not_covered: both, slip_pressure_bound: Some(0.0), ..paper() };
+        assert_eq!(
+            brief(known)[0],
+            "several solutions of a step are not excluded: the friction traction decreases; damage may soften the body"
+        );
+        let known = Certificates { theta_step: Some(1.5), ..paper() };
+        assert!(brief(known)[0].contains("may have several solutions"));
     }
 
     #[test]

@@ -20,7 +20,7 @@ use crate::{
 /// Largest number of directions for each Newton iteration that a solve may take, on the way to another equilibrium.
 pub(super) const DIRECTIONS_PER_ITERATION: usize = 20;
 /// Largest number of directions where another start is better than more of them.
-pub(super) const SHORT_DESCENT: usize = 10;
+pub(super) const SHORT_DESCENT: usize = 50;
 /// The ratio by which the share of softening decreases where the derivative is not positive definite, and by which it grows again.
 const DECREASE: f64 = 0.25;
 const INCREASE: f64 = 2.0;
@@ -30,6 +30,14 @@ const LEAST_SHARE: f64 = 0.1;
 const MAX_EVALUATIONS: usize = 12;
 /// The power at the end of a step relative to that at its start at which a step is long enough and short enough.
 const ENOUGH: f64 = 0.5;
+/// Ratio of the lengths of steps before a kink: its square, and the square of that of the last two from then on. Without stiffness
+/// against sliding a direction may be longer than all velocities by any factor.
+const FIRST_SHRINKAGE: f64 = 0.7;
+/// Ratio of two lengths beyond which the next one is their geometric mean.
+const FAR: f64 = 100.0;
+/// Ratio of the lengths at whose ends the direction is tried, and the least of them.
+const SHORTENING: f64 = 0.1;
+const LEAST_LENGTH: f64 = 1e-4;
 /// A change of velocities by this share is a rounding error.
 const ROUNDING: f64 = 1e-15;
 /// Ratio of the lengths of steps while the energy falls steeply.
@@ -107,7 +115,7 @@ impl Descent {
                 equations.linearise(x)?;
                 let curvature = equations.solve_if_definite(&self.residual, &mut self.direction)?;
                 if curvature == Curvature::Positive
-                    && let Some(place) = self.search(equations, x, norm)?
+                    && let Some(place) = self.search(equations, x, norm, share == 0.0)?
                 {
                     break place;
                 }
@@ -128,14 +136,16 @@ impl Descent {
         Ok(false)
     }
 
-    /// The end of the step along the direction; `None` if the energy grows along it. Collective.
+    /// The end of the step along the direction; `None` if the energy grows along it, on the last trial along its beginning, too.
+    /// Collective.
     fn search<const D: usize>(
         &mut self,
         equations: &mut ContactEquations<'_, D>,
         x: &DistributedVector,
         norm: f64,
+        is_last: bool,
     ) -> Result<Option<Place>> {
-        let mut length = 1.0;
+        let (mut length, mut shrink) = (1.0, FIRST_SHRINKAGE);
         let (mut low, mut high): (Option<Place>, Option<Place>) = (None, None);
         let mut start: Option<f64> = None;
         for _ in 0..MAX_EVALUATIONS {
@@ -153,7 +163,12 @@ impl Descent {
                 return Ok(Some(place));
             }
             if first >= 0.0 {
-                return Ok(None);
+                if !is_last || length < LEAST_LENGTH {
+                    return Ok(None);
+                }
+                // Velocities bend where branches change.
+                (length, start) = (SHORTENING * length, None);
+                continue;
             }
             if place.power.abs() <= ENOUGH * first.abs() {
                 return Ok(Some(place));
@@ -164,6 +179,14 @@ impl Descent {
                 high = Some(place)
             }
             length = match (low, high) {
+                // The energy has a kink: nothing tells how near.
+                (None, Some(high)) if high.power >= ENOUGH * first.abs() => {
+                    shrink *= shrink;
+                    shrink * high.length
+                }
+                (Some(low), Some(high)) if high.length > FAR * low.length => {
+                    (low.length * high.length).sqrt()
+                }
                 (Some(low), None) => GROWTH * low.length,
                 (low, Some(high)) => {
                     let [from, power] = low.map_or([0.0, first], |low| [low.length, low.power]);

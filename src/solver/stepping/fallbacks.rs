@@ -111,6 +111,9 @@ impl Conditions {
             iteration && search && (self.rubs_obstacles || !fallback.yields_at_first)
         };
         let first = self.has_bonds.then_some(DESCENT);
-        first.into_iter().chain(FALLBACKS).filter(applies)
+        // Bodies that nothing but little friction holds.
+        let last =
+            (self.follows_pressure && !self.rubs_obstacles && !self.has_user_search).then_some(YIELDING);
+        first.into_iter().chain(FALLBACKS).filter(applies).chain(last)
     }
 }

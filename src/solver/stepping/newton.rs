@@ -169,6 +169,7 @@ impl Newton {
             if fallback.yields_at_first {
                 iterations += self.solve_yielding(problem, system, krylov, trial)?;
             }
+            self.scratch.restart();
             let failed = loop {
                 if has_fixed_bounds {
                     self.fix_bounds(problem, system)?;
@@ -181,6 +182,7 @@ impl Newton {
                 }
                 iterations += attempt.iterations.max(1);
                 rounds += 1;
+                self.scratch.go_on();
                 if rounds == MAX_FIXED_POINT_ITERATIONS {
                     break Some(format!(
                         "friction bounds still change after {rounds} fixed-point iterations"
@@ -217,6 +219,7 @@ impl Newton {
                         self.sharpness * share * system.tolerance,
                         LINEAR_ITERATIONS,
                     )?;
+                    self.scratch.restart();
                     let attempt = self.attempt(problem, system, krylov, fallback.search, trial);
                     self.sharpness = 1.0;
                     let attempt = attempt?;
@@ -254,7 +257,10 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<usize> {
         let tolerance = system.tolerance.max(self.settings.tolerance * self.counts.first);
-        let system = System { tolerance: YIELDING_TOLERANCE * tolerance, ..system };
+        let enough = YIELDING_TOLERANCE * tolerance;
+        // The first residual may be much larger than all forces.
+        let tolerance = if system.floor.largest > 0.0 { enough.min(system.floor.largest) } else { enough };
+        let system = System { tolerance, ..system };
         let (mut iterations, mut reached) = (0, None);
         let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
         set_give(problem.body, ratio);
@@ -266,6 +272,7 @@ impl Newton {
         self.fix_bounds(problem, system)?;
         loop {
             set_give(problem.body, ratio);
+            self.scratch.restart();
             let attempt = self.attempt(problem, system, krylov, Search::ShortDescent, trial)?;
             iterations += attempt.iterations;
             if attempt.failure.is_none() {
@@ -375,7 +382,6 @@ impl Newton {
                 .iter()
                 .any(|c| c.law.depends_on_displacement() || c.friction().is_some());
         self.counts.sets.clear();
-        self.scratch.restart();
         let may_end_at_floor = search != Search::Equilibrated;
         let floor = if may_end_at_floor { system.floor } else { Floor::default() };
         let (cells, contacts) = problem.body.cells_and_contacts();

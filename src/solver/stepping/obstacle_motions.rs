@@ -72,6 +72,8 @@ struct Motion {
     forces: DistributedVector,
     /// The norm of `N`.
     size: f64,
+    /// The velocity in m/s that moves by the distances of which gaps are differences in a step.
+    places: f64,
     /// `m / k'`.
     inertia: f64,
     /// What held points add to its `s`.
@@ -160,6 +162,7 @@ impl ObstacleMotions {
                     column,
                     forces,
                     size: 0.0,
+                    places: 0.0,
                     inertia,
                     held: 0.0,
                     has_stops: false,
@@ -176,6 +179,9 @@ impl ObstacleMotions {
             motion.velocities.fill(0.0)?;
             contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
             motion.size = motion.velocities.norm()?;
+            let places =
+                if freedom == Freedom::Translation { contacts[contact].speed_of_places() } else { 0.0 };
+            [motion.places] = session.largest([places]);
         }
         if self.is_empty() {
             return Ok(());
@@ -457,13 +463,14 @@ impl ObstacleMotions {
         contacts.iter_mut().try_for_each(Contact::place_obstacle)
     }
 
-    /// The norm in m/s of the velocities by which nodes follow obstacles since the start of the step: velocities are rounded as differences
-    /// from them.
+    /// The norm in m/s of the velocities by which nodes follow obstacles since the start of the step, and of those that move by the distances
+    /// from which gaps are evaluated: velocities are rounded as differences from them.
     pub(super) fn speed<const D: usize>(&self, contacts: &[Contact<D>]) -> f64 {
         let change = |(contact, freedom): (usize, Freedom)| {
             contacts[contact].driven()[freedom as usize].map_or(0.0, |m| m.change())
         };
-        self.motions.iter().map(|motion| motion.size * change(motion.place).abs()).sum()
+        let speed = |motion: &Motion| motion.size * (change(motion.place).abs() + motion.places);
+        self.motions.iter().map(speed).sum()
     }
 
     /// Whether a motion changes nodal velocities otherwise than the velocities work against forces on the obstacle.

@@ -23,7 +23,10 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{body::Body, effect::Contact, space::linear_subspace, state::State},
-    linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision, has_option},
+    linear_algebra::{
+        petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision, has_option},
+        tensor::larger,
+    },
     parallel::{agreement::Agreed, session::Session},
 };
 use std::cell::Cell;
@@ -48,7 +51,7 @@ const LARGEST_FLOOR: f64 = 1e-4;
 struct Accuracy {
     /// The residual norm at which it counts as solved.
     tolerance: f64,
-    /// The size of the forces.
+    /// The size of the forces, of those that drive obstacles, too.
     size: f64,
     /// The forces to which its residual is compared: not below those at which rounding errors matter to pressures.
     reference: f64,
@@ -397,15 +400,20 @@ impl StepSolver {
         let size = norm.max(rounding.max(product) / accuracy);
         let size = if size > 0.0 { size.max(LEAST_FORCE / accuracy) } else { 0.0 };
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
+        // The forces that drive obstacles are among those of the step.
+        let mut driving = 0.0;
         for contact in &mut body.contacts {
-            // The force that drives an obstacle is one of the step.
             let [along, _] = contact.driven();
-            contact.reference.forces = along.map_or(total, |motion| total.max(motion.driving().abs()));
+            let own = along.map_or(0.0, |motion| motion.driving().abs());
+            contact.reference.forces = total.max(own);
+            driving = larger(driving, own);
         }
         let size = size_of(norm, *scale);
+        let all = size.max(driving);
         let tolerance =
             (self.settings.tolerance * size).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product);
-        Ok(Accuracy { tolerance, size, reference: size.max(rounding.max(product) / accuracy) })
+        let reference = all.max(rounding.max(product) / accuracy).max(LEAST_FORCE / self.settings.tolerance);
+        Ok(Accuracy { tolerance, size: all, reference })
     }
 
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.

@@ -21,8 +21,8 @@ const BALANCE: f64 = 1e-7;
 const EQUAL: f64 = 1e-5;
 /// The same where rounding errors choose among adaptive steps, or among several solutions of a step.
 const CHOSEN: f64 = 3e-2;
-/// What the log says of a step that has passed unstable states.
-const JUMP: &str = "passes unstable states";
+/// What the log says of a step that has passed unstable states, or is too long for what fails within it.
+const JUMPS: [&str; 2] = ["passes unstable states", "dissipates more energy than is available"];
 /// What the log says of the number of linear systems that were indefinite.
 const INDEFINITE: &str = "linear systems were indefinite";
 /// Energies in J that are none: a body that moves rigidly has rounding errors alone.
@@ -338,9 +338,9 @@ impl<const D: usize> Trial<'_, D> {
         })
     }
 
-    /// Whether some stage passed unstable states: rounding errors choose where it lands.
+    /// Whether some stage passed unstable states, or failed faster than its steps resolve: rounding errors choose where it lands.
     fn has_jumped(&self, name: &str) -> bool {
-        self.says(name, "run.log", JUMP)
+        JUMPS.iter().any(|jump| self.says(name, "run.log", jump))
     }
 
     /// Whether a linear system of some stage was indefinite: the energy of its step is not convex, and may have several minima.
@@ -354,7 +354,9 @@ impl<const D: usize> Trial<'_, D> {
 
     /// Whether steps may have had several solutions without unstable states, as the run says.
     fn may_choose(&self, name: &str) -> bool {
-        self.says(name, "summary.json", "a step is certain to have one solution only up to")
+        ["a step is certain to have one solution only up to", "no step is certain to have one solution"]
+            .iter()
+            .any(|words| self.says(name, "summary.json", words))
     }
 
     /// Whether a run of the same scene may fail with these words where this one does not: from where it has landed after unstable
@@ -367,12 +369,13 @@ impl<const D: usize> Trial<'_, D> {
     fn steps_before_jump(&self, name: &str) -> usize {
         let log = |folder: &Path| std::fs::read_to_string(folder.join("run.log")).unwrap_or_default();
         let (first, last) = (self.folder.join(name).join("out/job"), self.out(name));
-        if last != first && log(&first).contains(JUMP) {
+        let is_jump = |text: &str| JUMPS.iter().any(|jump| text.contains(jump));
+        if last != first && is_jump(&log(&first)) {
             return 0;
         }
         let number = |line: &str| line.strip_prefix("step ")?.split(',').next()?.parse::<usize>().ok();
         let log = log(&last);
-        let jumps = log.lines().filter(|line| line.contains(JUMP));
+        let jumps = log.lines().filter(|line| is_jump(line));
         jumps.map(|line| number(line).expect("a step") - 1).min().unwrap_or(usize::MAX)
     }
 
@@ -381,7 +384,7 @@ impl<const D: usize> Trial<'_, D> {
     /// Where a body has passed unstable states, the steps before must be equal. At such a state the derivative of a step is singular, and
     /// behind it are as many equilibria as there are sets of points that may soften while others unload: rounding errors choose one.
     /// Bonds and friction mostly meet again at the same end, damage does not: it never heals and keeps the choice. What follows is not
-    /// compared, nor where Newton's method has passed such states within a step.
+    /// compared, nor where Newton's method has passed such states within a step, nor the step of a damaged body before them, which leads there.
     fn differences(&self, frame: Frame, plain: &str, other: &str) -> Vec<String> {
         let names = [plain, other];
         let pair = Pair { frame, results: names.map(|name| self.results(name)) };
@@ -403,7 +406,7 @@ impl<const D: usize> Trial<'_, D> {
         }
         if has_jumped && !is_adaptive && rows[0] == rows[1] {
             let before = names.map(|name| self.steps_before_jump(name));
-            let same = before[0].min(before[1]).min(rows[0]);
+            let same = before[0].min(before[1]).saturating_sub(usize::from(is_damaged)).min(rows[0]);
             found.extend((0..same).flat_map(|row| pair.energies([row; 2], share)));
         }
         found

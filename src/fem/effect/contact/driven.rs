@@ -214,6 +214,20 @@ impl<const D: usize> Contact<D> {
         velocities.flatten().unwrap_or([0.0; D])
     }
 
+    /// The largest velocity in m/s that moves in the step by a distance from which the gap of a point on this rank is evaluated: that of its
+    /// place from the origin, and from the centre of the obstacle.
+    pub fn speed_of_places(&self) -> f64 {
+        if !self.law.depends_on_displacement() {
+            return 0.0;
+        }
+        let centre = self.gap.centre(self.rate.time);
+        let speed = |point: &Point<D>| {
+            let distance = norm(&point.place) + norm(&add_scaled(&point.place, -1.0, &centre));
+            if point.context.step_length > 0.0 { distance / point.context.step_length } else { 0.0 }
+        };
+        self.points.iter().filter(|point| point.can_touch()).map(speed).fold(0.0, larger)
+    }
+
     /// Adds the change of nodal velocities, a vector of Newton's method, with the velocity of a motion at fixed unknowns.
     pub fn add_motion(&self, freedom: Freedom, nodal: &mut [f64]) {
         if !self.follows {

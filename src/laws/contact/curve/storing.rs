@@ -32,6 +32,12 @@ fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
     [sum[0] * half, sum[1] * half.abs()]
 }
 
+/// The integral of a smooth function from `a` to `b`, as a part of a sum of the size `scale`.
+fn integral(function: &dyn Fn(f64) -> f64, [a, b]: [f64; 2], scale: f64) -> f64 {
+    let [sum, size] = gauss(function, a, b);
+    adaptive(function, [a, b], sum, (EXACT * size.max(scale), DEPTH))
+}
+
 /// The integral over a part with this integral by ten points, by halves until they agree within `slack`.
 fn adaptive(
     function: &dyn Fn(f64) -> f64,
@@ -42,35 +48,28 @@ fn adaptive(
     let middle = 0.5 * (a + b);
     let halves = [gauss(function, a, middle), gauss(function, middle, b)].map(|[sum, _]| sum);
     let sum = halves[0] + halves[1];
-    if depth == 0 || (sum - whole).abs() <= slack {
+    let error = (sum - whole).abs();
+    if depth == 0 || error <= slack || error.is_nan() {
         return sum;
     }
     let next = (slack, depth - 1);
     adaptive(function, [a, middle], halves[0], next) + adaptive(function, [middle, b], halves[1], next)
 }
 
-/// The integral from `a` to `b` in parts that grow with the distance from `a`, so that no scale is missed.
-fn integral(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
-    let nearest = NEAREST.max(f64::EPSILON * a.abs());
-    let ends = std::iter::successors(Some(nearest), |reach| Some(GROWTH * reach));
-    let inner = ends.take_while(|reach| *reach < (b - a).abs()).map(|reach| a + reach.copysign(b - a));
-    let (mut from, mut parts) = (a, Vec::new());
-    for to in inner.chain([b]) {
-        parts.push(([from, to], gauss(function, from, to)));
-        from = to;
-    }
-    let slack = EXACT * parts.iter().map(|(_, [_, size])| size).sum::<f64>();
-    parts.into_iter().map(|(part, [sum, _])| adaptive(function, part, sum, (slack, DEPTH))).sum()
-}
-
 /// A curve over the penetration in m, with its potential.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoringCurve {
     curve: Curve,
-    /// The potential in J/m² at minus infinity.
-    apart: f64,
-    /// The potential at each corner.
-    potentials: Vec<f64>,
+    /// Penetrations in m with the potential in J/m² there, in order: the corners, zero, and points between them.
+    knots: Vec<[f64; 2]>,
+}
+
+/// Points between two corners, at distances that grow from the end that is nearer to the obstacle, so that no scale is missed.
+fn between(low: f64, high: f64) -> impl Iterator<Item = f64> {
+    let [from, to] = if low.abs() < high.abs() { [low, high] } else { [high, low] };
+    let nearest = NEAREST.max(f64::EPSILON * from.abs());
+    let ends = std::iter::successors(Some(nearest), |reach| Some(GROWTH * reach));
+    ends.take_while(move |reach| *reach < high - low).map(move |reach| from + reach.copysign(to - from))
 }
 
 impl StoringCurve {
@@ -85,37 +84,33 @@ impl StoringCurve {
                 "let it vanish where the gap is open, for example by max(d, 0) in place of d".into(),
             ]);
         }
-        let mut storing = Self { curve, apart: 0.0, potentials: Vec::new() };
-        storing.apart = storing.work(0.0, -REACH);
-        let mut from = [0.0, 0.0];
-        for corner in storing.curve.corners.clone() {
-            let potential = from[1] + storing.work(from[0], corner[0]);
-            storing.potentials.push(potential);
-            from = [corner[0], potential];
-        }
-        Ok(storing)
+        let mut ends: Vec<f64> =
+            curve.corners.iter().map(|corner| corner[0]).chain([-REACH, 0.0, REACH]).collect();
+        ends.sort_by(f64::total_cmp);
+        let inner = ends.windows(2).flat_map(|pair| between(pair[0], pair[1]));
+        let mut at: Vec<f64> = ends.iter().copied().chain(inner).collect();
+        at.sort_by(f64::total_cmp);
+        at.dedup();
+        let (apart, close): (Vec<f64>, Vec<f64>) = at.into_iter().partition(|at| *at < 0.0);
+        let storing = Self { curve, knots: Vec::new() };
+        let outwards = |at: &mut dyn Iterator<Item = f64>| -> Vec<[f64; 2]> {
+            let next = |last: &mut [f64; 2], to| {
+                *last = [to, storing.potential_from(*last, to)];
+                Some(*last).filter(|knot| knot[1].is_finite())
+            };
+            at.scan([0.0; 2], next).collect()
+        };
+        let mut knots = outwards(&mut apart.into_iter().rev());
+        knots.reverse();
+        knots.extend(outwards(&mut close.into_iter()));
+        Ok(Self { knots, ..storing })
     }
 
-    /// The integral of the pressure from `a` to `b` over the branches between.
-    fn work(&self, a: f64, b: f64) -> f64 {
-        if b < a {
-            return -self.work(b, a);
-        }
-        let corners = self.curve.corners.iter().map(|corner| corner[0]);
-        let ends: Vec<f64> = corners.filter(|at| a < *at && *at < b).chain([b]).collect();
-        let (mut sum, mut from) = (0.0, a);
-        for to in ends {
-            let branch = self.curve.branch(0.5 * (from + to), NodeContext::AT_THE_GAP);
-            let pressure = |at: f64| self.curve.on_branch(branch, at)[0];
-            // From the end that is nearer to the obstacle.
-            sum += if from.abs() < to.abs() {
-                integral(&pressure, from, to)
-            } else {
-                -integral(&pressure, to, from)
-            };
-            from = to;
-        }
-        sum
+    /// The potential in J/m² at a penetration in m from that at a knot without a corner between.
+    fn potential_from(&self, [knot, potential]: [f64; 2], penetration: f64) -> f64 {
+        let branch = self.curve.branch(0.5 * (knot + penetration), NodeContext::AT_THE_GAP);
+        let pressure = |at| self.curve.on_branch(branch, at)[0];
+        potential + integral(&pressure, [knot, penetration], potential.abs())
     }
 }
 
@@ -133,17 +128,22 @@ impl StoringGraph for StoringCurve {
 
     fn potential(&self, penetration: f64) -> f64 {
         if penetration == f64::NEG_INFINITY {
-            return self.apart;
+            return self.knots[0][1];
         }
-        let before = self.curve.branch(penetration, NodeContext::AT_THE_GAP).saturating_sub(1);
-        self.potentials[before] + self.work(self.curve.corners[before][0], penetration)
+        // From the knot on the side of the obstacle.
+        let after = self.knots.partition_point(|knot| knot[0] <= penetration);
+        self.potential_from(self.knots[if penetration < 0.0 { after } else { after - 1 }], penetration)
     }
 
     fn mean(&self, before: f64, after: f64) -> [f64; 2] {
+        let advance = after - before;
+        if !advance.is_finite() {
+            // There was no obstacle along the normal, or there is none.
+            return [0.0; 2];
+        }
         let (low, high) = (before.min(after), before.max(after));
         let branch = self.curve.branch(low, NodeContext::AT_THE_GAP);
         let end = self.curve.corners.get(branch).map_or(f64::INFINITY, |corner| corner[0]);
-        let advance = after - before;
         if end < high {
             let mean = (self.potential(high) - self.potential(low)) / (high - low);
             let own = self.curve.pressure(after, NodeContext::AT_THE_GAP);
@@ -151,10 +151,55 @@ impl StoringGraph for StoringCurve {
         }
         // On one branch the derivative is an integral, too, without the rounding of a difference.
         let at = |share: f64| self.curve.on_branch(branch, before + share * advance);
-        let mean = |function: &dyn Fn(f64) -> f64| {
-            let [sum, size] = gauss(function, 0.0, 1.0);
-            adaptive(function, [0.0, 1.0], sum, (EXACT * size, DEPTH))
-        };
+        let mean = |function: &dyn Fn(f64) -> f64| integral(function, [0.0, 1.0], 0.0);
         [mean(&|share| at(share)[0]), mean(&|share| share * at(share)[1])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::expression::{Formula, Variable};
+
+    fn storing(text: &str) -> StoringCurve {
+        let formula = Formula::parse(text).expect("a formula");
+        StoringCurve::new(Curve::new(formula, Variable::D).expect("a graph")).expect("a potential")
+    }
+
+    #[test]
+    fn potentials_are_integrals_from_the_obstacle_on_every_scale() {
+        type Case = (&'static str, fn(f64) -> f64);
+        let cases: [Case; 3] = [
+            ("if(d < 0, 0, 1e3*d)", |d| 500.0 * d.max(0.0).powi(2)),
+            ("if(d < 2e-6, 0, 5)", |d| 5.0 * (d - 2e-6).max(0.0)),
+            ("exp(1e3*min(d, 0.01))", |d| {
+                (1e3 * d.min(0.01)).exp_m1() / 1e3 + 10f64.exp() * (d - 0.01).max(0.0)
+            }),
+        ];
+        for (text, potential) in cases {
+            let curve = storing(text);
+            for d in [-1e20, -0.3, -1e-5, -1e-15, 0.0, 1e-14, 1e-9, 2e-6, 3e-6, 1e-3, 0.01, 7.0, 1e12] {
+                let [found, expected] = [curve.potential(d), potential(d)];
+                assert!(
+                    (found - expected).abs() <= 1e-12 * expected.abs(),
+                    "{text} at {d}: {found}, {expected}"
+                );
+            }
+            assert_eq!(curve.potential(f64::NEG_INFINITY), curve.potential(-REACH), "{text}");
+        }
+    }
+
+    #[test]
+    fn means_are_ratios_of_potentials_and_none_where_an_obstacle_is_met_or_lost_along_the_normal() {
+        let curve = storing("if(d < 0, 0, 1e3*d)");
+        for [before, after] in [[1e-3, 3e-3], [-1e-3, 1e-3], [4e-3, -2e-3]] {
+            let [mean, _] = curve.mean(before, after);
+            let expected = (curve.potential(after) - curve.potential(before)) / (after - before);
+            assert!((mean - expected).abs() <= 1e-12, "{before}, {after}: {mean}, {expected}");
+        }
+        let apart = f64::NEG_INFINITY;
+        for [before, after] in [[apart, apart], [apart, 0.1], [0.1, apart]] {
+            assert_eq!(curve.mean(before, after), [0.0; 2], "{before}, {after}");
+        }
     }
 }

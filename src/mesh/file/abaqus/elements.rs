@@ -47,14 +47,14 @@ pub(super) fn meaning(name: &str) -> Result<Meaning, String> {
         ("C3D", "15") => of(Shape::Wedge, 15, true),
         ("C3D", "20") => of(Shape::Hexahedron, 20, true),
         ("C3D", "27") => of(Shape::Hexahedron, 27, true),
-        ("CPS" | "CPE", "3") => of(Shape::Triangle, 3, true),
-        ("CPS" | "CPE", "4") => of(Shape::Quadrilateral, 4, true),
-        ("CPS" | "CPE", "6") => of(Shape::Triangle, 6, true),
-        ("CPS" | "CPE", "8") => of(Shape::Quadrilateral, 8, true),
-        ("S" | "M3D" | "SFM3D" | "R3D" | "STRI" | "CAX", "3") => of(Shape::Triangle, 3, false),
-        ("S" | "M3D" | "SFM3D" | "R3D" | "CAX", "4") => of(Shape::Quadrilateral, 4, false),
-        ("S" | "M3D" | "SFM3D" | "CAX", "6") | ("STRI", "65") => of(Shape::Triangle, 6, false),
-        ("S" | "M3D" | "SFM3D" | "CAX", "8") => of(Shape::Quadrilateral, 8, false),
+        ("CPS" | "CPE" | "CAX", "3") => of(Shape::Triangle, 3, true),
+        ("CPS" | "CPE" | "CAX", "4") => of(Shape::Quadrilateral, 4, true),
+        ("CPS" | "CPE" | "CAX", "6") => of(Shape::Triangle, 6, true),
+        ("CPS" | "CPE" | "CAX", "8") => of(Shape::Quadrilateral, 8, true),
+        ("S" | "M3D" | "SFM3D" | "R3D" | "STRI", "3") => of(Shape::Triangle, 3, false),
+        ("S" | "M3D" | "SFM3D" | "R3D", "4") => of(Shape::Quadrilateral, 4, false),
+        ("S" | "M3D" | "SFM3D", "6") | ("STRI", "65") => of(Shape::Triangle, 6, false),
+        ("S" | "M3D" | "SFM3D", "8") => of(Shape::Quadrilateral, 8, false),
         ("S" | "M3D", "9") => of(Shape::Quadrilateral, 9, false),
         ("T2D" | "T3D" | "R2D", "2") | ("B", "21" | "23" | "31" | "33") => of(Shape::Line, 2, false),
         ("T2D" | "T3D", "3") | ("B", "22" | "32") => Ok(Meaning::Ignored),
@@ -69,7 +69,7 @@ fn unknown(name: &str) -> String {
     let name: String = name.chars().take(20).collect();
     format!(
         "TYPE={}, a type unknown to the solver: C3D4, C3D5, C3D6, C3D8, C3D10, C3D15, C3D20 (in space) and CPS3, CPS4, CPS6, CPS8, CPE3, \
-         CPE4, CPE6, CPE8 (in the plane), with any letters after the number, are read",
+         CPE4, CPE6, CPE8 (in the plane; CAX3 to CAX8 likewise), with any letters after the number, are read",
         name.escape_debug()
     )
 }
@@ -107,6 +107,7 @@ mod tests {
         };
         assert_eq!(shape("C3D10M"), Some((Shape::Tetrahedron, 10)));
         assert_eq!(shape("CPE4R"), Some((Shape::Quadrilateral, 4)));
+        assert_eq!(shape("CAX6M"), Some((Shape::Triangle, 6)));
         assert_eq!(shape("S4R"), Some((Shape::Quadrilateral, 4)));
         assert_eq!(shape("SFM3D3"), Some((Shape::Triangle, 3)));
         assert_eq!(shape("STRI65"), Some((Shape::Triangle, 6)));

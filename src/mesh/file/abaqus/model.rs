@@ -69,6 +69,8 @@ pub(super) struct Model {
     /// Numbers of elements whose type has no shape.
     ignored_elements: Vec<u64>,
     ignored_types: Vec<String>,
+    /// Whether elements are those of a body of revolution.
+    is_revolved: bool,
     ignored_keywords: Vec<String>,
     place: Place,
 }
@@ -202,6 +204,7 @@ impl Model {
     fn elements(&mut self, keyword: &Keyword, lines: &mut Lines) -> Result<()> {
         let name = keyword.required("TYPE")?;
         let set = keyword.parameter("ELSET").filter(|set| !set.is_empty()).map(str::to_owned);
+        self.is_revolved |= name.get(..3).is_some_and(|family| family.eq_ignore_ascii_case("CAX"));
         let tags = match meaning(name).map_err(|words| refuse(keyword.line, words))? {
             Meaning::Ignored => {
                 let name = name.to_ascii_uppercase();
@@ -266,8 +269,8 @@ impl Model {
         let cells = self.runs.iter().filter(|run| run.kind.is_continuum && !run.tags.is_empty());
         cells.map(|run| run.kind.shape.dimension()).max().ok_or_else(|| {
             Error::Refused(
-                "the file has no cells: *ELEMENT with TYPE=C3D4, C3D8 and the like in space, or CPS3, CPE4 and the like in the plane; \
-                 shells, membranes and axisymmetric elements are none"
+                "the file has no cells: *ELEMENT with TYPE=C3D4, C3D8 and the like in space, or CPS3, CPE4, CAX4 and the like in the \
+                 plane; shells and membranes are none"
                     .into(),
             )
         })
@@ -295,6 +298,12 @@ impl Model {
             if more == 0 { named.join(", ") } else { format!("{} and {more} more", named.join(", ")) }
         };
         let mut notes = Vec::new();
+        if self.is_revolved {
+            notes.push(
+                "a body of revolution (CAX): state [material] hypothesis = \"axisymmetric\" in the job"
+                    .into(),
+            );
+        }
         if !self.ignored_types.is_empty() {
             notes.push(format!("elements of these types are ignored: {}", list(&self.ignored_types, "")));
         }

@@ -110,7 +110,12 @@ fn a_flat_file_has_its_regions_boundaries_and_points() {
     assert_eq!(boundary(&mesh, "Nall"), (10.0, [0.0; 3]));
     assert_eq!(mesh.point_sets, [PointSet::new("edge", vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])]);
     assert!(notes[0].contains("not *MATERIAL, *ELASTIC, *STEP, *STATIC, *BOUNDARY:"), "{notes:?}");
-    assert_eq!(notes[1..], ["2 hexahedra were split into 12 tetrahedra"]);
+    assert_eq!(
+        notes[1..],
+        [
+            "2 hexahedra were split into 12 tetrahedra: linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not"
+        ]
+    );
 }
 
 #[test]
@@ -258,10 +263,26 @@ fn nodes_that_complete_no_facet_are_left_out_with_a_note() {
 }
 
 #[test]
+fn cells_of_a_body_of_revolution_are_those_of_the_plane_with_a_note() {
+    let (mesh, notes) = in_plane("*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT,TYPE=CAX3\n1,1,2,3\n");
+    assert_eq!(mesh.cell_count(), 1);
+    assert!(notes.iter().any(|note| note.contains("hypothesis = \"axisymmetric\"")), "{notes:?}");
+}
+
+#[test]
+fn bodies_may_touch_where_each_has_a_boundary_of_its_own_beside_those_of_both() {
+    let nodes = "*NODE, NSET=all\n1,0,0\n2,2,0\n3,2,1\n4,0,1\n5,.5,1\n6,1.5,1\n7,1.5,2\n8,.5,2\n";
+    let sets = "*NSET, NSET=low_top\n3,4\n*NSET, NSET=up_bottom\n5,6\n";
+    let text = format!("{nodes}{sets}*ELEMENT, TYPE=CPE4\n1,1,2,3,4\n2,5,6,7,8\n");
+    let (mesh, _) = in_plane(&text);
+    assert_eq!(boundary(&mesh, "up_bottom").0, 1.0);
+}
+
+#[test]
 fn wrong_files_are_refused_with_their_line() {
     refused("*HEADING\n", &["no *NODE with nodes"]);
     refused("*NODE\n1, 0, 0\n", &["the file has no cells"]);
-    refused("*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT,TYPE=CAX3\n1,1,2,3\n", &["no cells", "axisymmetric"]);
+    refused("*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT,TYPE=S3\n1,1,2,3\n", &["no cells", "shells"]);
     refused(&BARS.replace("5, 1., 1., 0.", "5, one, 1., 0."), &["line 9: `one` where a coordinate"]);
     refused(&BARS.replace("14\n*element", "*element"), &["line 19: the element has 7 nodes, 8 are expected"]);
     refused(&BARS.replace("14\n*element", "14, 15\n*element"), &["line 20: more than the 8 nodes"]);

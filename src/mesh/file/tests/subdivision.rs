@@ -135,7 +135,7 @@ proptest! {
         }
         let (mesh, notes) = in_space(&file(&points, &tags, &[(3, 1, &borrowed(&cells)), (2, 7, &borrowed(&sides))]));
         prop_assert_eq!(mesh.cell_count(), 5 * 6 + 4 * 3 + 6 * 2);
-        prop_assert_eq!(&notes[0], "5 hexahedra, 4 wedges and 6 pyramids were split into 54 tetrahedra");
+        prop_assert_eq!(&notes[0], "5 hexahedra, 4 wedges and 6 pyramids were split into 54 tetrahedra: linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not");
         prop_assert!((volume(&mesh) - 8.0).abs() < 1e-13);
         // Each cell has a share of its cube: none is flat.
         prop_assert!((0..mesh.cell_count()).all(|cell| mesh.measure(cell) > 0.08));
@@ -157,7 +157,7 @@ proptest! {
         let low: [&[usize]; 2] = [&[0, 1], &[1, 2]];
         let text = file(points, &tags, &[(2, 1, &borrowed(&cells)), (1, 7, &low)]);
         let file = super::super::parse(text.as_bytes(), &Placement::default()).expect("a mesh");
-        prop_assert_eq!(file.notes, ["3 quadrilaterals were split into 6 triangles"]);
+        prop_assert_eq!(file.notes, ["3 quadrilaterals were split into 6 triangles: linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not"]);
         let AnyMesh::Two(mesh) = file.mesh else { panic!("a mesh in space") };
         prop_assert_eq!((mesh.cell_count(), mesh.facets.len()), (8, 8));
         prop_assert!((0..8).all(|cell| mesh.measure(cell) == 0.5));
@@ -170,7 +170,12 @@ fn a_hexahedron_turned_round_is_turned_back() {
     let [a, b, c, d, e, f, g, h] = cube(0, 0, 0);
     let tags: Vec<u64> = (1..=27).collect();
     let (mesh, notes) = in_space(&file(&grid(), &tags, &[(3, 1, &[&[e, f, g, h, a, b, c, d]])]));
-    assert_eq!(notes, ["1 hexahedron was split into 6 tetrahedra"]);
+    assert_eq!(
+        notes,
+        [
+            "1 hexahedron was split into 6 tetrahedra: linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not"
+        ]
+    );
     assert!((volume(&mesh) - 1.0).abs() < 1e-15);
 }
 
