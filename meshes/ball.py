@@ -6,6 +6,8 @@
 from math import cos, hypot, pi, sin
 from pathlib import Path
 
+import gmsh
+
 RADIUS = 0.05
 
 
@@ -73,7 +75,7 @@ def mirrored(nodes, triangles, arc):
 
 
 def write(path, nodes, triangles, edges):
-    """The mesh in Gmsh's format 4.1, with the nodes on edges; those of the arc are on the circle."""
+    """The mesh with the nodes on edges; those of the arc are on the circle."""
     on_arc = {frozenset(edge) for edge in edges["surface"]}
     numbers = {key: number for number, key in enumerate(nodes, 1)}
     places = list(nodes.values())
@@ -94,27 +96,10 @@ def write(path, nodes, triangles, edges):
         pairs = [cell] if len(cell) == 2 else zip(cell, cell[1:] + cell[:1])
         return [numbers[key] for key in cell] + [middle(*pair) for pair in pairs]
 
-    blocks = [(1, tag, 8, [with_middles(edge) for edge in cells]) for tag, cells in enumerate(edges.values(), 1)]
-    blocks.append((2, 1, 9, [with_middles(cell) for cell in triangles]))
-    groups = len(edges)
-    box = f"0 {-RADIUS:g} 0 {RADIUS:g} {RADIUS:g} 0"
-    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(groups + 1)]
-    lines += [f'1 {tag} "{name}"' for tag, name in enumerate(edges, 1)]
-    lines += [f'2 {groups + 1} "body"', "$EndPhysicalNames", "$Entities", f"0 {groups} 1 0"]
-    lines += [f"{tag} {box} 1 {tag} 0" for tag in range(1, groups + 1)]
-    lines += [f"1 {box} 1 {groups + 1} 0", "$EndEntities"]
-    lines += ["$Nodes", f"1 {len(places)} 1 {len(places)}", f"2 1 0 {len(places)}"]
-    lines += [str(tag) for tag in range(1, len(places) + 1)]
-    lines += [f"{x:.12g} {y:.12g} 0" for x, y in places] + ["$EndNodes"]
-    total = sum(len(cells) for *_, cells in blocks)
-    lines += ["$Elements", f"{len(blocks)} {total} 1 {total}"]
-    number = 0
-    for dimension, tag, kind, cells in blocks:
-        lines.append(f"{dimension} {tag} {kind} {len(cells)}")
-        for cell in cells:
-            number += 1
-            lines.append(" ".join(map(str, (number, *cell))))
-    path.write_text("\n".join(lines + ["$EndElements"]) + "\n")
+    edges = {name: [with_middles(edge) for edge in cells] for name, cells in edges.items()}
+    triangles = [with_middles(cell) for cell in triangles]
+    nodes = [f"{x:.12g} {y:.12g}" for x, y in places]
+    gmsh.write(path, nodes, (0, -RADIUS, RADIUS, RADIUS), edges, triangles)
 
 
 here = Path(__file__).parent

@@ -6,6 +6,8 @@
 from math import cos, pi, sin
 from pathlib import Path
 
+import gmsh
+
 INNER, OUTER = 1.0, 2.0
 
 
@@ -41,29 +43,7 @@ def ring(radial):
     return nodes, triangles, edges
 
 
-def write(path, nodes, triangles, edges):
-    """The mesh in Gmsh's format 4.1."""
-    groups = len(edges)
-    box = f"0 0 0 {OUTER:g} {OUTER:g} 0"
-    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(groups + 1)]
-    lines += [f'1 {tag} "{name}"' for tag, name in enumerate(edges, 1)]
-    lines += [f'2 {groups + 1} "body"', "$EndPhysicalNames", "$Entities", f"0 {groups} 1 0"]
-    lines += [f"{tag} {box} 1 {tag} 0" for tag in range(1, groups + 1)]
-    lines += [f"1 {box} 1 {groups + 1} 0", "$EndEntities"]
-    lines += ["$Nodes", f"1 {len(nodes)} 1 {len(nodes)}", f"2 1 0 {len(nodes)}"]
-    lines += [str(tag) for tag in range(1, len(nodes) + 1)]
-    lines += [f"{x:.15g} {y:.15g} 0" for x, y in nodes] + ["$EndNodes"]
-    blocks = [(1, tag, 1, cells) for tag, cells in enumerate(edges.values(), 1)] + [(2, 1, 2, triangles)]
-    total = sum(len(cells) for *_, cells in blocks)
-    lines += ["$Elements", f"{len(blocks)} {total} 1 {total}"]
-    number = 0
-    for dimension, tag, kind, cells in blocks:
-        lines.append(f"{dimension} {tag} {kind} {len(cells)}")
-        for cell in cells:
-            number += 1
-            lines.append(" ".join(map(str, (number, *cell))))
-    path.write_text("\n".join(lines + ["$EndElements"]) + "\n")
-
-
 for name, radial in (("coarse", 4), ("medium", 8), ("fine", 16)):
-    write(Path(__file__).parent / f"ring_{name}.msh", *ring(radial))
+    nodes, triangles, edges = ring(radial)
+    nodes = [f"{x:.15g} {y:.15g}" for x, y in nodes]
+    gmsh.write(Path(__file__).parent / f"ring_{name}.msh", nodes, (0, 0, OUTER, OUTER), edges, triangles)

@@ -8,7 +8,7 @@ use crate::{
         surface_points,
     },
     linear_algebra::tensor::{Vector, norm},
-    mesh::{Mesh, shape::facet_normal},
+    mesh::Mesh,
     parallel::{
         agreement::Agreed,
         exchange::{exchange_lists, gather},
@@ -166,15 +166,10 @@ fn paired_nodes<const D: usize>(
 
 /// A facet of this rank.
 fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) -> Facet<D> {
-    let corners = mesh.facets[facet as usize].map(|node| places[node as usize]);
-    let normal = facet_normal(&corners);
-    let size = norm(&normal);
-    Facet {
-        nodes: mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect(),
-        corners,
-        normal: normal.map(|n| n / size),
-        turns: mesh.facets[facet as usize].map(|node| mesh.turn(&mesh.nodes[node as usize])),
-    }
+    let of_corners = mesh.facets[facet as usize];
+    let nodes = mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect();
+    let turns = of_corners.map(|node| mesh.turn(&mesh.nodes[node as usize]));
+    Facet { turns, ..Facet::new(nodes, of_corners.map(|node| places[node as usize])) }
 }
 
 /// These facets of all ranks. Collective.
@@ -186,23 +181,12 @@ fn gather_facets<const D: usize>(
 ) -> Result<Vec<Facet<D>>, Agreed> {
     let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
     let nodes: Vec<u32> = own.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
-    let places: Vec<f64> = own
-        .iter()
-        .flat_map(|facet| facet.corners.as_flattened().iter().chain(&facet.normal).copied())
-        .collect();
+    let places: Vec<f64> = own.iter().flat_map(|facet| facet.corners.as_flattened()).copied().collect();
     let (nodes, places) = (gather(session.world(), &nodes)?, gather(session.world(), &places)?);
     let per_facet = if mesh.order() == 2 { D + D * (D - 1) / 2 } else { D };
-    let values = places.chunks_exact(D * (D + 1));
-    Ok(nodes
-        .chunks_exact(per_facet)
-        .zip(values)
-        .map(|(nodes, values)| Facet {
-            nodes: nodes.to_vec(),
-            corners: std::array::from_fn(|a| std::array::from_fn(|i| values[a * D + i])),
-            normal: std::array::from_fn(|i| values[D * D + i]),
-            turns: [1.0; D],
-        })
-        .collect())
+    let corners = places.chunks_exact(D * D);
+    let corners = corners.map(|all| std::array::from_fn(|a| std::array::from_fn(|i| all[a * D + i])));
+    Ok(nodes.chunks_exact(per_facet).zip(corners).map(|(nodes, at)| Facet::new(nodes.to_vec(), at)).collect())
 }
 
 /// The nodes of this rank, from the contributions of the facets around them.

@@ -21,29 +21,20 @@ pub fn edges_of_cell<const D: usize>() -> &'static [[usize; 2]] {
     &EDGES[..if D == 2 { 3 } else { 6 }]
 }
 
-/// Values of the shape functions of a quadratic cell at a point with these barycentric coordinates: those of the corners, then those of
-/// the nodes on the edges.
-pub fn quadratic_values<const D: usize>(place: &[f64; 4]) -> [f64; 10] {
-    let mut out = [0.0; 10];
-    for a in 0..=D {
-        out[a] = place[a] * (2.0 * place[a] - 1.0);
+/// The values at the corners of the linear function with the gradient that the quadratic function with these nodal values has at a point in
+/// barycentric coordinates, of a simplex with so many corners; of places the corners of the linear cell whose map has the same
+/// Jacobian there. Nodes are the corners, then those on the edges in the order of [`edges_of_cell`].
+pub fn linear_at<const M: usize>(corners: usize, place: &[f64], nodal: &[[f64; M]]) -> [[f64; M]; 4] {
+    let edges = &edges_of_cell::<3>()[..corners * (corners - 1) / 2];
+    let mut out = [[0.0; M]; 4];
+    for i in 0..corners {
+        out[i] = nodal[i].map(|value| (4.0 * place[i] - 1.0) * value);
     }
-    for (value, &[a, b]) in out[D + 1..].iter_mut().zip(edges_of_cell::<D>()) {
-        *value = 4.0 * place[a] * place[b];
-    }
-    out
-}
-
-/// Corners of the linear cell whose map has the Jacobian of a quadratic cell at a point with these barycentric coordinates; only the
-/// first `D + 1` of the four are meant. `nodes` are the corners, then the nodes on the edges in the order of [`edges_of_cell`].
-pub fn tangent_corners<const D: usize>(nodes: &[Vector<D>], place: &[f64; 4]) -> [Vector<D>; 4] {
-    let mut out = [[0.0; D]; 4];
-    for a in 0..=D {
-        out[a] = add_scaled(&out[a], 4.0 * place[a] - 1.0, &nodes[a]);
-    }
-    for (&[a, b], node) in edges_of_cell::<D>().iter().zip(&nodes[D + 1..]) {
-        out[a] = add_scaled(&out[a], 4.0 * place[b], node);
-        out[b] = add_scaled(&out[b], 4.0 * place[a], node);
+    for (value, &[i, j]) in nodal[corners..].iter().zip(edges) {
+        for k in 0..M {
+            out[i][k] += 4.0 * place[j] * value[k];
+            out[j][k] += 4.0 * place[i] * value[k];
+        }
     }
     out
 }
@@ -56,7 +47,7 @@ pub fn tangent_measures<const D: usize>(nodes: &[Vector<D>]) -> [f64; 2] {
         let share = 1.0 / f64::from(corners.count_ones());
         places.push(std::array::from_fn(|a| if corners >> a & 1 == 1 { share } else { 0.0 }));
     }
-    let measures = places.iter().map(|place| signed_measure(&tangent_corners(nodes, place)[..=D]));
+    let measures = places.iter().map(|place| signed_measure(&linear_at(D + 1, place, nodes)[..=D]));
     measures.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], measure| {
         [if measure >= low { low } else { measure }, if measure <= high { high } else { measure }]
     })
@@ -214,7 +205,7 @@ mod tests {
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
         let middles = edges_of_cell::<2>().iter().map(|&[a, b]| centroid(&[corners[a], corners[b]]));
         let nodes: Vec<Vector<2>> = corners.into_iter().chain(middles).map(map).collect();
-        let measure = |b: f64| signed_measure(&tangent_corners(&nodes, &[0.7 - b, 0.3, b, 0.0])[..3]);
+        let measure = |b: f64| signed_measure(&linear_at(3, &[0.7 - b, 0.3, b], &nodes)[..3]);
         assert!((measure(0.4) - 0.5 * 1.8).abs() < 1e-15 && (measure(0.0) - 0.5).abs() < 1e-15);
         let [low, high] = tangent_measures(&nodes);
         assert!((low - 0.5).abs() < 1e-15 && (high - 1.5).abs() < 1e-15);

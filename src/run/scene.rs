@@ -6,14 +6,12 @@ use crate::{
     fem::space::mortar::{Facet, contributions},
     io::partitioned::{self, PartitionedFile},
     job::{self, Job, Loaded, MeshSource, Partition},
-    linear_algebra::tensor::norm,
     mesh::{
         GlobalMesh, Mesh, distribute,
         file::{self, AnyMesh, MeshFile, Placement, Rotation},
         generate::{Blocks, Cuboid, Grading, Grid, Rectangle, Toward},
         other_side,
         partition::{Method, divide_with_pairs},
-        shape::facet_normal,
     },
     parallel::{agreement::Agreed, session::Session},
 };
@@ -89,12 +87,7 @@ fn facing_cells<const D: usize>(mesh: &GlobalMesh<D>, contacts: &[job::Contact])
         let named = mesh.boundaries.iter().filter(|boundary| names.contains(&boundary.name));
         named.flat_map(|boundary| boundary.facets.iter().map(|facet| *facet as usize)).collect()
     };
-    let facet = |&at: &usize| {
-        let corners = mesh.facet_corners(at);
-        let normal = facet_normal(&corners);
-        let size = norm(&normal);
-        Facet { nodes: mesh.facets[at].to_vec(), corners, normal: normal.map(|n| n / size), turns: [1.0; D] }
-    };
+    let facet = |&at: &usize| Facet::new(mesh.facets[at].to_vec(), mesh.facet_corners(at));
     let mut pairs = Vec::new();
     for contact in contacts {
         let faults = || contact.on.iter().map(|name| other_side(name)).collect();

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
-    io::output::probes::Probes,
+    io::output::{probed, probes::Probes},
     job::Loaded,
     linear_algebra::petsc::set_option,
     mesh::Mesh,
@@ -50,7 +50,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let paired = pairs::find(session, job, &mut mesh)?;
     let probes = session.agree(Probes::locate(session, &mesh, &job.output))?;
     let (mut body, mut state) = build::body::<D, S>(session, job, mesh, paired)?;
-    let fault = probes.fault(&body);
+    let fault = probed::fault(&job.output.probe_also, &body);
     let fault = fault.map(|[message, help]| loaded.fault("output.probe_also", message, help));
     session.agree(fault.map_or(Ok(()), Err))?;
     let began_from = transfer(session, loaded, &mut body, &mut state)?;

@@ -134,7 +134,7 @@ fn solve_linear(session: &Session) {
         ksp.set_method("cg").expect("cg");
         ksp.set_preconditioner(preconditioner, package).expect(preconditioner);
         ksp.set_tolerances(0.0, 1e-12, 100).expect("tolerances");
-        ksp.set_matrix(&matrix).expect("matrix");
+        ksp.set_matrices(&matrix, &matrix).expect("matrix");
         ksp.set_up().expect("set up");
         x.fill(0.0).expect("fill");
         let outcome = ksp.solve(&b, &mut x).expect("solve");
@@ -150,7 +150,7 @@ fn solve_linear(session: &Session) {
     short.set_method("cg").expect("cg");
     short.set_preconditioner("none", None).expect("none");
     short.set_tolerances(0.0, 1e-12, 1).expect("tolerances");
-    short.set_matrix(&matrix).expect("matrix");
+    short.set_matrices(&matrix, &matrix).expect("matrix");
     x.fill(0.0).expect("fill");
     let outcome = short.solve(&b, &mut x).expect("an outcome, not an error");
     assert!(!outcome.converged(), "{outcome:?}");
@@ -165,7 +165,7 @@ fn limited_iterations(session: &Session, prefix: &str) -> usize {
     ksp.set_preconditioner("none", None).expect("none");
     ksp.set_tolerances(0.0, 1e-300, 5).expect("tolerances");
     ksp.apply_options().expect("options");
-    ksp.set_matrix(&matrix).expect("matrix");
+    ksp.set_matrices(&matrix, &matrix).expect("matrix");
     let (mut b, mut x) = (vector(session), vector(session));
     set(session, &mut b, |u| (u as f64).sin());
     x.fill(0.0).expect("fill");
@@ -225,7 +225,7 @@ fn outlive(mpi: Mpi, session: Session) {
     set(&session, &mut x, |_| 1.0);
     let mut ksp = Ksp::new("").expect("solver");
     ksp.set_preconditioner("jacobi", None).expect("jacobi");
-    ksp.set_matrix(&matrix).expect("matrix");
+    ksp.set_matrices(&matrix, &matrix).expect("matrix");
     let all = share(&session).2;
     drop(session);
     drop(mpi);

@@ -5,10 +5,11 @@ use super::run_on;
 use super::scenes::{any_mesh, simulation, stir};
 use super::wave::Field;
 use clarke::{
-    fem::space::{cell_rule, linear_at, values},
+    fem::space::{cell_rule, values},
     mesh::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
+        shape::linear_at,
     },
     parallel::session::Session,
     run::Simulation,

@@ -8,15 +8,13 @@ use crate::{
             Contact, ContactNode, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents,
             Term, contact_nodes,
         },
-        space::{
-            Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, linear_at, nodal_forces, offsets,
-        },
+        space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, nodal_forces, offsets},
     },
     linear_algebra::{
         simd::Pack,
-        tensor::{Mandel, component, dot},
+        tensor::{Mandel, dot},
     },
-    mesh::Mesh,
+    mesh::{Mesh, shape::linear_at},
 };
 
 /// The cells of a body with their effects, and the effects at its surface beside contact.
@@ -200,23 +198,9 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
                 corners.iter_mut().for_each(|corner| corner[0] += offset);
             }
             let rate: Mandel<S> = cell.strain(&corners[..=D]);
-            let (mut stress, mut hoop_stress) = ([[0.0; D]; D], 0.0);
-            for (c, row) in tangent.chunks_exact(S).enumerate() {
-                let (i, j, factor) = component::<S>(c);
-                if i < D && j < D {
-                    let value: f64 = row.iter().zip(&rate).map(|(t, e)| t * e).sum();
-                    stress[i][j] = cell.volume * value / factor;
-                    stress[j][i] = stress[i][j];
-                } else if i == j {
-                    hoop_stress = cell.volume * dot(&std::array::from_fn(|d| row[d]), &rate);
-                }
-            }
-            let mut of_corners = [[0.0; D]; 4];
-            for (a, force) in of_corners.iter_mut().enumerate().take(D + 1) {
-                let gradient = cell.gradient(a);
-                *force = std::array::from_fn(|i| dot(&stress[i], &gradient));
-                force[0] += if D == 2 { hoop_stress * cell.hoop[a] } else { 0.0 };
-            }
+            let stress: Mandel<S> =
+                std::array::from_fn(|c| dot(&std::array::from_fn(|d| tangent[S * c + d]), &rate));
+            let of_corners = cell.forces(&stress);
             let mut add = |node: u32, force: &[f64; D]| {
                 let target = &mut forces[node as usize * D..][..D];
                 target.iter_mut().zip(force).for_each(|(target, force)| *target += force);

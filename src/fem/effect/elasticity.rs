@@ -1,10 +1,10 @@
 use super::{
-    Curvature, Effect, ElasticLaw, Energy, EnergyKind, Evaluation, NUMERICAL, Outcome, Phases, Role, Step,
-    StressError, Term, isotropic,
+    Curvature, Effect, ElasticLaw, ElasticTensor, Energy, EnergyKind, Evaluation, NUMERICAL, Outcome, Phases,
+    Role, Step, StressError, Term, linear,
 };
 use crate::{
     fem::space::{Batch, Integrity, Needs},
-    laws::material::ByMaterial,
+    laws::material::{ByMaterial, Isotropic},
     linear_algebra::{
         simd::Pack,
         tensor::{add_scaled, dot},
@@ -17,14 +17,14 @@ pub const ELASTIC: EnergyKind = EnergyKind::new(1, Role::Stored, "elastic_energy
 /// Elastic stress `E e(u)`: of the converged displacement, `E e(u_{n-1})` in (24), or of that at the end of the step, `u_n = u~ + k' v_n`,
 /// where `E e(u~)` is known at the start of the step and `k' E` is part of the matrix.
 #[derive(Debug)]
-pub struct Elasticity {
+pub struct Elasticity<T = Isotropic> {
     /// The elastic materials.
-    pub law: ByMaterial<ElasticLaw>,
+    pub law: ByMaterial<ElasticLaw<T>>,
 }
 
-impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
+impl<T: ElasticTensor, const D: usize, const S: usize> Effect<D, S> for Elasticity<T> {
     fn name(&self) -> &'static str {
-        "elasticity"
+        T::ELASTICITY
     }
 
     fn phases(&self, at: Evaluation) -> Phases {
@@ -40,18 +40,18 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
     }
 
     fn term(&self) -> Term<'_> {
-        Term::Elasticity(&self.law)
+        T::term(&self.law)
     }
 
     fn evaluate(&mut self, _: Evaluation, _: Step, batch: &mut Batch<D, S>, _: &mut Outcome) {
         let Some(law) = self.law.get(batch.material) else { return };
-        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
+        linear::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
     }
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
         let sound = Integrity::default();
-        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &sound, &mut batch.elastic_stress);
+        linear::add_stresses(&law.tensor, 1.0, &batch.strain, &sound, &mut batch.elastic_stress);
     }
 
     fn add_stress(&self, at: Evaluation, step: Step, batch: &mut Batch<D, S>) {
@@ -59,12 +59,12 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
         let before = |lane| add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane));
         let is_lagged = at == Evaluation::Converged;
         let strain = if is_lagged { Pack::from_lanes(before) } else { batch.strain };
-        isotropic::add_stresses(&law.tensor, 1.0, &strain, &batch.integrity, &mut batch.stress);
+        linear::add_stresses(&law.tensor, 1.0, &strain, &batch.integrity, &mut batch.stress);
     }
 
     fn add_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material) else { return };
-        let square = |strains| isotropic::square(&law.tensor, batch.cells, &batch.integrity, strains);
+        let square = |strains| linear::square(&law.tensor, batch.cells, &batch.integrity, strains);
         if !law.with_history {
             energy[ELASTIC] += 0.5 * square(&batch.strain);
         }
@@ -80,14 +80,14 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
             let strain = batch.strain.lane(lane);
             let change = add_scaled(&strain, -1.0, &batch.strain_before.lane(lane));
             let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
-            let jump = 0.5 * dot(&change, &law.tensor.apply(&change));
-            let work = dot(&law.tensor.apply(&strain), &beside);
+            let jump = 0.5 * dot(&change, &law.tensor.stress(&change));
+            let work = dot(&law.tensor.stress(&strain), &beside);
             energy[NUMERICAL] += share[lane] * batch.cells.volume[lane] * (work - jump);
         }
     }
 
     fn add_error(&self, _: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
-        error.size += isotropic::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
+        error.size += linear::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
     }
 }

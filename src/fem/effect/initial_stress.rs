@@ -1,5 +1,5 @@
 use super::{
-    Curvature, ELASTIC, Effect, Energy, Evaluation, NUMERICAL, Outcome, Phases, Step, StressError, isotropic,
+    Curvature, ELASTIC, Effect, Energy, Evaluation, NUMERICAL, Outcome, Phases, Step, StressError, linear,
 };
 use crate::{
     fem::space::{Batch, Integrity, Needs},
@@ -34,8 +34,8 @@ impl<const S: usize> InitialStress<S> {
     fn square<const D: usize>(&self, batch: &Batch<D, S>) -> f64 {
         let Some((law, stress)) = self.of(batch) else { return 0.0 };
         let (cells, integrity) = (batch.cells, &batch.integrity);
-        isotropic::inverse_square(law, cells, integrity, &batch.strain, stress)
-            - isotropic::square(law, cells, integrity, &batch.strain)
+        linear::inverse_square(law, cells, integrity, &batch.strain, stress)
+            - linear::square(law, cells, integrity, &batch.strain)
     }
 }
 
@@ -52,17 +52,17 @@ impl<const D: usize, const S: usize> Effect<D, S> for InitialStress<S> {
 
     fn evaluate(&mut self, _: Evaluation, _: Step, batch: &mut Batch<D, S>, _: &mut Outcome) {
         let Some((_, stress)) = self.of(batch) else { return };
-        isotropic::add_histories(stress, &batch.integrity, &mut batch.stress);
+        linear::add_histories(stress, &batch.integrity, &mut batch.stress);
     }
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
         let Some((_, stress)) = self.of(batch) else { return };
-        isotropic::add_histories(stress, &Integrity::default(), &mut batch.elastic_stress);
+        linear::add_histories(stress, &Integrity::default(), &mut batch.elastic_stress);
     }
 
     fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {
         let Some((_, stress)) = self.of(batch) else { return };
-        isotropic::add_histories(stress, &batch.integrity, &mut batch.stress);
+        linear::add_histories(stress, &batch.integrity, &mut batch.stress);
     }
 
     fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {

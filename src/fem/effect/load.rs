@@ -3,7 +3,7 @@
 use super::{EnergyKind, Role};
 use crate::{
     error::{Error, Result},
-    fem::space::{CellShape, Geometry, cell_rule, facet_points, fine_cell_rule, values},
+    fem::space::{CellShape, Geometry, cell_rule, facet_points, fine_cell_rule},
     job::{BodyForce, Scalar},
     laws::material::ByMaterial,
     linear_algebra::tensor::{Vector, add_scaled},
@@ -150,10 +150,7 @@ fn forces_in_cells<const D: usize>(
             continue;
         }
         for (k, (place, weight)) in fine_cell_rule::<D>().iter().enumerate() {
-            let mut shares = values(D + 1, place);
-            if let CellShape::LinearRing(_) = cell.shape() {
-                shares[..=D].copy_from_slice(&place[..=D]);
-            }
+            let shares = cell.shape().values::<D>(place);
             let coordinates = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]);
             let value = of_place(&point(coordinates, &shares))?;
             let weight = match cell.shape() {

@@ -3,7 +3,7 @@
 use crate::{
     fem::space::{
         Batch, CellShape, MOST_NODES, MOST_POINTS, MassCoefficients, NodalPacks, OPPOSITE, SimplexPack,
-        cell_rule, edges, fine_cell_rule, node_count, values,
+        cell_rule, edges, fine_cell_rule,
     },
     laws::material::ByMaterial,
     linear_algebra::simd::{LANES, sum},
@@ -24,12 +24,8 @@ pub(super) fn add_to_batch<const D: usize, const S: usize>(
             add(factor, batch.cells, &batch.velocity, &mut batch.force);
         }
         CellShape::Straight => add_straight(factor, batch.cells, &batch.velocity, &mut batch.force),
-        CellShape::Curved(weights) => {
-            let rule = (weights, node_count::<D>(), |at: &[f64; 4]| values(D + 1, at));
-            add_weighted(factor, rule, &batch.velocity, &mut batch.force);
-        }
-        CellShape::LinearRing(weights) => {
-            add_weighted(factor, (weights, D + 1, linear_values), &batch.velocity, &mut batch.force);
+        CellShape::Curved(weights) | CellShape::LinearRing(weights) => {
+            add_weighted((batch.shape, weights), factor, &batch.velocity, &mut batch.force);
         }
     }
 }
@@ -44,19 +40,10 @@ pub(super) fn square<const D: usize, const S: usize>(
         CellShape::Linear => square_linear(density, batch.cells, nodal),
         _ if batch.point > 0 => 0.0,
         CellShape::Straight => square_straight(density, batch.cells, nodal),
-        CellShape::Curved(weights) => {
-            let rule = (weights, node_count::<D>(), |at: &[f64; 4]| values(D + 1, at));
-            square_weighted(density, rule, nodal)
+        CellShape::Curved(weights) | CellShape::LinearRing(weights) => {
+            square_weighted((batch.shape, weights), density, nodal)
         }
-        CellShape::LinearRing(weights) => square_weighted(density, (weights, D + 1, linear_values), nodal),
     }
-}
-
-/// The linear functions of the corners at a place, as [`values`] of all nodes.
-fn linear_values(place: &[f64; 4]) -> [f64; MOST_NODES] {
-    let mut out = [0.0; MOST_NODES];
-    out[..4].copy_from_slice(place);
-    out
 }
 
 /// Adds `factor * volume` times each nodal velocity and the sum of them all to the nodal forces.
@@ -138,20 +125,20 @@ fn times_straight<const D: usize>(nodal: &NodalPacks<D>, i: usize, lane: usize) 
     out
 }
 
-/// The weights of the points of the fine rule, the number of nodes, and the values of their functions at a place.
-type Weighted<'a, F> = (&'a [[f64; LANES]; MOST_POINTS], usize, F);
+/// The shape of cells whose mass is summed over the points of the fine rule, and the weights of these points.
+type Weighted<'a> = (CellShape<'a>, &'a [[f64; LANES]; MOST_POINTS]);
 
 /// The mass matrix of a cell of density 1 times component `i` of nodal values.
 #[inline(always)]
 fn times_weighted<const D: usize>(
-    (weights, nodes, values): Weighted<impl Fn(&[f64; 4]) -> [f64; MOST_NODES]>,
+    (shape, weights): Weighted,
     nodal: &NodalPacks<D>,
     i: usize,
     lane: usize,
 ) -> [f64; MOST_NODES] {
-    let mut out = [0.0; MOST_NODES];
+    let (nodes, mut out) = (shape.nodes::<D>(), [0.0; MOST_NODES]);
     for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
-        let shares = values(place);
+        let shares = shape.values::<D>(place);
         let mut value = 0.0;
         for a in 0..nodes {
             value += shares[a] * nodal[a].0[i][lane];
@@ -199,32 +186,28 @@ fn square_straight<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal: 
 }
 
 fn add_weighted<const D: usize>(
+    weighted: Weighted,
     factor: f64,
-    weighted: Weighted<impl Fn(&[f64; 4]) -> [f64; MOST_NODES] + Copy>,
     velocities: &NodalPacks<D>,
     forces: &mut NodalPacks<D>,
 ) {
     for i in 0..D {
         for lane in 0..LANES {
             let momentum = times_weighted(weighted, velocities, i, lane);
-            for (force, momentum) in forces.iter_mut().zip(momentum).take(weighted.1) {
+            for (force, momentum) in forces.iter_mut().zip(momentum).take(weighted.0.nodes::<D>()) {
                 force.0[i][lane] += factor * momentum;
             }
         }
     }
 }
 
-fn square_weighted<const D: usize>(
-    density: f64,
-    weighted: Weighted<impl Fn(&[f64; 4]) -> [f64; MOST_NODES] + Copy>,
-    nodal: &NodalPacks<D>,
-) -> f64 {
+fn square_weighted<const D: usize>(weighted: Weighted, density: f64, nodal: &NodalPacks<D>) -> f64 {
     let mut integrals = [0.0; LANES];
     for i in 0..D {
         for lane in 0..LANES {
             let momentum = times_weighted(weighted, nodal, i, lane);
             let products = momentum.iter().zip(nodal).map(|(m, value)| m * value.0[i][lane]);
-            integrals[lane] += products.take(weighted.1).sum::<f64>();
+            integrals[lane] += products.take(weighted.0.nodes::<D>()).sum::<f64>();
         }
     }
     density * sum(&integrals)

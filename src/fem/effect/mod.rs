@@ -6,8 +6,6 @@
 //! An effect is called only in the phases that it declares in [`Effect::phases`].
 
 mod adhesion;
-mod anisotropic;
-mod anisotropic_elasticity;
 mod carriers;
 mod cell_history;
 mod contact;
@@ -21,7 +19,7 @@ mod history;
 mod inertia;
 mod initial_stress;
 mod interior;
-mod isotropic;
+mod linear;
 mod load;
 mod mass;
 mod mass_damping;
@@ -50,7 +48,6 @@ use crate::{
 use crate::laws::step::quantity;
 pub use crate::laws::step::{Blend, Evaluation, Moment, Quantity, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
-pub use anisotropic_elasticity::AnisotropicElasticity;
 pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
     Decrease, Freedom, Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
@@ -75,7 +72,7 @@ pub use step_error::{CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLE
 pub use support::{SupportMotion, Supports};
 pub use surface::{SurfaceEffect, SurfaceForce};
 pub use tangents::Tangents;
-pub use term::{ElasticLaw, FlowProperties, Form, Term};
+pub use term::{ElasticLaw, ElasticTensor, FlowProperties, Form, Term};
 pub use viscoplastic_flow::{STRESS_OF_FLOW, VISCOPLASTIC, ViscoplasticFlow};
 pub use viscous_stress::{VISCOUS, ViscousStress};
 
@@ -113,9 +110,11 @@ pub fn effects<const D: usize, const S: usize>(
     if let Some(law) = by_material(materials, elastic_law::<S>) {
         effects.push(Box::new(Elasticity { law }));
     }
-    let orthotropic = |m: &Material<f64>| Some(m.orthotropic?.tensor(Hypothesis::of(S)));
+    let orthotropic = |m: &Material<f64>| {
+        Some(ElasticLaw { tensor: m.orthotropic?.tensor(Hypothesis::of(S)), with_history: false })
+    };
     if let Some(law) = by_material(materials, orthotropic) {
-        effects.push(Box::new(AnisotropicElasticity { law }));
+        effects.push(Box::new(Elasticity { law }));
     }
     if let Some(tensor) = by_material(materials, |m| m.viscosity_tensor(Hypothesis::of(S))) {
         effects.push(Box::new(ViscousStress { tensor }));

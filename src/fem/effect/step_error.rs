@@ -1,6 +1,6 @@
 //! The error that a step makes in stresses and histories.
 
-use super::{Step, isotropic};
+use super::{Step, linear};
 use crate::{fem::space::Batch, laws::material::Isotropic, linear_algebra::simd::Pack};
 
 /// The deviation of the next value from the straight line through the last two: `k_n / (k_n + k_{n-1}) (x_n - x_{n-1} - w (x_{n-1} -
@@ -53,8 +53,8 @@ impl StressError {
             std::array::from_fn(|c| curvature.error([now, before, earlier].map(|values| values.0[c][lane])))
         });
         let (cells, integrity) = (batch.cells, &batch.integrity);
-        self.error += isotropic::inverse_square(elasticity, cells, integrity, &Pack::ZERO, &error);
-        self.size += isotropic::inverse_square(elasticity, cells, integrity, &batch.strain, now);
+        self.error += linear::inverse_square(elasticity, cells, integrity, &Pack::ZERO, &error);
+        self.size += linear::inverse_square(elasticity, cells, integrity, &batch.strain, now);
     }
 }
 

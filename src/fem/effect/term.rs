@@ -1,9 +1,9 @@
 //! Effects as terms of the linearised equation of motion: its matrix and the certificates are made of them.
 
-use super::{anisotropic, isotropic, mass};
+use super::{linear, mass};
 use crate::{
     fem::space::{Batch, Cell, CellMatrix},
-    laws::material::{Anisotropic, ByMaterial, Isotropic},
+    laws::material::{Anisotropic, ByMaterial, Isotropic, LinearTensor},
 };
 
 /// A quadratic form of the velocity.
@@ -21,11 +21,36 @@ pub enum Form {
 
 /// An elastic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ElasticLaw {
+pub struct ElasticLaw<T = Isotropic> {
     /// The elastic tensor `E` in Pa.
-    pub tensor: Isotropic,
+    pub tensor: T,
     /// Whether a history adds to the elastic stress, which then accounts for its energy.
     pub with_history: bool,
+}
+
+/// The tensor of an elastic material.
+pub trait ElasticTensor: LinearTensor {
+    /// The name of its effect.
+    const ELASTICITY: &'static str;
+
+    /// The term of its effect.
+    fn term(law: &ByMaterial<ElasticLaw<Self>>) -> Term<'_>;
+}
+
+impl ElasticTensor for Isotropic {
+    const ELASTICITY: &'static str = "elasticity";
+
+    fn term(law: &ByMaterial<ElasticLaw>) -> Term<'_> {
+        Term::Elasticity(law)
+    }
+}
+
+impl ElasticTensor for Anisotropic {
+    const ELASTICITY: &'static str = "anisotropic_elasticity";
+
+    fn term(law: &ByMaterial<ElasticLaw<Self>>) -> Term<'_> {
+        Term::Anisotropic(law)
+    }
 }
 
 /// Explicit or implicit flow as the stability of steps and the solver see it.
@@ -50,8 +75,8 @@ pub enum Term<'a> {
     Viscosity(&'a ByMaterial<Isotropic>),
     /// Elasticity.
     Elasticity(&'a ByMaterial<ElasticLaw>),
-    /// Elasticity that is not isotropic, with its tensor in Pa.
-    Anisotropic(&'a ByMaterial<Anisotropic>),
+    /// Elasticity that is not isotropic.
+    Anisotropic(&'a ByMaterial<ElasticLaw<Anisotropic>>),
     /// Flow.
     Flow(FlowProperties),
     /// Nothing that the matrix or a certificate contains.
@@ -86,7 +111,7 @@ impl Term<'_> {
             Self::Viscosity(tensor) => tensor.get(material).copied(),
             Self::Elasticity(law) => law.get(material).map(|law| law.tensor),
             Self::Anisotropic(law) => {
-                law.get(material).map(|law| Isotropic { volumetric: 0.0, shear: law.most() })
+                law.get(material).map(|law| Isotropic { volumetric: 0.0, shear: law.tensor.most() })
             }
             Self::Mass(_) | Self::Drag(_) | Self::Flow(_) | Self::Absent => None,
         }
@@ -115,14 +140,12 @@ impl Term<'_> {
                 matrix.add_mass(cell, factor * coefficient);
             }
         } else if let Self::Anisotropic(law) = self {
-            if let Some(tensor) = law.get(material) {
-                matrix.add_form(cell, |slopes, volume| {
-                    tensor.block(slopes).map(|row| row.map(|entry| length * volume * entry))
-                });
+            if let Some(law) = law.get(material) {
+                matrix.add_form(cell, length, &law.tensor);
             }
         } else if let Some(tensor) = self.tensor(material) {
             let factor = if matches!(self, Self::Elasticity(_)) { length } else { 1.0 };
-            matrix.add_isotropic(cell, factor * tensor.volumetric, factor * tensor.shear);
+            matrix.add_form(cell, factor, &tensor);
         }
     }
 
@@ -131,11 +154,17 @@ impl Term<'_> {
         if let Some((coefficient, _)) = self.of_values(1.0) {
             mass::add_to_batch(coefficient, 1.0, batch);
         } else if let Self::Anisotropic(law) = self {
-            if let Some(tensor) = law.get(batch.material) {
-                anisotropic::add_stresses(tensor, -1.0, &batch.strain_rate, &mut batch.stress);
+            if let Some(law) = law.get(batch.material) {
+                linear::add_stresses(
+                    &law.tensor,
+                    -1.0,
+                    &batch.strain_rate,
+                    &batch.integrity,
+                    &mut batch.stress,
+                );
             }
         } else if let Some(tensor) = self.tensor(batch.material) {
-            isotropic::add_stresses(&tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
+            linear::add_stresses(&tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
         }
     }
 }
@@ -166,7 +195,8 @@ mod tests {
         let v: Vec<f64> = (0..mesh.nodes.len() * D).map(number).collect();
         let density = ByMaterial::uniform(1.7);
         let tensor = ByMaterial::uniform(Isotropic { volumetric: 7.0, shear: 3.0 });
-        let wood = ByMaterial::uniform(WOOD.tensor(Hypothesis::of(S)));
+        let tensor_of_wood = WOOD.tensor(Hypothesis::of(S));
+        let wood = ByMaterial::uniform(ElasticLaw { tensor: tensor_of_wood, with_history: false });
         for (term, size) in [
             (Term::Mass(&density), 0),
             (Term::Anisotropic(&wood), 2),

@@ -1,4 +1,4 @@
-use super::{Effect, Energy, EnergyKind, Evaluation, Phases, Role, Step, Term, isotropic};
+use super::{Effect, Energy, EnergyKind, Evaluation, Phases, Role, Step, Term, linear};
 use crate::{
     fem::space::{Batch, Integrity, Needs},
     laws::material::{ByMaterial, Isotropic},
@@ -31,12 +31,12 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
     fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
         let whole = Integrity::default();
-        isotropic::add_stresses(tensor, 1.0, &batch.strain_rate, &whole, &mut batch.stress);
+        linear::add_stresses(tensor, 1.0, &batch.strain_rate, &whole, &mut batch.stress);
     }
 
     fn add_energy(&self, _: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
         let whole = Integrity::default();
-        energy[VISCOUS] += step.length * isotropic::square(tensor, batch.cells, &whole, &batch.strain_rate);
+        energy[VISCOUS] += step.length * linear::square(tensor, batch.cells, &whole, &batch.strain_rate);
     }
 }

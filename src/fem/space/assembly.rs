@@ -2,12 +2,13 @@
 
 use super::{
     Cell, CellShape, Geometry, Held, Simplex,
-    quadratic::{MOST_NODES, MassCoefficients, derivatives, node_count, offsets, values},
+    quadratic::{MOST_NODES, MassCoefficients, derivatives, node_count, offsets},
     quadrature::{CellRule, cell_rule, fine_cell_rule},
 };
 use crate::{
     error::Result,
-    linear_algebra::{petsc::BlockRows, tensor::Vector},
+    laws::material::LinearTensor,
+    linear_algebra::petsc::BlockRows,
     mesh::Mesh,
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
@@ -87,53 +88,18 @@ impl<const D: usize> CellMatrix<D> {
         self.blocks[..nodes].iter_mut().for_each(|row| row[..nodes].fill([[0.0; D]; D]));
     }
 
-    /// Adds `integral of e(w) : T(e(v))` with `T` isotropic.
+    /// Adds `factor * integral of e(w) : T(e(v))`.
     #[inline]
-    pub fn add_isotropic(&mut self, cell: Cell<'_, D>, volumetric: f64, shear: f64) {
-        if let CellShape::Linear | CellShape::LinearRing(_) = cell.shape() {
-            add_linear(&mut self.blocks, &cell.point(0), volumetric, shear);
-            return;
-        }
-        self.add_products_of(cell, |cell| {
-            let mut blocks = [[[[0.0; D]; D]; 4]; 4];
-            add_linear(&mut blocks, cell, volumetric, shear);
-            blocks
-        });
-    }
-
-    /// Adds a form of the strains of velocities, given its block for the gradients of two barycentric coordinates, each with the hoop
-    /// strain of its radial velocity, and the volume.
-    pub fn add_form(&mut self, cell: Cell<'_, D>, block: impl Fn([(Vector<D>, f64); 2], f64) -> Block<D>) {
+    pub fn add_form(&mut self, cell: Cell<'_, D>, factor: f64, tensor: &impl LinearTensor) {
         let linear = |cell: &Simplex<D>| {
-            let slope = |a: usize| (cell.gradient(a), cell.hoop.get(a).copied().unwrap_or(0.0));
             let mut blocks = [[[[0.0; D]; D]; 4]; 4];
-            for (a, row) in blocks.iter_mut().enumerate().take(D + 1) {
-                for (b, entry) in row.iter_mut().enumerate().take(D + 1) {
-                    *entry = block([slope(a), slope(b)], cell.volume);
-                }
-            }
+            add_linear(&mut blocks, cell, factor, tensor);
             blocks
         };
-        if !matches!(cell.shape(), CellShape::Linear | CellShape::LinearRing(_)) {
-            self.add_products_of(cell, linear);
-            return;
-        }
-        let added = linear(&cell.point(0));
-        for (row, added) in self.blocks.iter_mut().zip(&added) {
-            for (block, added) in row.iter_mut().zip(added) {
-                for i in 0..D {
-                    for j in 0..D {
-                        block[i][j] += added[i][j];
-                    }
-                }
-            }
-        }
-    }
-
-    /// Adds the matrix of a quadratic cell, given those of linear ones.
-    fn add_products_of(&mut self, cell: Cell<'_, D>, linear: impl Fn(&Simplex<D>) -> [[Block<D>; 4]; 4]) {
         match cell.shape() {
-            CellShape::Linear | CellShape::LinearRing(_) => {}
+            CellShape::Linear | CellShape::LinearRing(_) => {
+                add_linear(&mut self.blocks, &cell.point(0), factor, tensor);
+            }
             CellShape::Straight => add_products(&mut self.blocks, &self.products, &linear(&cell.whole())),
             CellShape::Curved(_) => {
                 for (point, products) in self.products_at.iter().enumerate() {
@@ -155,16 +121,10 @@ impl<const D: usize> CellMatrix<D> {
                 let (form, size) = (MassCoefficients::of::<D>(), factor * cell.whole().volume);
                 self.add_scalar(|a, b| size * form.entry::<D>(a, b));
             }
-            CellShape::Curved(weights) => {
+            CellShape::Curved(weights) | CellShape::LinearRing(weights) => {
                 for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
-                    let (all, size) = (values(D + 1, place), factor * weights[cell.lane()]);
+                    let (all, size) = (cell.shape().values::<D>(place), factor * weights[cell.lane()]);
                     self.add_scalar(|a, b| size * all[a] * all[b]);
-                }
-            }
-            CellShape::LinearRing(weights) => {
-                for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
-                    let size = factor * weights[cell.lane()];
-                    self.add_scalar(|a, b| size * place[a] * place[b]);
                 }
             }
         }
@@ -189,29 +149,13 @@ impl<const D: usize> CellMatrix<D> {
 fn add_linear<const D: usize, const N: usize>(
     blocks: &mut [[Block<D>; N]; N],
     cell: &Simplex<D>,
-    volumetric: f64,
-    shear: f64,
+    factor: f64,
+    tensor: &impl LinearTensor,
 ) {
+    let slope = |a: usize| (cell.gradient(a), cell.hoop.get(a).copied().unwrap_or(0.0));
     for a in 0..=D {
-        let ga = cell.gradient(a);
         for b in 0..=D {
-            let gb = cell.gradient(b);
-            let inner = 0.5 * shear * crate::linear_algebra::tensor::dot(&ga, &gb);
-            let block = &mut blocks[a][b];
-            for i in 0..D {
-                for j in 0..D {
-                    block[i][j] += cell.volume * (volumetric * ga[i] * gb[j] + 0.5 * shear * ga[j] * gb[i]);
-                }
-                block[i][i] += cell.volume * inner;
-            }
-            if D == 2 && cell.hoop != [0.0; 3] {
-                let (volumetric, [ha, hb]) = (cell.volume * volumetric, [cell.hoop[a], cell.hoop[b]]);
-                for i in 0..D {
-                    block[0][i] += volumetric * ha * gb[i];
-                    block[i][0] += volumetric * ga[i] * hb;
-                }
-                block[0][0] += (volumetric + cell.volume * shear) * ha * hb;
-            }
+            tensor.add_block(factor, cell.volume, [&slope(a), &slope(b)], &mut blocks[a][b]);
         }
     }
 }

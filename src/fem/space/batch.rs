@@ -235,15 +235,13 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
     /// Adds the force outputs and the divergence of the stress outputs to nodal forces (`D` a node, with ghosts). Once called at a
     /// point of cells, it must be called at their last one, see [`Batch::holds_forces`].
     pub fn scatter(&mut self, mesh: &Mesh<D>, forces: &mut [f64]) {
-        match self.shape {
-            CellShape::Linear | CellShape::LinearRing(_) => scatter(self, self.nodes(mesh), forces),
-            _ => {
-                add_forces_at_point(self);
-                self.holds_forces = self.point + 1 < cell_rule::<D>().len();
-                if !self.holds_forces {
-                    scatter_all(self, mesh, forces);
-                }
-            }
+        if self.shape.is_linear() {
+            return scatter(self, self.nodes(mesh), forces);
+        }
+        add_forces_at_point(self);
+        self.holds_forces = self.point + 1 < cell_rule::<D>().len();
+        if !self.holds_forces {
+            scatter_all(self, mesh, forces);
         }
     }
 
@@ -414,11 +412,9 @@ fn scatter_all<const D: usize, const S: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::space::{
-        quadratic::linear_at,
-        samples::{number, quadratic, revolved, row},
-    };
+    use crate::fem::space::samples::{number, quadratic, revolved, row};
     use crate::linear_algebra::tensor::{Mandel, Vector, apply, symmetric_part};
+    use crate::mesh::shape::linear_at;
 
     fn close<const N: usize>(found: [f64; N], expected: [f64; N]) {
         for i in 0..N {

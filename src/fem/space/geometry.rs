@@ -7,15 +7,18 @@
 //! multiple of the radial displacements at the corners of its linear cell.
 
 use super::{
-    quadratic::{linear_at, place_in_cell},
+    quadratic::{MOST_NODES, node_count, place_in_cell, values},
     quadrature::{CENTROID, MOST_POINTS, cell_rule, fine_cell_rule},
 };
 use crate::{
     linear_algebra::{
         simd::{LANES, Pack, prefetch},
-        tensor::{Mandel, Vector, symmetric_part},
+        tensor::{Mandel, Vector, component, dot, symmetric_part},
     },
-    mesh::{Mesh, shape},
+    mesh::{
+        Mesh,
+        shape::{self, linear_at},
+    },
 };
 
 /// One linear cell, or a point of a quadratic one: its volume and the gradients of its linear shape functions.
@@ -84,6 +87,28 @@ impl<const D: usize> Simplex<D> {
         let mut out = symmetric_part(&self.field_gradient(nodal));
         if S == 4 {
             out[2] = self.hoop.iter().zip(nodal).map(|(hoop, value)| hoop * value[0]).sum();
+        }
+        out
+    }
+
+    /// Forces in N on the corners that a stress in Pa resists, the transpose of [`Simplex::strain`].
+    #[inline(always)]
+    pub fn forces<const S: usize>(&self, stress: &Mandel<S>) -> [Vector<D>; 4] {
+        let mut inner = [[0.0; D]; D];
+        for (c, value) in stress.iter().enumerate() {
+            let (i, j, factor) = component::<S>(c);
+            if i < D && j < D {
+                inner[i][j] = self.volume * value / factor;
+                inner[j][i] = inner[i][j];
+            }
+        }
+        let mut out = [[0.0; D]; 4];
+        for (a, force) in out.iter_mut().enumerate().take(D + 1) {
+            let gradient = self.gradient(a);
+            *force = std::array::from_fn(|i| dot(&inner[i], &gradient));
+            if S == 4 {
+                force[0] += self.volume * stress[2] * self.hoop[a];
+            }
         }
         out
     }
@@ -182,6 +207,31 @@ pub enum CellShape<'g> {
     LinearRing(&'g [[f64; LANES]; MOST_POINTS]),
 }
 
+impl CellShape<'_> {
+    /// Whether the shape functions are linear.
+    #[inline(always)]
+    pub fn is_linear(&self) -> bool {
+        matches!(self, Self::Linear | Self::LinearRing(_))
+    }
+
+    /// Number of nodes of a cell.
+    #[inline(always)]
+    pub fn nodes<const D: usize>(&self) -> usize {
+        if self.is_linear() { D + 1 } else { node_count::<D>() }
+    }
+
+    /// The functions of these nodes at a place in barycentric coordinates.
+    #[inline(always)]
+    pub fn values<const D: usize>(&self, place: &[f64; 4]) -> [f64; MOST_NODES] {
+        if !self.is_linear() {
+            return values(D + 1, place);
+        }
+        let mut out = [0.0; MOST_NODES];
+        out[..=D].copy_from_slice(&place[..=D]);
+        out
+    }
+}
+
 /// One cell with all its points.
 #[derive(Debug, Clone, Copy)]
 pub struct Cell<'g, const D: usize> {
@@ -226,10 +276,10 @@ impl<'g, const D: usize> Cell<'g, D> {
     #[inline(always)]
     pub fn whole(self) -> Simplex<D> {
         let first = self.point(0);
-        match self.shape() {
-            CellShape::Linear | CellShape::LinearRing(_) => first,
-            _ => Simplex { volume: (0..self.points()).map(|q| self.point(q).volume).sum(), ..first },
+        if self.shape().is_linear() {
+            return first;
         }
+        Simplex { volume: (0..self.points()).map(|q| self.point(q).volume).sum(), ..first }
     }
 }
 
@@ -420,6 +470,20 @@ mod tests {
                 assert!((gradient[i][j] - matrix[i][j]).abs() < 1e-13);
             }
         }
+    }
+
+    #[test]
+    fn the_work_of_the_forces_of_a_stress_is_that_of_the_stress() {
+        let corners = [[0.1, 0.2], [1.0, 0.1], [0.2, 1.3]];
+        let cell = Simplex::new(&corners).revolved(&[0.2, 0.3, 0.5], 0.42, 2.6);
+        let (moved, stress) = ([[0.1, -0.3], [0.4, 0.2], [-0.7, 0.6]], [3.0, -1.0, 5.0, 2.0]);
+        let forces = cell.forces(&stress);
+        let work: f64 = moved.iter().zip(&forces).map(|(u, force)| dot(u, force)).sum();
+        let expected = cell.volume * dot(&stress, &cell.strain(&moved));
+        assert!((work - expected).abs() < 1e-14 * expected.abs(), "{work} {expected}");
+        // A body on which only the hoop stress acts is pushed away from the axis.
+        let total: f64 = cell.forces(&[0.0, 0.0, 1.0, 0.0]).iter().map(|force| force[0]).sum();
+        assert!((total - cell.volume / 0.42).abs() < 1e-14 * total, "{total}");
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub(super) fn gather<const D: usize>(count: usize, nodes: &[u32], nodal: &[[f64;
 }
 
 /// The values at the corners of the linear functions with the gradients that quadratic functions have at a point, as
-/// [`super::quadratic::linear_at`] of one cell.
+/// [`linear_at`](crate::mesh::shape::linear_at) of one cell.
 #[inline(always)]
 pub(super) fn linear_at<const D: usize>(place: &[f64; 4], nodal: &NodalPacks<D>) -> [Pack<D>; 4] {
     let mut out = [Pack::ZERO; 4];

@@ -20,8 +20,7 @@ pub use held::{Held, Slanted};
 pub use kernels::NodalPacks;
 pub use linear_subspace::linear_subspace;
 pub use quadratic::{
-    MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, node_count, offsets,
-    place_in_cell, values,
+    MOST_NODES, MassCoefficients, OPPOSITE, edges, nodal_forces, node_count, offsets, place_in_cell, values,
 };
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};
 pub use surface::{

@@ -81,21 +81,6 @@ pub fn offsets(corners: usize, place: &[f64; 4]) -> [f64; MOST_NODES] {
     out
 }
 
-/// The values at the corners of the linear function with the gradient that the function with these nodal values has at a point.
-pub fn linear_at<const M: usize>(corners: usize, place: &[f64], nodal: &[[f64; M]]) -> [[f64; M]; 4] {
-    let mut out = [[0.0; M]; 4];
-    for i in 0..corners {
-        out[i] = nodal[i].map(|value| (4.0 * place[i] - 1.0) * value);
-    }
-    for (value, &[i, j]) in nodal[corners..].iter().zip(edges(corners)) {
-        for k in 0..M {
-            out[i][k] += 4.0 * place[j] * value[k];
-            out[j][k] += 4.0 * place[i] * value[k];
-        }
-    }
-    out
-}
-
 /// The forces on the nodes of a quadratic cell that have the virtual work of forces on the corners of the linear cell at a point.
 pub fn nodal_forces<const M: usize>(
     corners: usize,
@@ -161,6 +146,7 @@ impl MassCoefficients {
 mod tests {
     use super::*;
     use crate::fem::space::quadrature::{cell_rule, fine_cell_rule};
+    use crate::mesh::shape::linear_at;
 
     /// Nodes of a simplex in barycentric coordinates.
     fn places(corners: usize) -> Vec<[f64; 4]> {

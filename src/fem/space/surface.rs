@@ -1,12 +1,15 @@
 //! Points of a boundary: nodes, at which nodal quadrature evaluates a law, and Gauss points of facets.
 
 use super::{
-    quadratic::{linear_at, values},
+    quadratic::values,
     quadrature::{facet_rule, fine_facet_rule},
 };
 use crate::{
     linear_algebra::tensor::{Vector, dot, larger, norm},
-    mesh::{Mesh, shape::facet_normal},
+    mesh::{
+        Mesh,
+        shape::{facet_normal, linear_at},
+    },
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
 
@@ -98,7 +101,7 @@ pub fn surface_means<const D: usize, const N: usize>(
                 let factor = match (mesh.order(), corners.contains(&node)) {
                     (1, _) => 1.0,
                     (_, false) => 4.0 / 3.0,
-                    (_, true) if acts_at_midsides(mesh) => 0.0,
+                    (_, true) if is_omitted(mesh, node) => 0.0,
                     (_, true) => 2.0 / 3.0,
                 };
                 let global = mesh.global_node(node);
@@ -154,15 +157,15 @@ struct Share<const D: usize, const N: usize> {
     values: [f64; N],
 }
 
-/// Whether laws on boundaries act at midside nodes alone: of quadratic cells in space.
-fn acts_at_midsides<const D: usize>(mesh: &Mesh<D>) -> bool {
-    D == 3 && mesh.order() == 2
-}
-
 /// Whether there are corners of facets at which laws do not act, because their weights are zero: those of quadratic cells in space, and
 /// on the axis of bodies of revolution.
 pub fn omits_corners<const D: usize>(mesh: &Mesh<D>) -> bool {
     mesh.order() == 2 && (D == 3 || mesh.is_revolved)
+}
+
+/// Whether a corner is one of them.
+fn is_omitted<const D: usize>(mesh: &Mesh<D>, corner: u32) -> bool {
+    omits_corners(mesh) && (D == 3 || mesh.is_on_axis(&mesh.nodes[corner as usize]))
 }
 
 /// The points of these boundaries at corners where laws do not act, with the means of values at the
@@ -184,7 +187,7 @@ pub fn corner_means<const D: usize, const N: usize>(
         for (i, midside) in mesh.facet_midsides(facet).into_iter().enumerate() {
             let midside = mesh.global_node(midside);
             let ends = [corners[i], corners[(i + 1) % D]].into_iter();
-            for corner in ends.filter(|&end| D == 3 || mesh.is_on_axis(&mesh.nodes[end as usize])) {
+            for corner in ends.filter(|&end| is_omitted(mesh, end)) {
                 let record = &mut questions[mesh.owner(midside)];
                 record.extend([f64::from(midside), f64::from(mesh.global_node(corner))]);
                 record.extend(normal);

@@ -25,6 +25,13 @@ macro_rules! fields {
         /// All of them, in the order of field files.
         pub(crate) static FIELDS: [OutputField; COUNT] = [$($name),*];
 
+        /// Their positions in this list.
+        #[expect(non_camel_case_types, clippy::upper_case_acronyms, reason = "the names of the fields above")]
+        #[derive(Debug, Clone, Copy)]
+        pub(super) enum Position {
+            $(#[allow(dead_code)] $name),*
+        }
+
         /// The functions that compute them, in the same order.
         pub(super) fn computations<const D: usize, const S: usize>() -> [Compute<D, S>; COUNT] {
             [$({

@@ -22,7 +22,7 @@ pub mod inspect;
 pub(crate) mod log;
 pub(crate) mod output_field;
 pub mod parallel_file;
-mod probed;
+pub(crate) mod probed;
 pub(crate) mod probes;
 pub mod profiles;
 pub(crate) mod quantity_name;

@@ -3,7 +3,7 @@
 use super::{
     contact_points::fill_corners,
     field::{Place, Shape, plain_components},
-    field_list::{FIELDS, computations},
+    field_list::{FIELDS, Position, computations},
     output_field::Converged,
 };
 use crate::{
@@ -19,28 +19,28 @@ const COUNT: usize = 14;
 
 /// The quantities, in the order of their columns in `probes.csv`, each with what it is made of.
 const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
-    (ProbedQuantity::Stress, &[Source::Field("stress")]),
-    (ProbedQuantity::VonMises, &[Source::Field("von_mises")]),
+    (ProbedQuantity::Stress, &[Source::Field(Position::STRESS)]),
+    (ProbedQuantity::VonMises, &[Source::Field(Position::VON_MISES)]),
     (
         ProbedQuantity::PrincipalStress,
         &[
-            Source::Field("principal_stress_1"),
-            Source::Field("principal_stress_2"),
-            Source::Field("principal_stress_3"),
+            Source::Field(Position::PRINCIPAL_STRESS_1),
+            Source::Field(Position::PRINCIPAL_STRESS_2),
+            Source::Field(Position::PRINCIPAL_STRESS_3),
         ],
     ),
-    (ProbedQuantity::Pressure, &[Source::Field("pressure")]),
-    (ProbedQuantity::Strain, &[Source::Field("strain")]),
+    (ProbedQuantity::Pressure, &[Source::Field(Position::PRESSURE)]),
+    (ProbedQuantity::Strain, &[Source::Field(Position::STRAIN)]),
     (ProbedQuantity::Acceleration, &[Source::Acceleration]),
     (
         ProbedQuantity::EquivalentViscoplasticStrain,
         &[Source::OfCells("equivalent_viscoplastic_strain", "viscoplastic flow")],
     ),
     (ProbedQuantity::Damage, &[Source::OfCells("damage", "[material.damage]")]),
-    (ProbedQuantity::ContactPressure, &[Source::Field("contact_pressure")]),
-    (ProbedQuantity::ContactTraction, &[Source::Field("contact_traction")]),
-    (ProbedQuantity::Gap, &[Source::Field("gap")]),
-    (ProbedQuantity::SlidingVelocity, &[Source::Field("sliding_velocity")]),
+    (ProbedQuantity::ContactPressure, &[Source::Field(Position::CONTACT_PRESSURE)]),
+    (ProbedQuantity::ContactTraction, &[Source::Field(Position::CONTACT_TRACTION)]),
+    (ProbedQuantity::Gap, &[Source::Field(Position::GAP)]),
+    (ProbedQuantity::SlidingVelocity, &[Source::Field(Position::SLIDING_VELOCITY)]),
     (ProbedQuantity::Slip, &[Source::OfNodes("slip", "a friction law that depends on the slip")]),
     (ProbedQuantity::Wear, &[Source::OfNodes("wear", "[contact.wear]")]),
 ];
@@ -48,8 +48,8 @@ const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
 /// What a quantity is made of.
 #[derive(Debug, Clone, Copy)]
 enum Source {
-    /// An output field of this name.
-    Field(&'static str),
+    /// An output field.
+    Field(Position),
     /// A scalar history of nodes of this name, and what a job needs to have it.
     OfNodes(&'static str, &'static str),
     /// A scalar history of cells, likewise.
@@ -62,6 +62,44 @@ enum Source {
 pub(super) fn groups(wanted: &[ProbedQuantity]) -> Vec<bool> {
     let of_quantities = QUANTITIES.iter().map(|(quantity, _)| wanted.contains(quantity));
     std::iter::once(true).chain(of_quantities).collect()
+}
+
+/// What these quantities are made of.
+fn sources(wanted: &[ProbedQuantity]) -> impl Iterator<Item = Source> {
+    QUANTITIES
+        .iter()
+        .filter(|(quantity, _)| wanted.contains(quantity))
+        .flat_map(|(_, sources)| *sources)
+        .copied()
+}
+
+/// What is wrong with quantities that the body does not have: message and advice.
+pub(crate) fn fault<const D: usize, const S: usize>(
+    wanted: &[ProbedQuantity],
+    body: &Body<D, S>,
+) -> Option<[String; 2]> {
+    for source in sources(wanted) {
+        let (name, needed, is_there) = match source {
+            Source::OfNodes(name, needed) => {
+                (name, needed, body.node_histories().any(|history| history.name() == name))
+            }
+            Source::OfCells(name, needed) => {
+                (name, needed, body.cell_histories().any(|history| history.name() == name))
+            }
+            Source::Field(Position::CONTACT_TRACTION) => {
+                let is_there = body.contacts.iter().any(|contact| !contact.needs_ghosts());
+                ("contact_traction", "a contact", is_there)
+            }
+            Source::Field(_) | Source::Acceleration => continue,
+        };
+        if !is_there {
+            return Some([
+                format!("the body has no {name}"),
+                format!("it needs {needed}; or delete \"{name}\" from the list"),
+            ]);
+        }
+    }
+    None
 }
 
 /// The point of a probe, as far as this rank knows it.
@@ -109,8 +147,7 @@ pub(super) struct Probed {
 impl Probed {
     /// These quantities.
     pub(super) fn new(wanted: &[ProbedQuantity]) -> Self {
-        let chosen = QUANTITIES.iter().filter(|(quantity, _)| wanted.contains(quantity));
-        Self { sources: chosen.flat_map(|(_, sources)| *sources).copied().collect() }
+        Self { sources: sources(wanted).collect() }
     }
 
     /// Whether there are none.
@@ -121,31 +158,6 @@ impl Probed {
     /// Numbers of a probe.
     pub(super) fn width(&self, dimension: usize) -> usize {
         self.sources.iter().map(|source| source.width(dimension)).sum()
-    }
-
-    /// What is wrong with quantities that the body does not have: message and advice.
-    pub(super) fn fault<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Option<[String; 2]> {
-        for source in &self.sources {
-            let (name, needed, is_there) = match *source {
-                Source::OfNodes(name, needed) => {
-                    (name, needed, body.node_histories().any(|history| history.name() == name))
-                }
-                Source::OfCells(name, needed) => {
-                    (name, needed, body.cell_histories().any(|history| history.name() == name))
-                }
-                Source::Field(name @ "contact_traction") => {
-                    (name, "a contact", body.contacts.iter().any(|contact| !contact.needs_ghosts()))
-                }
-                Source::Field(_) | Source::Acceleration => continue,
-            };
-            if !is_there {
-                return Some([
-                    format!("the body has no {name}"),
-                    format!("it needs {needed}; or delete \"{name}\" from the list"),
-                ]);
-            }
-        }
-        None
     }
 
     /// Adds the part of this rank to the values of the probes, after displacement and velocity. Collective.
@@ -164,12 +176,11 @@ impl Probed {
                 }
             };
             match *source {
-                Source::Field(name) => {
-                    let number = FIELDS.iter().position(|field| field.name == name);
-                    let Some(number) = number else { continue };
-                    let computed = at.session.agree(computations::<D, S>()[number](at))?;
+                Source::Field(field) => {
+                    let computed = at.session.agree(computations::<D, S>()[field as usize](at))?;
                     if let Some(computed) = computed {
-                        visit(FIELDS[number].place, FIELDS[number].shape, &computed.values);
+                        let field = &FIELDS[field as usize];
+                        visit(field.place, field.shape, &computed.values);
                     }
                 }
                 Source::OfNodes(name, _) => {
@@ -200,14 +211,14 @@ impl Probed {
 impl Source {
     fn width(self, dimension: usize) -> usize {
         let shape = match self {
-            Self::Field(name) => FIELDS.iter().find(|field| field.name == name).map(|field| field.shape),
-            Self::Acceleration => Some(Shape::Vector),
-            Self::OfNodes(..) | Self::OfCells(..) => Some(Shape::Scalar),
+            Self::Field(field) => FIELDS[field as usize].shape,
+            Self::Acceleration => Shape::Vector,
+            Self::OfNodes(..) | Self::OfCells(..) => Shape::Scalar,
         };
         match shape {
-            Some(Shape::Vector) => dimension,
-            Some(Shape::Tensor) => [4, 6][dimension - 2],
-            _ => 1,
+            Shape::Vector => dimension,
+            Shape::Tensor => [4, 6][dimension - 2],
+            Shape::Scalar => 1,
         }
     }
 }

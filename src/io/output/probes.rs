@@ -8,13 +8,14 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, resultants::BalancedMotion, space::Simplex, state::State},
+    fem::{
+        resultants::BalancedMotion,
+        space::{Simplex, values},
+        state::State,
+    },
     job::{Output, Probe},
     linear_algebra::tensor::Vector,
-    mesh::{
-        Mesh,
-        shape::{quadratic_values, tangent_corners},
-    },
+    mesh::{Mesh, shape::linear_at},
     parallel::{agreement::Agreed, session::Session},
 };
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
@@ -75,11 +76,6 @@ impl<const D: usize> Probes<D> {
     /// Whether quantities besides displacement and velocity are recorded.
     pub(crate) fn needs_stress(&self) -> bool {
         !self.probed.is_empty() && !self.is_empty()
-    }
-
-    /// What is wrong with quantities that the body does not have: message and advice.
-    pub(crate) fn fault<const S: usize>(&self, body: &Body<D, S>) -> Option<[String; 2]> {
-        self.probed.fault(body)
     }
 
     /// Opens the file on rank 0, if there are probes; continues it after this step if one is given.
@@ -172,7 +168,7 @@ fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<Found> {
         let place = place(&nodes, point)?;
         let shares = match mesh.order() {
             1 => place.to_vec(),
-            _ => quadratic_values::<D>(&place).to_vec(),
+            _ => values(D + 1, &place).to_vec(),
         };
         Some((number, mesh.cell_nodes(number).zip(shares).collect()))
     })
@@ -201,9 +197,9 @@ fn place<const D: usize>(nodes: &[Vector<D>], point: &Vector<D>) -> Option<[f64;
         if longest.is_nan() || longest > 1e3 {
             return None;
         }
-        let shares = quadratic_values::<D>(&place);
+        let shares = values(D + 1, &place);
         at = std::array::from_fn(|i| nodes.iter().zip(shares).map(|(node, share)| share * node[i]).sum());
-        cell = Simplex::new(&tangent_corners(nodes, &place)[..=D]);
+        cell = Simplex::new(&linear_at(D + 1, &place, nodes)[..=D]);
     }
     None
 }

@@ -53,11 +53,6 @@ pub struct ObstacleMotion<const D: usize> {
 }
 
 impl<const D: usize> ObstacleMotion<D> {
-    /// Adds an angular velocity in rad/s.
-    pub fn turn(&mut self, angular_velocity: &Vector<3>) {
-        self.angular_velocity = add_scaled(&self.angular_velocity, 1.0, angular_velocity);
-    }
-
     /// Whether the motion is a translation.
     fn is_translation(&self) -> bool {
         self.angular_velocity == [0.0; 3]

@@ -1,6 +1,6 @@
 //! Linear elastic tensors of any symmetry.
 
-use super::elasticity::Hypothesis;
+use super::{elasticity::Hypothesis, isotropic::LinearTensor};
 use crate::linear_algebra::tensor::{Mandel, Vector, dot};
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
@@ -69,32 +69,39 @@ impl Anisotropic {
         Self { matrix }
     }
 
-    /// `T(e)`.
+    /// A bound of its eigenvalues from above, in Pa.
+    pub fn most(&self) -> f64 {
+        let sums = self.matrix.map(|row| row.iter().map(|entry| entry.abs()).sum());
+        sums.into_iter().fold(0.0, f64::max)
+    }
+}
+
+impl LinearTensor for Anisotropic {
     #[inline(always)]
-    pub fn apply<const S: usize>(&self, e: &Mandel<S>) -> Mandel<S> {
+    fn stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S> {
         let mut out = [0.0; S];
         for (c, value) in out.iter_mut().enumerate() {
             let row = &self.matrix[in_space::<S>(c)];
             for d in 0..S {
-                *value += row[in_space::<S>(d)] * e[d];
+                *value += row[in_space::<S>(d)] * strain[d];
             }
         }
         out
     }
 
-    /// `e_i : T(e_j)` for the strains `e_i = sym(a_i g^T)` and `e_j = sym(a_j h^T)` along the axes `a`, given `g` and `h`, each with the
-    /// hoop strain that comes with the first axis in a body of revolution.
     #[inline]
-    pub fn block<const D: usize>(&self, [g, h]: [(Vector<D>, f64); 2]) -> [[f64; D]; D] {
-        let strains: [Mandel<6>; D] = std::array::from_fn(|j| product(j, &h));
-        let stresses = strains.map(|strain| self.matrix.map(|row| dot(&row, &strain)));
-        std::array::from_fn(|i| std::array::from_fn(|j| dot(&product(i, &g), &stresses[j])))
-    }
-
-    /// A bound of its eigenvalues from above, in Pa.
-    pub fn most(&self) -> f64 {
-        let sums = self.matrix.map(|row| row.iter().map(|entry| entry.abs()).sum());
-        sums.into_iter().fold(0.0, f64::max)
+    fn add_block<const D: usize>(
+        &self,
+        factor: f64,
+        volume: f64,
+        [g, h]: [&(Vector<D>, f64); 2],
+        block: &mut [[f64; D]; D],
+    ) {
+        for j in 0..D {
+            let strain = product(j, h);
+            let stress = self.matrix.map(|row| dot(&row, &strain));
+            (0..D).for_each(|i| block[i][j] += factor * volume * dot(&product(i, g), &stress));
+        }
     }
 }
 
@@ -122,7 +129,7 @@ mod tests {
     fn isotropic(hypothesis: Hypothesis) -> Anisotropic {
         let tensor = GLASS.tensor(Hypothesis::Space);
         let column =
-            |c: usize| tensor.apply(&std::array::from_fn::<f64, 6, _>(|i| f64::from(u8::from(i == c))));
+            |c: usize| tensor.stress(&std::array::from_fn::<f64, 6, _>(|i| f64::from(u8::from(i == c))));
         let (c, s) = (0.6, 0.8);
         let axes = if hypothesis == Hypothesis::Space {
             [[c, s, 0.0], [0.0, 0.0, 1.0], [s, -c, 0.0]]
@@ -135,7 +142,7 @@ mod tests {
     fn check<const S: usize>(hypothesis: Hypothesis) {
         let strain: Mandel<S> = std::array::from_fn(|c| if S == 4 && c == 2 { 0.0 } else { 0.1 + c as f64 });
         let (found, expected) =
-            (isotropic(hypothesis).apply(&strain), GLASS.tensor(hypothesis).apply(&strain));
+            (isotropic(hypothesis).stress(&strain), GLASS.tensor(hypothesis).apply(&strain));
         for c in 0..S {
             assert!((found[c] - expected[c]).abs() < 1e-11, "{found:?} {expected:?}");
         }
@@ -154,7 +161,8 @@ mod tests {
     fn blocks_are_tractions_of_the_stress() {
         let tensor = GLASS.tensor(Hypothesis::PlaneStress);
         let (g, h) = ([0.3, -2.0], [1.5, 0.7]);
-        let found = isotropic(Hypothesis::PlaneStress).block([(g, 0.0), (h, 0.0)]);
+        let mut found = [[0.0; 2]; 2];
+        isotropic(Hypothesis::PlaneStress).add_block(1.0, 1.0, [&(g, 0.0), &(h, 0.0)], &mut found);
         for i in 0..2 {
             for j in 0..2 {
                 let same = if i == j { g[0] * h[0] + g[1] * h[1] } else { 0.0 };

@@ -1,6 +1,23 @@
 //! Linear isotropic tensors.
 
-use crate::linear_algebra::tensor::{Mandel, normal_components, trace};
+use crate::linear_algebra::tensor::{Mandel, Vector, dot, normal_components, trace};
+use std::fmt::Debug;
+
+/// A symmetric linear map `T` of strains to stresses in Pa, or of strain rates with `T` in Pa s.
+pub trait LinearTensor: Copy + Debug {
+    /// `T(e)`.
+    fn stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S>;
+
+    /// Adds `factor volume e_i : T(e_j)` for the strains `e_i = sym(a_i g^T)` and `e_j = sym(a_j h^T)` along the axes `a`, given `g` and
+    /// `h`, each with the hoop strain that comes with the first axis in a body of revolution, elsewhere 0.
+    fn add_block<const D: usize>(
+        &self,
+        factor: f64,
+        volume: f64,
+        slopes: [&(Vector<D>, f64); 2],
+        block: &mut [[f64; D]; D],
+    );
+}
 
 /// `T(e) = volumetric tr(e) I + shear e`, where `tr` and `I` run over the stored normal components.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -9,6 +26,37 @@ pub struct Isotropic {
     pub volumetric: f64,
     /// Factor of the tensor itself (twice the shear modulus), in Pa or Pa s.
     pub shear: f64,
+}
+
+impl LinearTensor for Isotropic {
+    #[inline(always)]
+    fn stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S> {
+        self.apply(strain)
+    }
+
+    #[inline(always)]
+    fn add_block<const D: usize>(
+        &self,
+        factor: f64,
+        volume: f64,
+        [(g, hoop_g), (h, hoop_h)]: [&(Vector<D>, f64); 2],
+        block: &mut [[f64; D]; D],
+    ) {
+        let (volumetric, shear) = (factor * self.volumetric, factor * self.shear);
+        let inner = 0.5 * shear * dot(g, h);
+        for i in 0..D {
+            for j in 0..D {
+                block[i][j] += volume * (volumetric * g[i] * h[j] + 0.5 * shear * g[j] * h[i]);
+            }
+            block[i][i] += volume * inner;
+        }
+        let pressure = volume * volumetric;
+        for i in 0..D {
+            block[0][i] += pressure * hoop_g * h[i];
+            block[i][0] += pressure * g[i] * hoop_h;
+        }
+        block[0][0] += (pressure + volume * shear) * hoop_g * hoop_h;
+    }
 }
 
 impl Isotropic {
@@ -57,7 +105,7 @@ impl Isotropic {
     pub fn inverse_square<const S: usize>(&self, t: &Mandel<S>) -> f64 {
         let (n, trace) = (normal_components::<S>() as f64, trace(t));
         let pressure = self.volumetric / (self.shear + n * self.volumetric) * trace;
-        (crate::linear_algebra::tensor::dot(t, t) - pressure * trace) / self.shear
+        (dot(t, t) - pressure * trace) / self.shear
     }
 
     /// Smallest eigenvalue over the stored components, `m_A` of assumption H(A)(iv) for a viscosity.
@@ -74,7 +122,6 @@ impl Isotropic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_algebra::tensor::dot;
 
     #[test]
     fn solve_inverts_apply() {

@@ -24,7 +24,7 @@ pub use by_material::ByMaterial;
 pub use damage::Damage;
 pub use damping::Damping;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
-pub use isotropic::Isotropic;
+pub use isotropic::{Isotropic, LinearTensor};
 pub use local::Numbers;
 pub use orthotropic::Orthotropic;
 pub use viscoplasticity::*;

@@ -166,6 +166,7 @@ impl Orthotropic {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laws::material::LinearTensor;
     use crate::linear_algebra::tensor::Mandel;
 
     const WOOD: Orthotropic = Orthotropic {
@@ -188,7 +189,7 @@ mod tests {
             ([0.0, 0.0, 0.0, 0.0, 0.5 / 0.6, 0.0], 4),
             ([0.0, 0.0, 0.0, 0.0, 0.0, 0.5 / 0.7], 5),
         ] {
-            let stress: Mandel<6> = tensor.apply(&strain);
+            let stress: Mandel<6> = tensor.stress(&strain);
             for (c, stress) in stress.into_iter().enumerate() {
                 let expected = f64::from(u8::from(c == at));
                 assert!((stress - expected).abs() < 1e-13, "{at}: {stress}");
@@ -204,7 +205,7 @@ mod tests {
             let of_x = c.powi(4) / 12.0 + (1.0 / 0.7 - 0.8 / 12.0) * (s * c).powi(2) + s.powi(4) / 0.8;
             // The compliance along x is the entry of the inverse: by Cramer's rule.
             let column =
-                |k: usize| plate.apply(&std::array::from_fn::<f64, 3, _>(|i| f64::from(u8::from(i == k))));
+                |k: usize| plate.stress(&std::array::from_fn::<f64, 3, _>(|i| f64::from(u8::from(i == k))));
             let [x, y, z] = [column(0), column(1), column(2)];
             let minor = y[1] * z[2] - y[2] * z[1];
             let determinant =
@@ -218,8 +219,8 @@ mod tests {
         let turned = Orthotropic { axes: Some([[0.0, 0.0, 3.0], [2.0, 0.0, 1.0]]), ..WOOD };
         let (found, own) = (turned.tensor(Hypothesis::Space), WOOD.tensor(Hypothesis::Space));
         // Axis 1 is z, 2 is x, 3 is y.
-        let [xx, yy, zz, yz, xz, xy] = found.apply(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
-        let expected = own.apply(&[0.3, 0.1, 0.2, 0.6, 0.4, 0.5]);
+        let [xx, yy, zz, yz, xz, xy] = found.stress(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+        let expected = own.stress(&[0.3, 0.1, 0.2, 0.6, 0.4, 0.5]);
         for (found, expected) in [zz, xx, yy, xy, yz, xz].into_iter().zip(expected) {
             assert!((found - expected).abs() < 1e-13, "{found} {expected}");
         }

@@ -105,11 +105,6 @@ impl Ksp {
         unsafe { levels::preconditioner_of(self.raw.get()) }
     }
 
-    /// Sets the matrix of the system, from which the preconditioner is also built.
-    pub fn set_matrix(&mut self, matrix: &Matrix) -> Result<()> {
-        self.set_matrices(matrix, matrix)
-    }
-
     /// Sets the first matrix as that of the system; the preconditioner is built from the second, and rebuilt if that has changed.
     pub fn set_matrices(&mut self, matrix: &Matrix, preconditioned: &Matrix) -> Result<()> {
         // SAFETY: live objects; PETSc keeps its own references.

@@ -2,12 +2,12 @@
 
 use crate::{
     error::{Error, Result},
-    fem::space::Simplex,
+    fem::space::{Simplex, values},
     io::output::fields::Place,
     linear_algebra::tensor::Vector,
     mesh::{
         midpoint,
-        shape::{edges_of_cell, quadratic_values, tangent_corners},
+        shape::{edges_of_cell, linear_at},
     },
     postprocessing::study::{document::Quantity, squares::mix},
 };
@@ -79,8 +79,8 @@ impl<const D: usize> StoredMesh<D> {
         if self.order() == 1 {
             return mix(&self.of_corners(nodal, cell), shares);
         }
-        let (values, shares) = (self.of_nodes(nodal, cell), quadratic_values::<D>(shares));
-        std::array::from_fn(|i| values.iter().zip(&shares).map(|(value, share)| share * value[i]).sum())
+        let (of_nodes, shares) = (self.of_nodes(nodal, cell), values(D + 1, shares));
+        std::array::from_fn(|i| of_nodes.iter().zip(&shares).map(|(value, share)| share * value[i]).sum())
     }
 
     /// The linear cell that has the Jacobian of a cell at such a point.
@@ -102,7 +102,7 @@ impl<const D: usize> StoredMesh<D> {
             return self.of_corners(nodal, cell);
         }
         let nodes = D + 1 + edges_of_cell::<D>().len();
-        tangent_corners(&self.of_nodes(nodal, cell)[..nodes], shares)
+        linear_at(D + 1, shares, &self.of_nodes(nodal, cell)[..nodes])
     }
 
     /// Number of cells.

@@ -3,7 +3,7 @@ mod implicit;
 
 use super::{
     Curvature, ELASTIC, Effect, Energy, EnergyKind, Evaluation, FlowProperties, HistoryStore, Outcome,
-    Phases, Quantity, Role, Step, StressError, Term, cell_history::CellHistory, isotropic, quantity,
+    Phases, Quantity, Role, Step, StressError, Term, cell_history::CellHistory, linear, quantity,
 };
 use crate::{
     fem::space::{Batch, Geometry, Integrity, Needs},
@@ -82,7 +82,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
             Evaluation::Converged => self.advance_explicitly(step, batch, outcome),
             Evaluation::Start(_) => {
                 let Some(history) = self.stress.converged(batch.number) else { return };
-                isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
+                linear::add_histories(history, &batch.integrity, &mut batch.stress);
             }
             Evaluation::End(blend) => self.advance_implicitly(blend, step, batch, outcome),
         }
@@ -90,12 +90,12 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
         let Some(history) = self.stress.converged(batch.number) else { return };
-        isotropic::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
+        linear::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
     }
 
     fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {
         let Some(history) = self.stress.converged(batch.number) else { return };
-        isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
+        linear::add_histories(history, &batch.integrity, &mut batch.stress);
     }
 
     fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
@@ -103,7 +103,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         let Some(history) = self.stress.converged(batch.number) else { return };
         let (strain, integrity) = (&batch.strain, &batch.integrity);
         energy[ELASTIC] +=
-            0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
+            0.5 * linear::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
     }
 
     fn add_step_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {

@@ -1,6 +1,9 @@
 //! Facets of surfaces.
 
-use crate::linear_algebra::tensor::Vector;
+use crate::{
+    linear_algebra::tensor::{Vector, norm},
+    mesh::shape::facet_normal,
+};
 
 /// A straight facet of a surface: a segment in two dimensions, a triangle in three.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +22,13 @@ pub struct Facet<const D: usize> {
 }
 
 impl<const D: usize> Facet<D> {
+    /// The facet with these nodes and corners, in a body that is not one of revolution; the order of the corners gives the normal.
+    pub fn new(nodes: Vec<u32>, corners: [Vector<D>; D]) -> Self {
+        let normal = facet_normal(&corners);
+        let size = norm(&normal);
+        Self { nodes, corners, normal: normal.map(|n| n / size), turns: [1.0; D] }
+    }
+
     pub(super) fn is_quadratic(&self) -> bool {
         self.nodes.len() > D
     }

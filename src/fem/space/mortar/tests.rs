@@ -61,7 +61,7 @@ impl<const D: usize> Surface<D> {
                     places.insert(number, std::array::from_fn(|k| 0.5 * (corners[i][k] + corners[j][k])));
                 }
             }
-            facets.push(Facet { nodes, normal: normal(&corners, &side), corners, turns: [1.0; D] });
+            facets.push(Facet { normal: normal(&corners, &side), ..Facet::new(nodes, corners) });
         }
         Self { facets, places }
     }
@@ -75,10 +75,9 @@ impl<const D: usize> Surface<D> {
             std::array::from_fn(|i| turned[i] + by[i])
         };
         let facets = self.facets.iter().map(|facet| Facet {
-            nodes: facet.nodes.clone(),
-            corners: facet.corners.map(|corner| place(&corner)),
             normal: turn(&facet.normal),
-            turns: facet.turns,
+            corners: facet.corners.map(|corner| place(&corner)),
+            ..facet.clone()
         });
         let places = self.places.iter().map(|(&number, x)| (number, place(x))).collect();
         Self { facets: facets.collect(), places }
@@ -879,12 +878,7 @@ fn the_search_finds_all_pairs() {
                 let corners = [[0.0; 3]; 3].map(|_: Vector<3>| middle.map(|x| x + random.uniform(-0.3, 0.3)));
                 let side = [0.0; 3].map(|_: f64| random.uniform(-1.0, 1.0));
                 let start = first + 3 * i as u32;
-                Facet {
-                    nodes: (start..start + 3).collect(),
-                    normal: normal(&corners, &side),
-                    corners,
-                    turns: [1.0; 3],
-                }
+                Facet { normal: normal(&corners, &side), ..Facet::new((start..start + 3).collect(), corners) }
             })
             .collect()
     };

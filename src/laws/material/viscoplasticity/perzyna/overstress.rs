@@ -5,7 +5,7 @@ use crate::{
     laws::material::{Elastic, Isotropic},
     linear_algebra::{
         simd::{LANES, Pack},
-        tensor::{Mandel, dot, normal_components, trace, von_mises},
+        tensor::{Mandel, normal_components, trace, von_mises},
     },
 };
 use multiversion::multiversion;
@@ -189,15 +189,6 @@ impl Elastic<Perzyna> {
         let Isotropic { volumetric, shear } = self.stiffness::<3>();
         let (along, across) = self.inverse_metric();
         [(along, shear + 2.0 * volumetric), (across, shear)]
-    }
-
-    /// `t : t` in the metric of the projection.
-    pub fn metric_square<const S: usize>(&self, t: &Mandel<S>) -> f64 {
-        match self.parameters.metric {
-            Metric::Elasticity => dot(t, &self.elasticity.apply(t)),
-            Metric::Compliance => self.elasticity.inverse_square(t),
-            Metric::Frobenius => dot(t, t),
-        }
     }
 }
 

@@ -150,8 +150,13 @@ fn check_projection<const S: usize>(law: &Elastic<Perzyna>, s: &Mandel<S>, other
         sum[c] = to_other[c] + away[c];
     }
     // <away, to_other> in the metric, by polarisation: not positive for a projection on a convex set.
-    let product = 0.5 * (law.metric_square(&sum) - law.metric_square(&away) - law.metric_square(&to_other));
-    let size = law.metric_square(&sum) + law.metric_square(&away) + law.metric_square(&to_other);
+    let square = |t: &Mandel<S>| match law.parameters.metric {
+        Metric::Elasticity => dot(t, &law.elasticity.apply(t)),
+        Metric::Compliance => law.elasticity.inverse_square(t),
+        Metric::Frobenius => dot(t, t),
+    };
+    let product = 0.5 * (square(&sum) - square(&away) - square(&to_other));
+    let size = square(&sum) + square(&away) + square(&to_other);
     assert!(product <= 1e-10 * size, "orthogonal: {product} of {size}");
     assert!(dot(s, &law.strain_rate(s)) >= -1e-12 * scale * scale, "dissipation");
 }

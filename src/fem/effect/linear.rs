@@ -1,8 +1,8 @@
-//! Stresses and energies of isotropic tensors, for a pack of cells.
+//! Stresses and energies of linear tensors, for a pack of cells.
 
 use crate::{
     fem::space::{Integrity, SimplexPack},
-    laws::material::Isotropic,
+    laws::material::{Isotropic, LinearTensor},
     linear_algebra::{
         simd::{LANES, Pack, sum},
         tensor::{add_scaled, dot},
@@ -12,8 +12,8 @@ use multiversion::multiversion;
 
 /// Adds `factor` times the stresses of strains or strain rates, times the fractions that the cells carry.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_stresses<const S: usize>(
-    tensor: &Isotropic,
+pub(super) fn add_stresses<T: LinearTensor, const S: usize>(
+    tensor: &T,
     factor: f64,
     strain: &Pack<S>,
     integrity: &Integrity,
@@ -21,14 +21,14 @@ pub(super) fn add_stresses<const S: usize>(
 ) {
     let share = integrity.shares().map(|share| factor * share);
     *stress = Pack::from_lanes(|lane| {
-        add_scaled(&stress.lane(lane), share[lane], &tensor.apply(&strain.lane(lane)))
+        add_scaled(&stress.lane(lane), share[lane], &tensor.stress(&strain.lane(lane)))
     });
 }
 
 /// `integral of T(e) : e` over the cells, times the fractions that they carry.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn square<const D: usize, const S: usize>(
-    tensor: &Isotropic,
+pub(super) fn square<T: LinearTensor, const D: usize, const S: usize>(
+    tensor: &T,
     cells: &SimplexPack<D>,
     integrity: &Integrity,
     strain: &Pack<S>,
@@ -37,7 +37,7 @@ pub(super) fn square<const D: usize, const S: usize>(
     let mut squares = [0.0; LANES];
     for lane in 0..LANES {
         let strain = strain.lane(lane);
-        squares[lane] = share[lane] * cells.volume[lane] * dot(&strain, &tensor.apply(&strain));
+        squares[lane] = share[lane] * cells.volume[lane] * dot(&strain, &tensor.stress(&strain));
     }
     sum(&squares)
 }
