@@ -94,7 +94,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         ));
     }
     log.line(format!(
-        "stress     von Mises at most {} Pa, at the end {} Pa",
+        "stress     von Mises at most {} Pa at a point of a cell; in the means of cells {} Pa at the end",
         Digits(summary.peaks.von_mises),
         Digits(summary.final_von_mises)
     ));

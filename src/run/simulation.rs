@@ -96,7 +96,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         }
         let target = landings.next(state.time);
         let was_single = scheme.factor_precision() == Some(Precision::Single);
-        let outcome = if let Some(adaptive) = adaptive {
+        let mut outcome = if let Some(adaptive) = adaptive {
             let outcome = adaptive.advance(session, scheme, body, state, target)?;
             totals.step_level = Some(adaptive.step_level);
             outcome
@@ -107,6 +107,8 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             outcome
         };
         let before = *totals;
+        // Newton's method may jump over unstable states without having met them.
+        outcome.fell |= !body.has_form(Form::Mass) && totals.is_jump(&outcome.energy);
         totals.add(&outcome);
         // The kinetic energy of a body with mass is far above rounding errors.
         if totals.energy_imbalance > BALANCED && !body.has_form(Form::Mass) {
