@@ -701,7 +701,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/hertz_sphere", "force_z", 0.13),
     ("verification/hertz_sphere", "largest_pressure", 0.05),
     ("verification/friction_pad", "displacement_x", 3e-3),
-    ("verification/restitution", "", 1e-5),
+    ("verification/restitution", "", 4e-5),
     ("verification/spring_slider", "", 1e-6),
     ("verification/capstan", "", 1e-3),
     ("verification/cone", "obstacle_displacement", 4e-3),

@@ -209,8 +209,7 @@ impl Totals {
         self.unstable_steps += u64::from(outcome.fell);
         let available = larger(dissipated - numerical, 0.0);
         let failed = energy[DAMAGE] + energy[DEBONDING];
-        let is_unresolved =
-            failed > LARGEST_EXCESS * available && failed > NOTICEABLE_SHARE * self.turnover;
+        let is_unresolved = failed > LARGEST_EXCESS * available && failed > NOTICEABLE_SHARE * self.turnover;
         self.unresolved = is_unresolved.then_some(Unresolved { failed, available });
         self.unresolved_steps += u64::from(is_unresolved);
         self.indefinite_solves += outcome.indefinite_solves as u64;
