@@ -107,7 +107,12 @@ impl ObstacleMotions {
         if contacts.iter().any(|contact| contact.obstacle.is_some()) {
             find_contacts(session, contacts, start)?;
         }
-        self.set_columns(session, contacts, start, multiply)
+        self.set_columns(session, contacts, start, multiply)?;
+        let translations = self.motions.iter_mut().filter(|motion| motion.place.1 == Freedom::Translation);
+        translations.for_each(|motion| {
+            [motion.places] = session.largest([contacts[motion.place.0].speed_of_places()]);
+        });
+        Ok(())
     }
 
     /// Lets the unknowns of a contact follow its obstacle if they have touched unexpectedly, and no longer if they have parted; returns
@@ -179,9 +184,6 @@ impl ObstacleMotions {
             motion.velocities.fill(0.0)?;
             contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
             motion.size = motion.velocities.norm()?;
-            let places =
-                if freedom == Freedom::Translation { contacts[contact].speed_of_places() } else { 0.0 };
-            [motion.places] = session.largest([places]);
         }
         if self.is_empty() {
             return Ok(());
