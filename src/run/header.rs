@@ -79,8 +79,13 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         log.line(format!("error: {error}"));
     }
     log.line(format!(
-        "{}     {} steps to t = {} s, {} Newton and {} linear iterations",
-        summary.status, summary.steps, summary.time, summary.newton_iterations, summary.linear_iterations
+        "{}     {} step{} to t = {} s, {} Newton and {} linear iterations",
+        summary.status,
+        summary.steps,
+        if summary.steps == 1 { "" } else { "s" },
+        summary.time,
+        summary.newton_iterations,
+        summary.linear_iterations
     ));
     let inclusion = match summary.inventory.contact_points {
         0 => String::new(),

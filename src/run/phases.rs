@@ -8,7 +8,7 @@ use crate::{
 use serde_json::{Map, Value};
 use std::time::Duration;
 
-/// Seconds by phase of the slowest rank. Collective.
+/// Seconds by phase of the slowest rank; `other` is what is left of its total. Collective.
 pub(super) fn seconds(
     session: &Session,
     run: Clock,
@@ -16,8 +16,9 @@ pub(super) fn seconds(
     clock: &StepClock,
     output: Duration,
 ) -> Map<String, Value> {
-    let phases = [
-        ("total", run.began.elapsed()),
+    let total = run.began.elapsed();
+    let mut phases = [
+        ("total", total),
         ("launch", run.launched),
         ("setup", setup.saturating_sub(clock.first_assembly)),
         ("assembly", clock.assembly),
@@ -25,7 +26,9 @@ pub(super) fn seconds(
         ("solve", clock.solve),
         ("balance", clock.balance),
         ("output", output),
+        ("other", Duration::ZERO),
     ];
+    phases[8].1 = total.saturating_sub(phases[1..8].iter().map(|(_, spent)| *spent).sum());
     let seconds = session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
     phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
 }

@@ -56,8 +56,8 @@ impl StepLine<'_> {
         push(has.iterative, format_args!("  linear {}", outcome.linear_iterations));
         push(outcome.indefinite_solves > 0, format_args!("  indefinite {}", outcome.indefinite_solves));
         push(outcome.solutions > 0, format_args!("  solutions {}", outcome.solutions));
-        push(has.contact, format_args!("  contact error {:.0e}", outcome.inclusion_residual));
-        push(true, format_args!("  energy error {imbalance:.0e}"));
+        push(has.contact, format_args!("  inclusion residual {:.0e}", outcome.inclusion_residual));
+        push(true, format_args!("  energy imbalance {imbalance:.0e}"));
         line.push_str(end.text());
     }
 }
@@ -148,7 +148,7 @@ mod tests {
         );
         assert_eq!(
             line(&outcome, ShownColumns::default(), [3, 64], 7.0),
-            "step  3/64  t = 0.5 s  energy error 1e-9  7 s left",
+            "step  3/64  t = 0.5 s  energy imbalance 1e-9  7 s left",
             "no contact, no Newton iterations"
         );
     }

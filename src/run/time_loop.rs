@@ -288,7 +288,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             left: self.seconds_per_step() * (last - step) as f64,
         };
         line.write(&mut self.line);
-        self.log.quiet_line(&self.line);
+        self.log.step_line(&self.line, self.clock.logs_every_step || step == last);
     }
 
     /// Mean seconds per step so far.

@@ -9,16 +9,22 @@ use std::{
     fs::{File, OpenOptions, TryLockError},
     io::{IsTerminal, Write},
     path::Path,
+    time::{Duration, Instant},
 };
 
 /// Where the words of a line begin, behind its title.
 pub(crate) const WORDS: usize = 11;
+
+/// Least time between two lines of steps on the standard output.
+const BETWEEN_STEPS: Duration = Duration::from_secs(1);
 
 /// Writes lines on rank 0 and nothing elsewhere.
 #[derive(Debug)]
 pub(crate) struct Log {
     is_active: bool,
     on_terminal: bool,
+    /// When the last line of a step was printed.
+    stepped: Option<Instant>,
     file: Option<File>,
     bar: Option<ProgressBar>,
     warnings: Vec<String>,
@@ -27,7 +33,7 @@ pub(crate) struct Log {
 impl Log {
     /// A log that writes on rank 0 only and has no file yet; without `on_terminal` its lines go to the file only.
     pub(crate) fn new(is_active: bool, on_terminal: bool) -> Self {
-        Self { is_active, on_terminal, file: None, bar: None, warnings: Vec::new() }
+        Self { is_active, on_terminal, stepped: None, file: None, bar: None, warnings: Vec::new() }
     }
 
     /// Locks this file for the run, as long as the log exists; creates a missing one if `create` is set.
@@ -93,6 +99,20 @@ impl Log {
             }
             self.file_line(&words);
         }
+    }
+
+    /// Writes the line of a step to the file and, where no progress bar moves, to the terminal: there once a second, or always if
+    /// `is_wanted`.
+    pub(crate) fn step_line(&mut self, words: &str, is_wanted: bool) {
+        if !self.is_active {
+            return;
+        }
+        let is_due = self.stepped.is_none_or(|printed| printed.elapsed() >= BETWEEN_STEPS);
+        if self.bar.is_none() && self.on_terminal && (is_due || is_wanted) {
+            print_line(words);
+            self.stepped = Some(Instant::now());
+        }
+        self.file_line(words);
     }
 
     fn file_line(&mut self, words: &str) {

@@ -1,7 +1,7 @@
 //! Pictures as SVG and PNG: charts, and bodies with their fields.
 //!
 //! Charts are drawn by plotters, bodies by this module, both as SVG: text remains text, in the reader's own sans-serif
-//! font. PNG files are rendered from the same SVG by resvg with a font included in the program, so that both agree and no font
+//! font. PNG files are rendered by resvg from the same SVG, with the letters of a font included in the program as outlines: no font
 //! of the computer is needed.
 
 pub mod body;
@@ -9,6 +9,7 @@ pub mod chart;
 pub mod colour;
 pub mod common;
 pub mod frame;
+mod letters;
 pub mod markup;
 mod paint;
 pub mod picture;

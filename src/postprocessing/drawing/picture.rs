@@ -1,16 +1,13 @@
 //! A picture as SVG and as PNG.
 
-use super::{chart::Chart, markup::escape};
+use super::{chart::Chart, letters::outlined, markup::escape};
 use crate::error::{Error, Result};
 use resvg::{tiny_skia, usvg};
-use std::sync::Arc;
 
 /// Pixels of a PNG file per unit of the view box.
 const RESOLUTION: f32 = 2.0;
 /// Pixels of a thumbnail per unit of the view box.
 const THUMBNAIL: f32 = 0.5;
-/// The font of PNG files, so that they need no font of the computer.
-const FONT: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
 
 /// A picture with its texts.
 #[derive(Debug, Clone)]
@@ -77,7 +74,7 @@ impl Picture {
 
     /// The drawing as the content of a PNG file.
     pub fn png(&self) -> Result<Vec<u8>> {
-        self.rendered(&self.svg, RESOLUTION)
+        self.rendered(&outlined(&self.svg)?, RESOLUTION)
     }
 
     /// A small PNG file without the texts, which would be illegible.
@@ -91,11 +88,8 @@ impl Picture {
     fn rendered(&self, svg: &str, resolution: f32) -> Result<Vec<u8>> {
         let fault =
             |words: String| Error::Internal(format!("the picture {} cannot be drawn: {words}", self.name));
-        let mut options = usvg::Options::default();
-        let fonts = Arc::make_mut(&mut options.fontdb);
-        fonts.load_font_data(FONT.to_vec());
-        fonts.set_sans_serif_family("DejaVu Sans");
-        let tree = usvg::Tree::from_str(svg, &options).map_err(|error| fault(error.to_string()))?;
+        let tree =
+            usvg::Tree::from_str(svg, &usvg::Options::default()).map_err(|error| fault(error.to_string()))?;
         let size = tree.size().to_int_size().scale_by(resolution).ok_or_else(|| fault("no size".into()))?;
         let mut pixels =
             tiny_skia::Pixmap::new(size.width(), size.height()).ok_or_else(|| fault("no size".into()))?;
