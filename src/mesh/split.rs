@@ -38,6 +38,127 @@ impl Groups {
     }
 }
 
+/// One side of a facet: the number of the facet, and 0 or 1.
+type Side = [usize; 2];
+
+/// A surface along which a mesh is split.
+struct Fault<'a, const D: usize> {
+    name: &'a str,
+    facets: Vec<Sorted<D>>,
+    /// The numbers of the facets.
+    numbers: HashMap<Sorted<D>, usize>,
+    /// The cells on the sides of each facet, and the position of their node opposite to it.
+    cells: Vec<Vec<(usize, usize)>>,
+    /// The nodes that become two, and the cells around each on the one side and on the other.
+    split: BTreeMap<u32, Vec<Vec<usize>>>,
+    /// The sides of facets: those that meet on the same side of a node that becomes two are in the same group.
+    sides: Groups,
+}
+
+impl<'a, const D: usize> Fault<'a, D> {
+    /// The fault with this name and these facets; refused where it can't open.
+    fn new(mesh: &GlobalMesh<D>, name: &'a str, facets: Vec<Sorted<D>>) -> Result<Self> {
+        let numbers = facets.iter().copied().zip(0..).collect();
+        let (cells, sides) = (vec![Vec::new(); facets.len()], Groups::new(2 * facets.len()));
+        let mut fault = Self { name, facets, numbers, cells, split: BTreeMap::new(), sides };
+        let around = fault.find_cells(mesh);
+        if let Some(facet) = fault.cells.iter().position(|cells| cells.len() != 2) {
+            return Err(fault.refusal(mesh, "is on the surface of the body", facet));
+        }
+        fault.split_nodes(mesh, &around)?;
+        if fault.split.is_empty() {
+            let words = "has no node away from its edge, so that it cannot open; refine the mesh";
+            return Err(fault.refusal(mesh, words, 0));
+        }
+        let one_sided = |facet: usize| fault.group([facet, 0]) == fault.group([facet, 1]);
+        match (0..fault.facets.len()).find(|facet| fault.opens(*facet) && one_sided(*facet)) {
+            Some(facet) => Err(fault.refusal(mesh, "has one side only", facet)),
+            None => Ok(fault),
+        }
+    }
+
+    fn refusal(&self, mesh: &GlobalMesh<D>, words: &str, facet: usize) -> Error {
+        let corners = self.facets[facet].map(|node| mesh.nodes[node as usize]);
+        Error::Refused(format!("the fault \"{}\" {words} around {}", self.name, place(&centroid(&corners))))
+    }
+
+    /// Finds the cells of each facet, and gives those around each node.
+    fn find_cells(&mut self, mesh: &GlobalMesh<D>) -> BTreeMap<u32, Vec<usize>> {
+        let on_fault: BTreeSet<u32> = self.facets.iter().flatten().copied().collect();
+        let mut around: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (cell, nodes) in mesh.cells.chunks_exact(D + 1).enumerate() {
+            nodes.iter().filter(|node| on_fault.contains(node)).for_each(|node| {
+                around.entry(*node).or_default().push(cell);
+            });
+            for opposite in 0..=D {
+                if let Some(&facet) = self.numbers.get(&sorted(facet_of::<D>(nodes, opposite))) {
+                    self.cells[facet].push((cell, opposite));
+                }
+            }
+        }
+        around
+    }
+
+    /// Finds the nodes that become two, and the sides of facets that belong together.
+    fn split_nodes(&mut self, mesh: &GlobalMesh<D>, around: &BTreeMap<u32, Vec<usize>>) -> Result<()> {
+        for (&node, cells) in around {
+            let parts = mesh.parts_around(node, cells, &self.numbers);
+            match parts.len() {
+                1 => continue,
+                2 => {}
+                _ => {
+                    let facet = self.facets.iter().position(|facet| facet.contains(&node)).unwrap_or(0);
+                    return Err(self.refusal(mesh, "branches, which a fault can't do,", facet));
+                }
+            }
+            for part in &parts {
+                let here: Vec<Side> =
+                    self.sides_at(node).filter(|side| part.contains(&self.cell(*side))).collect();
+                here.windows(2).for_each(|pair| {
+                    let [one, other] = [pair[0], pair[1]].map(|[facet, side]| 2 * facet + side);
+                    self.sides.join(one, other);
+                });
+            }
+            self.split.insert(node, parts);
+        }
+        Ok(())
+    }
+
+    /// The sides of all facets with this node.
+    fn sides_at(&self, node: u32) -> impl Iterator<Item = Side> {
+        let facets = (0..self.facets.len()).filter(move |facet| self.facets[*facet].contains(&node));
+        facets.flat_map(|facet| [[facet, 0], [facet, 1]])
+    }
+
+    /// The cell on this side.
+    fn cell(&self, [facet, side]: Side) -> usize {
+        self.cells[facet][side].0
+    }
+
+    /// The group of this side.
+    fn group(&self, [facet, side]: Side) -> usize {
+        self.sides.of(2 * facet + side)
+    }
+
+    /// Whether some node of a facet becomes two.
+    fn opens(&self, facet: usize) -> bool {
+        self.facets[facet].iter().any(|node| self.split.contains_key(node))
+    }
+
+    /// For each group of sides, whether it carries the law: in each connected part, the side of the first facet does.
+    fn carriers(&self) -> HashMap<usize, bool> {
+        let mut carries: HashMap<usize, bool> = HashMap::new();
+        for facet in 0..self.facets.len() {
+            let [first, second] = [0, 1].map(|side| self.group([facet, side]));
+            let known = carries.get(&first).copied().or_else(|| carries.get(&second).map(|carries| !carries));
+            let first_carries = known.unwrap_or(true);
+            carries.insert(first, first_carries);
+            carries.insert(second, !first_carries);
+        }
+        carries
+    }
+}
+
 impl<const D: usize> GlobalMesh<D> {
     /// Splits the mesh along the facets inside the body that have this name: their nodes become two, except on the edge of the surface
     /// inside the body, where cells stay joined. The sides become two boundaries: one with this name, and [`other_side`]. Refused where
@@ -50,113 +171,51 @@ impl<const D: usize> GlobalMesh<D> {
             let place = &self.inner_groups[at].place;
             return Err(Error::Refused(format!("the fault \"{name}\", around {place}, meets another fault")));
         }
-        let refused = |words: &str, facet: &Sorted<D>| {
-            let corners = facet.map(|node| self.nodes[node as usize]);
-            Err(Error::Refused(format!("the fault \"{name}\" {words} around {}", place(&centroid(&corners)))))
-        };
-        let numbers: HashMap<Sorted<D>, usize> = facets.iter().copied().zip(0..).collect();
-        let on_fault: BTreeSet<u32> = facets.iter().flatten().copied().collect();
-        // The two cells of each facet, and the cells around each node.
-        let mut sides = vec![Vec::new(); facets.len()];
-        let mut around: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (cell, nodes) in self.cells.chunks_exact(D + 1).enumerate() {
-            nodes.iter().filter(|node| on_fault.contains(node)).for_each(|node| {
-                around.entry(*node).or_default().push(cell);
-            });
-            for opposite in 0..=D {
-                if let Some(&facet) = numbers.get(&sorted(facet_of::<D>(nodes, opposite))) {
-                    sides[facet].push((cell, opposite));
-                }
-            }
-        }
-        if let Some(facet) = sides.iter().position(|cells| cells.len() != 2) {
-            return refused("is on the surface of the body", &facets[facet]);
-        }
-        // The sides of facets at a common node that becomes two are in the same group.
-        let mut groups = Groups::new(2 * facets.len());
-        let mut split: BTreeMap<u32, Vec<Vec<usize>>> = BTreeMap::new();
-        for (&node, cells) in &around {
-            let parts = self.parts_around(node, cells, &numbers);
-            match parts.len() {
-                1 => continue,
-                2 => {}
-                _ => {
-                    let facet = facets.iter().find(|facet| facet.contains(&node)).unwrap_or(&facets[0]);
-                    return refused("branches, which a fault can't do,", facet);
-                }
-            }
-            for part in &parts {
-                let at_node = (0..facets.len()).filter(|number| facets[*number].contains(&node));
-                let both = at_node.flat_map(|number| [(number, 0), (number, 1)]);
-                let here = both.filter(|(number, side)| part.contains(&sides[*number][*side].0));
-                let mut of_part = here.map(|(number, side)| 2 * number + side);
-                if let Some(first) = of_part.next() {
-                    of_part.for_each(|other| groups.join(first, other));
-                }
-            }
-            split.insert(node, parts);
-        }
-        let opens = |facet: &Sorted<D>| facet.iter().any(|node| split.contains_key(node));
-        if split.is_empty() {
-            return refused(
-                "has no node away from its edge, so that it cannot open; refine the mesh",
-                &facets[0],
-            );
-        }
-        let one_sided = |number: usize| groups.of(2 * number) == groups.of(2 * number + 1);
-        if let Some(facet) = (0..facets.len()).find(|number| opens(&facets[*number]) && one_sided(*number)) {
-            return refused("has one side only", &facets[facet]);
-        }
-        // Of each connected part, the side of the first facet carries the law.
-        let mut carries: HashMap<usize, bool> = HashMap::new();
-        for number in 0..facets.len() {
-            let [first, second] = [0, 1].map(|side| groups.of(2 * number + side));
-            let known = carries.get(&first).copied().or_else(|| carries.get(&second).map(|carries| !carries));
-            let first_carries = known.unwrap_or(true);
-            carries.insert(first, first_carries);
-            carries.insert(second, !first_carries);
-        }
-        let carries = |number: usize, side: usize| carries[&groups.of(2 * number + side)];
-        let mut moved: HashMap<(usize, u32), u32> = HashMap::new();
-        for (&node, parts) in &split {
-            let at_node = (0..facets.len()).filter(|number| facets[*number].contains(&node));
-            let Some((number, side)) =
-                at_node.flat_map(|number| [(number, 0), (number, 1)]).find(|(n, side)| carries(*n, *side))
-            else {
-                continue;
-            };
-            let cell = sides[number][side].0;
+        let fault = Fault::new(self, name, facets)?;
+        let carriers = fault.carriers();
+        let carries = |side: Side| carriers[&fault.group(side)];
+        self.double_nodes(&fault, carries);
+        self.add_sides(&fault, carries);
+        self.inner_groups.remove(at);
+        self.inner_facets.remove(at);
+        // Facets of faults that meet this one would have nodes of one side or the other.
+        let meets =
+            |facets: &Vec<Sorted<D>>| facets.iter().flatten().any(|node| fault.split.contains_key(node));
+        self.inner_facets.iter_mut().filter(|facets| meets(facets)).for_each(Vec::clear);
+        Ok(())
+    }
+
+    /// Gives the cells on the side that carries the law, and their facets, new nodes in place of those that become two.
+    fn double_nodes(&mut self, fault: &Fault<'_, D>, carries: impl Fn(Side) -> bool) {
+        let mut twins: HashMap<(usize, u32), u32> = HashMap::new();
+        for (&node, parts) in &fault.split {
+            let Some(side) = fault.sides_at(node).find(|side| carries(*side)) else { continue };
             let twin = self.nodes.len() as u32;
             self.nodes.push(self.nodes[node as usize]);
-            let part = parts.iter().find(|part| part.contains(&cell)).into_iter().flatten();
-            part.for_each(|&cell| {
-                moved.insert((cell, node), twin);
-            });
+            let part = parts.iter().find(|part| part.contains(&fault.cell(side))).into_iter().flatten();
+            twins.extend(part.map(|&cell| ((cell, node), twin)));
         }
-        for (cell, nodes) in self.cells.chunks_exact_mut(D + 1).enumerate() {
-            nodes.iter_mut().for_each(|node| *node = moved.get(&(cell, *node)).copied().unwrap_or(*node));
-        }
-        for (facet, &cell) in self.facets.iter_mut().zip(&self.facet_cells) {
-            let key = |node| (cell as usize, node);
-            facet.iter_mut().for_each(|node| *node = moved.get(&key(*node)).copied().unwrap_or(*node));
-        }
-        let mut named = [Vec::new(), Vec::new()];
-        for number in (0..facets.len()).filter(|number| opens(&facets[*number])) {
-            for (side, &(cell, opposite)) in sides[number].iter().enumerate() {
-                named[usize::from(!carries(number, side))].push(self.facets.len() as u32);
+        let replace = |cell: usize, nodes: &mut [u32]| {
+            nodes.iter_mut().for_each(|node| *node = twins.get(&(cell, *node)).copied().unwrap_or(*node));
+        };
+        self.cells.chunks_exact_mut(D + 1).enumerate().for_each(|(cell, nodes)| replace(cell, nodes));
+        let facets = self.facets.iter_mut().zip(&self.facet_cells);
+        facets.for_each(|(facet, &cell)| replace(cell as usize, facet));
+    }
+
+    /// Adds the facets of both sides as boundaries, that of the side that carries the law first.
+    fn add_sides(&mut self, fault: &Fault<'_, D>, carries: impl Fn(Side) -> bool) {
+        let mut sides = [Vec::new(), Vec::new()];
+        for number in (0..fault.facets.len()).filter(|facet| fault.opens(*facet)) {
+            for (side, &(cell, opposite)) in fault.cells[number].iter().enumerate() {
+                sides[usize::from(!carries([number, side]))].push(self.facets.len() as u32);
                 self.facets.push(facet_of::<D>(&self.cells[cell * (D + 1)..(cell + 1) * (D + 1)], opposite));
                 self.facet_cells.push(cell as u32);
             }
         }
-        let [own, other] = named;
-        self.boundaries.push(Boundary { name: name.into(), facets: own });
-        self.boundaries.push(Boundary { name: other_side(name), facets: other });
-        self.inner_groups.remove(at);
-        self.inner_facets.remove(at);
-        // Facets of faults that meet this one would have nodes of one side or the other.
-        let meets = |facets: &Vec<Sorted<D>>| facets.iter().flatten().any(|node| split.contains_key(node));
-        self.inner_facets.iter_mut().filter(|facets| meets(facets)).for_each(Vec::clear);
-        Ok(())
+        let names = [fault.name.into(), other_side(fault.name)];
+        let boundaries = names.into_iter().zip(sides).map(|(name, facets)| Boundary { name, facets });
+        self.boundaries.extend(boundaries);
     }
 
     /// The cells around a node, in parts that are connected through facets at the node that are not on the fault.

@@ -42,43 +42,14 @@ pub(super) fn body<const D: usize, const S: usize>(
     let materials = Materials::new(session, job, &mesh)?;
     let geometry = Geometry::by_cells(&mesh, |cell| materials.of_cell(&mesh, cell));
     let mut state = session.agree(State::at_rest(&mesh))?;
-    let Supports { held, motion } = Supports::of_body(session, &mesh, &job.support, &state.velocity)?;
+    let supports = Supports::of_body(session, &mesh, &job.support, &state.velocity)?;
     let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
     let load = load(job, &mesh, &materials.all);
-    let elastic_support = elastic_support::<D, S>(session, job, &mesh, &held, &materials)?;
-    let coupling = coupling(session, &mesh, &pairs, &held)?;
-    let mut contacts = Vec::new();
-    let mut taken = BTreeSet::new();
-    let mut parts = Vec::new();
-    for (number, contact) in job.contact.iter().enumerate() {
-        let facets = part_of(session, &mesh, ("contact", &contact.on), contact.part.as_ref())?;
-        session.agree(take_facets(contact, &mesh, &facets, &mut taken))?;
-        parts.push(facets.clone());
-        if let Some(motion) = &motion {
-            let points = surface_points(session, &mesh, &facets)?;
-            session.agree(refuse_moving_contact(contact, &mesh, &points, (&held, motion)))?;
-        }
-        let (law, gap) = session.agree(normal_law(contact))?;
-        let mut laws = Contact::new(
-            session,
-            &mesh,
-            &facets,
-            ContactConditions {
-                quadrature: contact.quadrature,
-                law,
-                gap,
-                paired: nodes_of(&pairs, number).map(<[_]>::to_vec),
-            },
-            &held,
-        )?;
-        laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
-        laws.wear = contact.wear;
-        if let Some(friction) = &contact.friction {
-            session.agree(laws.add_friction(friction.clone(), &mesh, &held))?;
-        }
-        contacts.push(laws);
-    }
+    let elastic_support = elastic_support::<D, S>(session, job, &mesh, &supports.held, &materials)?;
+    let coupling = coupling(session, &mesh, &pairs, &supports.held)?;
+    let (mut contacts, parts) = contacts(session, job, &mesh, &pairs, &supports)?;
+    let Supports { held, motion } = supports;
     let points = |at: usize| -> Result<Vec<SurfacePoint<D>>> {
         let points = match nodes_of(&pairs, at) {
             Some(paired) => paired.iter().map(PairedNode::point).collect(),
@@ -117,14 +88,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     }
     refuse_conflicts(session, job, &body)?;
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
-        let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
-        let mut facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
-        let pairs = body.pairs.iter().filter(|pair| job.contact[pair.contact].redistribute_mass);
-        facets.extend(pairs.flat_map(|pair| &pair.against));
-        facets.sort_unstable();
-        facets.dedup();
-        session.agree(body.redistribute_mass(session, &facets, &state.velocity))?;
-        session.agree(refuse_remaining_mass(job, &body))?;
+        redistribute_mass(session, job, &mut body, &parts, &state)?;
     }
     if job.time.adaptive.is_some() || job.time.scheme.states() > 1 {
         body.keep_earlier();
@@ -133,6 +97,55 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.restore_history(STRESS_OF_FLOW, Moment::Last, initial_stress.as_flattened());
     }
     Ok((body, state))
+}
+
+/// The contacts of a job, and the facets of each on this rank. Collective.
+fn contacts<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &[Pair<D>],
+    Supports { held, motion }: &Supports<D>,
+) -> Result<(Vec<Contact<D>>, Vec<Vec<u32>>)> {
+    let (mut contacts, mut parts, mut taken) = (Vec::new(), Vec::new(), BTreeSet::new());
+    for (number, contact) in job.contact.iter().enumerate() {
+        let facets = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
+        session.agree(take_facets(contact, mesh, &facets, &mut taken))?;
+        if let Some(motion) = motion {
+            let points = surface_points(session, mesh, &facets)?;
+            session.agree(refuse_moving_contact(contact, mesh, &points, (held, motion)))?;
+        }
+        let (law, gap) = session.agree(normal_law(contact))?;
+        let paired = nodes_of(pairs, number).map(<[_]>::to_vec);
+        let conditions = ContactConditions { quadrature: contact.quadrature, law, gap, paired };
+        let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
+        laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
+        laws.wear = contact.wear;
+        if let Some(friction) = &contact.friction {
+            session.agree(laws.add_friction(friction.clone(), mesh, held))?;
+        }
+        contacts.push(laws);
+        parts.push(facets);
+    }
+    Ok((contacts, parts))
+}
+
+/// Removes the mass of contacts that request it, given the facets of each contact, and of what they face. Collective.
+fn redistribute_mass<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &mut Body<D, S>,
+    parts: &[Vec<u32>],
+    state: &State,
+) -> Result<()> {
+    let given = job.contact.iter().zip(parts).filter(|(contact, _)| contact.redistribute_mass);
+    let mut facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
+    let pairs = body.pairs.iter().filter(|pair| job.contact[pair.contact].redistribute_mass);
+    facets.extend(pairs.flat_map(|pair| &pair.against));
+    facets.sort_unstable();
+    facets.dedup();
+    session.agree(body.redistribute_mass(session, &facets, &state.velocity))?;
+    Ok(session.agree(refuse_remaining_mass(job, body))?)
 }
 
 /// If the end of a step is extrapolated, every contact node must be without mass.

@@ -185,6 +185,8 @@ pub struct SolveCounts {
     pub residuals: usize,
     /// Norm in N of the first residual.
     pub first: f64,
+    /// Iterations of Newton's method.
+    pub newton_iterations: usize,
     /// Krylov iterations.
     pub linear_iterations: usize,
     /// Those of the last linear system.

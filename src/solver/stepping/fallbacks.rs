@@ -9,12 +9,10 @@ pub(super) struct Fallback {
     /// Ratio of the parameters of the graphs to the resistance of the body; which branches recur depends on it.
     pub stiffness_factor: f64,
     pub iteration: FrictionIteration,
-    /// Whether points with friction yield at first, and less and less until they obey their law.
-    pub yields_at_first: bool,
 }
 
 /// Step lengths of Newton's method, and the equations that determine them.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Search {
     /// Full steps only.
     FullSteps,
@@ -27,49 +25,16 @@ pub(super) enum Search {
     Descent,
     /// The same with few directions.
     ShortDescent,
+    /// The same from a solution with friction points that yield at first, and less and less until they obey their law.
+    Yielding,
 }
 
 impl Search {
     /// Whether steps lower an energy.
     pub(super) fn minimises(self) -> bool {
-        matches!(self, Self::Descent | Self::ShortDescent)
+        matches!(self, Self::Descent | Self::ShortDescent | Self::Yielding)
     }
 }
-
-const fn fallback(search: Search, stiffness_factor: f64, iteration: FrictionIteration) -> Fallback {
-    Fallback { search, stiffness_factor, iteration, yields_at_first: false }
-}
-
-/// The fallbacks that are tried in turn until a step is solved, each from the start value of the step.
-///
-/// Full steps are tried first: a new set of branches raises the residual of the whole body, so that a line search would take very
-/// short steps where full ones converge. With all other velocities in equilibrium the residual is that of the contact points alone
-/// and measures their error. Fixed-point iteration avoids cycles between pressure and friction; it is used if friction depends on the
-/// pressure. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
-/// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge.
-const FALLBACKS: [Fallback; 15] = [
-    fallback(Search::FullSteps, 1.0, FrictionIteration::Newton),
-    YIELDING,
-    fallback(Search::Equilibrated, 1.0, FrictionIteration::Newton),
-    fallback(Search::Equilibrated, 10.0, FrictionIteration::Newton),
-    fallback(Search::FullSteps, 10.0, FrictionIteration::Newton),
-    fallback(Search::Backtracking, 1.0, FrictionIteration::Newton),
-    fallback(Search::FullSteps, 100.0, FrictionIteration::Newton),
-    fallback(Search::Backtracking, 1.0 / 30.0, FrictionIteration::Newton),
-    fallback(Search::FullSteps, 1.0, FrictionIteration::FixedPoint),
-    fallback(Search::Equilibrated, 1.0, FrictionIteration::FixedPoint),
-    fallback(Search::FullSteps, 30.0, FrictionIteration::FixedPoint),
-    fallback(Search::Equilibrated, 30.0, FrictionIteration::FixedPoint),
-    fallback(Search::Backtracking, 30.0, FrictionIteration::FixedPoint),
-    DESCENT,
-    fallback(Search::Descent, 1.0, FrictionIteration::FixedPoint),
-];
-
-/// A light obstacle on a stiff body: points that stick and slide in turn move it to and fro.
-const YIELDING: Fallback =
-    Fallback { yields_at_first: true, ..fallback(Search::Descent, 1.0, FrictionIteration::FixedPoint) };
-
-const DESCENT: Fallback = fallback(Search::Descent, 1.0, FrictionIteration::Newton);
 
 /// The properties that determine the fallbacks of a step.
 #[derive(Clone, Copy)]
@@ -91,29 +56,106 @@ pub(super) struct Conditions {
 }
 
 impl Conditions {
-    /// The fallbacks in order.
+    /// The fallbacks that are tried in turn until a step is solved, each from the start value of the step.
+    ///
+    /// Full steps are tried first: a new set of branches raises the residual of the whole body, so that a line search would take very
+    /// short steps where full ones converge. With all other velocities in equilibrium the residual is that of the contact points alone
+    /// and measures their error. Fixed-point iteration avoids cycles between pressure and friction; it is used if friction depends on the
+    /// pressure. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
+    /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge. Friction
+    /// points yield at first for a light obstacle on a stiff body, which points that stick and slide in turn move to and fro; and at
+    /// last for bodies that nothing but little friction holds.
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
-        let applies = move |fallback: &Fallback| {
-            let iteration = match fallback.iteration {
-                FrictionIteration::Newton => {
-                    !self.follows_pressure || self.friction == FrictionIteration::Newton
-                }
-                FrictionIteration::FixedPoint => self.follows_pressure || fallback.yields_at_first,
-            };
-            let search = match fallback.search {
-                Search::FullSteps => !self.has_user_search,
-                Search::Equilibrated => self.interior_is_linear,
-                Search::Backtracking => true,
-                Search::Descent | Search::ShortDescent => {
-                    (self.softens || fallback.yields_at_first) && !self.has_user_search
-                }
-            };
-            iteration && search && (self.rubs_obstacles || !fallback.yields_at_first)
-        };
-        let first = self.has_bonds.then_some(DESCENT);
-        // Bodies that nothing but little friction holds.
-        let last =
-            (self.follows_pressure && !self.rubs_obstacles && !self.has_user_search).then_some(YIELDING);
-        first.into_iter().chain(FALLBACKS).filter(applies).chain(last)
+        use FrictionIteration::{FixedPoint, Newton};
+        use Search::{Backtracking, Descent, Equilibrated, FullSteps, Yielding};
+        let follows_bounds = !self.follows_pressure || self.friction == Newton;
+        let fixes_bounds = self.follows_pressure;
+        let little_friction = self.follows_pressure && !self.rubs_obstacles;
+        [
+            (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
+            (follows_bounds, FullSteps, 1.0, Newton),
+            (self.rubs_obstacles, Yielding, 1.0, FixedPoint),
+            (follows_bounds, Equilibrated, 1.0, Newton),
+            (follows_bounds, Equilibrated, 10.0, Newton),
+            (follows_bounds, FullSteps, 10.0, Newton),
+            (follows_bounds, Backtracking, 1.0, Newton),
+            (follows_bounds, FullSteps, 100.0, Newton),
+            (follows_bounds, Backtracking, 1.0 / 30.0, Newton),
+            (fixes_bounds, FullSteps, 1.0, FixedPoint),
+            (fixes_bounds, Equilibrated, 1.0, FixedPoint),
+            (fixes_bounds, FullSteps, 30.0, FixedPoint),
+            (fixes_bounds, Equilibrated, 30.0, FixedPoint),
+            (fixes_bounds, Backtracking, 30.0, FixedPoint),
+            (follows_bounds, Descent, 1.0, Newton),
+            (fixes_bounds, Descent, 1.0, FixedPoint),
+            (little_friction, Yielding, 1.0, FixedPoint),
+        ]
+        .into_iter()
+        .filter(move |(is_wanted, search, ..)| *is_wanted && self.allows(*search))
+        .map(|(_, search, stiffness_factor, iteration)| Fallback {
+            search,
+            stiffness_factor,
+            iteration,
+        })
+    }
+
+    /// Whether the equations can be solved by this search.
+    fn allows(self, search: Search) -> bool {
+        match search {
+            Search::FullSteps | Search::Yielding => !self.has_user_search,
+            Search::Equilibrated => self.interior_is_linear,
+            Search::Backtracking => true,
+            Search::Descent | Search::ShortDescent => self.softens && !self.has_user_search,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRICTIONLESS: Conditions = Conditions {
+        follows_pressure: false,
+        friction: FrictionIteration::Newton,
+        has_user_search: false,
+        interior_is_linear: true,
+        rubs_obstacles: false,
+        softens: false,
+        has_bonds: false,
+    };
+
+    fn searches(conditions: Conditions) -> Vec<Search> {
+        conditions.fallbacks().map(|fallback| fallback.search).collect()
+    }
+
+    #[test]
+    fn full_steps_come_first_and_the_descent_of_bonds_before_them() {
+        assert_eq!(searches(FRICTIONLESS)[..2], [Search::FullSteps, Search::Equilibrated]);
+        let bonds = Conditions { softens: true, has_bonds: true, interior_is_linear: false, ..FRICTIONLESS };
+        let found = searches(bonds);
+        assert_eq!(found[..2], [Search::Descent, Search::FullSteps]);
+        assert_eq!(found.last(), Some(&Search::Descent), "from the start value again");
+    }
+
+    #[test]
+    fn friction_points_yield_second_with_driven_obstacles_and_last_with_bounds_that_follow_the_pressure() {
+        let rubs = Conditions { rubs_obstacles: true, interior_is_linear: false, ..FRICTIONLESS };
+        let found = searches(rubs);
+        assert_eq!(found[1], Search::Yielding);
+        assert_eq!(found.iter().filter(|search| **search == Search::Yielding).count(), 1);
+        let coulomb = Conditions { follows_pressure: true, ..FRICTIONLESS };
+        assert_eq!(searches(coulomb).last(), Some(&Search::Yielding));
+        assert!(!searches(FRICTIONLESS).contains(&Search::Yielding));
+    }
+
+    #[test]
+    fn a_line_search_of_the_user_and_a_fixed_point_iteration_leave_out_what_they_replace() {
+        let own = Conditions { has_user_search: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
+        assert!(
+            searches(own).iter().all(|search| matches!(search, Search::Backtracking | Search::Equilibrated))
+        );
+        let fixed = FrictionIteration::FixedPoint;
+        let fixed_point = Conditions { follows_pressure: true, friction: fixed, ..FRICTIONLESS };
+        assert!(fixed_point.fallbacks().all(|fallback| fallback.iteration == fixed));
     }
 }

@@ -10,17 +10,17 @@ use super::{
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
     obstacle_motions::ObstacleMotions,
-    problem::{MASSLESS_REMEDY, REMEDY, STEEP_RISE, StepProblem, System, rise_remedy, softening_remedy},
+    problem::{StepProblem, System},
     solver::Reduced,
 };
 use crate::{
-    error::{Error, Result},
+    error::Result,
     fem::{
         body::Body,
-        effect::{COUNTS, Contact, Energy, Form, Peaks, PointCount},
+        effect::{COUNTS, Contact, PointCount},
     },
     linear_algebra::{
-        petsc::{DistributedVector, ProjectedKsp, Snes, has_option},
+        petsc::{DistributedVector, Snes, has_option},
         tensor::larger,
     },
     parallel::session::Session,
@@ -50,8 +50,6 @@ pub(super) struct Newton {
     counts: SolveCounts,
     /// The velocity from which the step was started.
     start: DistributedVector,
-    /// The tolerance of residuals as a share of that of the step.
-    sharpness: f64,
     /// Whether the user has set a line search.
     has_user_search: bool,
     /// Work data for cells that flow, if there are any.
@@ -93,14 +91,6 @@ const NO_MINIMUM: &str = "no minimum of the energy was found";
 
 const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance is the largest accepted value";
 
-/// Outcome of an attempt to solve a step.
-struct Attempt {
-    /// Newton iterations.
-    iterations: usize,
-    /// The reason for failure, if it failed.
-    failure: Option<String>,
-}
-
 impl Newton {
     /// Newton's method for unknowns with the layout of `like`.
     pub(super) fn new<const D: usize>(
@@ -125,114 +115,138 @@ impl Newton {
             // Longer solutions enlarge the list.
             counts: SolveCounts { sets: Vec::with_capacity(128), ..SolveCounts::default() },
             start: like.like()?,
-            sharpness: 1.0,
             has_user_search: has_option("snes_linesearch_type")?,
             flow: None,
         })
     }
 
     /// Solves equations from their start value: tries one fallback after the other, then checks that velocities and pressures lie on
-    /// the contact graphs. A fixed-point iteration solves with friction bounds at fixed pressures, and updates these until the solution
-    /// also solves the equations with its own pressures. Collective.
+    /// the contact graphs. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
-        Reduced { system, krylov, velocity: trial }: Reduced<'_>,
+        mut equations: Reduced<'_>,
     ) -> Result<StepOutcome> {
         self.counts.restart();
+        let system = equations.system;
         if let Some(bounded) = &mut self.bounded {
             write_branches(problem.body, system.converged, &mut self.branches_before)?;
-            let iterations = bounded.solve(problem, system, trial)?;
-            return self.check_inclusion(problem, trial, iterations);
+            self.counts.newton_iterations = bounded.solve(problem, system, equations.velocity)?;
+            let inclusion = self.inclusion_residual(problem, equations.velocity)?;
+            return self.check_inclusion(problem, equations.velocity, inclusion);
         }
-        self.start.copy_from(trial)?;
-        let contacts = &mut problem.body.contacts;
-        self.obstacles
-            .start(problem.session, contacts, trial, system.tolerance, |x, y| system.matrix.multiply(x, y))?;
-        let [reduction, share] =
-            if self.obstacles.is_empty() { [LINEAR_REDUCTION, LINEAR_SHARE] } else { WITH_OBSTACLES };
-        krylov.set_tolerances(reduction, share * system.tolerance, LINEAR_ITERATIONS)?;
-        write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
+        self.start(problem, &mut equations)?;
         let conditions = self.conditions(problem.body);
-        let mut fallbacks = conditions.fallbacks();
-        let mut next = fallbacks.next();
         // With these parameters, whatever those of the last step were: a restarted run does not know them.
-        if let Some(first) = next {
+        if let Some(first) = conditions.fallbacks().next() {
             self.set_graph_parameters(&mut problem.body.contacts, system.scales, first);
         }
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
-        let (mut iterations, mut failure) = (0, String::new());
-        while let Some(fallback) = next {
-            self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
-            let has_fixed_bounds = fallback.iteration == FrictionIteration::FixedPoint;
-            let mut rounds = 0;
-            if fallback.yields_at_first {
-                iterations += self.solve_yielding(problem, system, krylov, trial)?;
+        let mut failure = String::new();
+        for fallback in conditions.fallbacks() {
+            match self.attempt_with_parameters(problem, &mut equations, fallback)? {
+                Some(reason) => failure = reason,
+                None => return self.finish(problem, &mut equations, fallback.search),
             }
-            self.scratch.restart();
-            let failed = loop {
-                if has_fixed_bounds {
-                    self.fix_bounds(problem, system)?;
-                }
-                let attempt = self.attempt(problem, system, krylov, fallback.search, trial)?;
-                // Where nothing was to be done, the solution for the last bounds also solves the equations with its own bounds.
-                if attempt.failure.is_some() || !has_fixed_bounds || (attempt.iterations == 0 && rounds > 0) {
-                    iterations += attempt.iterations;
-                    break attempt.failure;
-                }
-                iterations += attempt.iterations.max(1);
-                rounds += 1;
-                self.scratch.go_on();
-                if rounds == MAX_FIXED_POINT_ITERATIONS {
-                    break Some(format!(
-                        "friction bounds still change after {rounds} fixed-point iterations"
-                    ));
-                }
-            };
-            if let Some(reason) = failed {
-                trial.copy_from(&self.start)?;
-                restore_pressures(problem.body, problem.state)?;
-                let contacts = &mut problem.body.contacts;
-                let multiply =
-                    |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
-                if !self.obstacles.follow_new_contacts(problem.session, contacts, trial, multiply)? {
-                    (failure, next) = (reason, fallbacks.next());
+        }
+        Err(problem.explain(&failure, conditions.softens))
+    }
+
+    /// Prepares obstacles, linear solves and parameters of friction graphs for new equations. Collective.
+    fn start<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+    ) -> Result<()> {
+        let (session, contacts, system) = (problem.session, &mut problem.body.contacts, equations.system);
+        self.start.copy_from(equations.velocity)?;
+        let multiply = |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
+        self.obstacles.start(session, contacts, equations.velocity, system.tolerance, multiply)?;
+        self.set_linear_tolerances(equations, 1.0)?;
+        write_steepest_decreases(session, contacts, &mut self.steepest_decreases);
+        Ok(())
+    }
+
+    /// Sets the tolerances of linear solves, for equations that are solved to this share of their tolerance.
+    fn set_linear_tolerances(&self, equations: &mut Reduced<'_>, sharpness: f64) -> Result<()> {
+        let [reduction, share] =
+            if self.obstacles.is_empty() { [LINEAR_REDUCTION, LINEAR_SHARE] } else { WITH_OBSTACLES };
+        let tolerance = sharpness * share * equations.system.tolerance;
+        equations.krylov.set_tolerances(reduction, tolerance, LINEAR_ITERATIONS)
+    }
+
+    /// Tries one fallback, again while obstacles touch or part unexpectedly, or while pressures rise so much that friction decreases
+    /// faster than the parameters of its graphs permit; returns the reason for failure, if it fails. Collective.
+    fn attempt_with_parameters<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+        fallback: Fallback,
+    ) -> Result<Option<String>> {
+        let system = equations.system;
+        let multiply = |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
+        loop {
+            self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
+            let failure = self.attempt_with_bounds(problem, equations, fallback)?;
+            let (session, contacts) = (problem.session, &mut problem.body.contacts);
+            if failure.is_none() {
+                write_steepest_decreases(session, contacts, &mut self.steepest_decreases);
+                let mut pairs = contacts.iter().zip(&self.steepest_decreases);
+                if pairs
+                    .all(|(contact, decrease)| *decrease <= LARGEST_DECREASE_RATIO * contact.friction_scale())
+                {
+                    return Ok(None);
                 }
                 continue;
             }
-            // The pressure rose so much that the friction graph decreases faster than its parameter permits: repeat with a larger one.
-            write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
-            let mut pairs = problem.body.contacts.iter().zip(&self.steepest_decreases);
-            if pairs.all(|(contact, decrease)| *decrease <= LARGEST_DECREASE_RATIO * contact.friction_scale())
-            {
-                if fallback.yields_at_first {
-                    // Nothing has fallen: the energies were those of fixed friction bounds.
-                    self.counts.unstable = 0;
-                }
-                for times in 1..=MOST_SHARPER {
-                    if self.lies_on_graphs(problem, trial)? {
-                        break;
-                    }
-                    self.sharpness = SHARPER.powi(times);
-                    krylov.set_tolerances(
-                        reduction,
-                        self.sharpness * share * system.tolerance,
-                        LINEAR_ITERATIONS,
-                    )?;
-                    self.scratch.restart();
-                    let attempt = self.attempt(problem, system, krylov, fallback.search, trial);
-                    self.sharpness = 1.0;
-                    let attempt = attempt?;
-                    iterations += attempt.iterations;
-                    // Its last iterate is no solution, even if it is on the graphs.
-                    if let Some(reason) = attempt.failure {
-                        return Err(problem.failed(&reason, INCLUSION_REMEDY));
-                    }
-                }
-                return self.check_inclusion(problem, trial, iterations);
+            self.go_back(problem, equations)?;
+            let (contacts, velocity) = (&mut problem.body.contacts, &*equations.velocity);
+            if !self.obstacles.follow_new_contacts(session, contacts, velocity, multiply)? {
+                return Ok(failure);
             }
         }
-        Err(explain_failure(problem, &failure, conditions.softens))
+    }
+
+    /// Sets velocity and pressures to those from which the step was started.
+    fn go_back<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+    ) -> Result<()> {
+        equations.velocity.copy_from(&self.start)?;
+        restore_pressures(problem.body, problem.state)
+    }
+
+    /// Solves the equations with given parameters of the graphs. A fixed-point iteration solves with friction bounds at fixed pressures,
+    /// and updates these until the solution also solves the equations with its own pressures. Returns the reason for failure, if it
+    /// fails. Collective.
+    fn attempt_with_bounds<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+        Fallback { search, iteration, .. }: Fallback,
+    ) -> Result<Option<String>> {
+        if search == Search::Yielding {
+            self.solve_yielding(problem, equations)?;
+        }
+        self.scratch.restart();
+        if iteration == FrictionIteration::Newton {
+            return self.attempt(problem, equations, search, 1.0);
+        }
+        for round in 0..MAX_FIXED_POINT_ITERATIONS {
+            self.fix_bounds(problem, equations.system)?;
+            let failure = self.attempt(problem, equations, search, 1.0)?;
+            let is_unchanged = self.counts.sets.is_empty();
+            // Where nothing was to be done, the solution for the last bounds also solves the equations with its own bounds.
+            if failure.is_some() || (is_unchanged && round > 0) {
+                return Ok(failure);
+            }
+            self.counts.newton_iterations += usize::from(is_unchanged);
+            self.scratch.go_on();
+        }
+        Ok(Some(format!(
+            "friction bounds still change after {MAX_FIXED_POINT_ITERATIONS} fixed-point iterations"
+        )))
     }
 
     /// Fixes the friction bounds at the pressures of the last evaluation. Collective.
@@ -248,62 +262,39 @@ impl Newton {
     }
 
     /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
-    /// none; returns the Newton iterations. Collective.
+    /// none. Collective.
     fn solve_yielding<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
-        system: System<'_>,
-        krylov: &mut ProjectedKsp,
-        trial: &mut DistributedVector,
-    ) -> Result<usize> {
-        let tolerance = system.tolerance.max(self.settings.tolerance * self.counts.first);
-        let enough = YIELDING_TOLERANCE * tolerance;
-        // The first residual may be much larger than all forces.
-        let tolerance = if system.floor.largest > 0.0 { enough.min(system.floor.largest) } else { enough };
-        let system = System { tolerance, ..system };
-        let (mut iterations, mut reached) = (0, None);
+        equations: &mut Reduced<'_>,
+    ) -> Result<()> {
+        let system = self.loosened(equations.system);
+        let equations = &mut Reduced { system, krylov: equations.krylov, velocity: equations.velocity };
+        let mut reached = None;
         let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
         set_give(problem.body, ratio);
-        {
-            let mut unknowns = trial.owned_mut()?;
-            problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
-            problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut unknowns));
-        }
+        write_unknowns(&problem.body.contacts, equations.velocity)?;
+        write_velocities(&mut problem.body.contacts, equations.velocity)?;
         self.fix_bounds(problem, system)?;
         loop {
             set_give(problem.body, ratio);
             self.scratch.restart();
-            let attempt = self.attempt(problem, system, krylov, Search::ShortDescent, trial)?;
-            iterations += attempt.iterations;
-            if attempt.failure.is_none() {
+            let failure = self.attempt(problem, equations, Search::ShortDescent, 1.0)?;
+            if failure.is_none() {
                 self.fix_bounds(problem, system)?;
-                let unknowns = match &mut self.reached {
-                    Some(unknowns) => unknowns,
-                    none => none.insert(trial.like()?),
-                };
-                unknowns.copy_from(trial)?;
-                {
-                    let mut unknowns = unknowns.owned_mut()?;
-                    problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
-                }
-                self.obstacles.keep(&problem.body.contacts);
+                self.keep_reached(&problem.body.contacts, equations.velocity)?;
                 reached = Some(ratio);
                 factor = f64::max(RATIO_FACTOR, factor * factor);
             } else {
                 factor = factor.sqrt();
             }
-            let (Some(last), Some(unknowns)) = (reached, &self.reached) else {
-                trial.copy_from(&self.start)?;
-                restore_pressures(problem.body, problem.state)?;
+            let Some(last) = reached else {
+                self.go_back(problem, equations)?;
                 break;
             };
-            if attempt.failure.is_some() {
+            if failure.is_some() {
                 set_give(problem.body, last);
-                let contacts = &mut problem.body.contacts;
-                problem.session.agree(self.obstacles.restore(contacts))?;
-                trial.copy_from(unknowns)?;
-                let mut velocity = trial.owned_mut()?;
-                contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+                self.go_to_reached(problem, equations)?;
             }
             if last <= LAST_RATIO || factor > LARGEST_RATIO_FACTOR {
                 break;
@@ -311,7 +302,45 @@ impl Newton {
             ratio = last * factor;
         }
         problem.body.contacts.iter_mut().for_each(|contact| contact.set_give(0.0));
-        Ok(iterations)
+        Ok(())
+    }
+
+    /// The equations with the tolerance of solutions with points that yield.
+    fn loosened<'a>(&self, system: System<'a>) -> System<'a> {
+        let tolerance = system.tolerance.max(self.settings.tolerance * self.counts.first);
+        let enough = YIELDING_TOLERANCE * tolerance;
+        // The first residual may be much larger than all forces.
+        let tolerance = if system.floor.largest > 0.0 { enough.min(system.floor.largest) } else { enough };
+        System { tolerance, ..system }
+    }
+
+    /// Keeps the unknowns of this velocity, and the motions of obstacles.
+    fn keep_reached<const D: usize>(
+        &mut self,
+        contacts: &[Contact<D>],
+        velocity: &DistributedVector,
+    ) -> Result<()> {
+        let unknowns = match &mut self.reached {
+            Some(unknowns) => unknowns,
+            none => none.insert(velocity.like()?),
+        };
+        unknowns.copy_from(velocity)?;
+        write_unknowns(contacts, unknowns)?;
+        self.obstacles.keep(contacts);
+        Ok(())
+    }
+
+    /// Sets velocities, pressures and motions of obstacles to those kept last. Collective.
+    fn go_to_reached<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+    ) -> Result<()> {
+        let Some(unknowns) = &self.reached else { return Ok(()) };
+        let contacts = &mut problem.body.contacts;
+        problem.session.agree(self.obstacles.restore(contacts))?;
+        equations.velocity.copy_from(unknowns)?;
+        write_velocities(contacts, equations.velocity)
     }
 
     fn conditions<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Conditions {
@@ -346,119 +375,150 @@ impl Newton {
         }
     }
 
-    /// Newton's method from the velocity in `trial`, where it writes the solution. Collective.
+    /// Solves equations by one search from the velocity in them, where it writes the solution, to this share of their tolerance; returns
+    /// the reason for failure, if it fails. Collective.
     fn attempt<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
-        system: System<'_>,
-        krylov: &mut ProjectedKsp,
+        equations: &mut Reduced<'_>,
         search: Search,
-        trial: &mut DistributedVector,
-    ) -> Result<Attempt> {
-        let session = problem.session;
+        sharpness: f64,
+    ) -> Result<Option<String>> {
         self.has_descended = search.minimises();
         if self.has_descended {
-            let tolerance = LINEAR_SHARE * system.tolerance;
-            krylov.set_tolerances(DESCENT_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
-            let mut descent = match self.descent.take() {
-                Some(descent) => descent,
-                None => Descent::new(trial)?,
-            };
-            descent.has_other_start = self.writes_steady_start(problem, trial, &mut descent.other_start)?;
-            self.descent = Some(descent);
+            self.prepare_descent(problem, equations)?;
         }
-        {
-            let mut unknowns = trial.owned_mut()?;
-            problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+        write_unknowns(&problem.body.contacts, equations.velocity)?;
+        let solved = self.search(problem, equations, search, sharpness);
+        self.counts.newton_iterations += self.counts.sets.len();
+        let mut failure = self.agree_on_failure(problem.session, solved)?;
+        if search == Search::Equilibrated {
+            equations.velocity.copy_from(&self.scratch.velocity)?;
+        } else {
+            write_velocities(&mut problem.body.contacts, equations.velocity)?;
+            if self.is_at_floor(problem, equations, failure.is_none())? {
+                failure = None;
+            }
         }
+        if failure.is_none() {
+            failure = self.obstacles.failure(self.last_residual().norm()?, self.settings.tolerance);
+        }
+        Ok(failure)
+    }
+
+    /// Prepares the minimisation of energies. Collective.
+    fn prepare_descent<const D: usize, const S: usize>(
+        &mut self,
+        problem: &StepProblem<'_, D, S>,
+        Reduced { system, krylov, velocity }: &mut Reduced<'_>,
+    ) -> Result<()> {
+        krylov.set_tolerances(DESCENT_REDUCTION, LINEAR_SHARE * system.tolerance, LINEAR_ITERATIONS)?;
+        let mut descent = match self.descent.take() {
+            Some(descent) => descent,
+            None => Descent::new(velocity)?,
+        };
+        descent.has_other_start = self.writes_steady_start(problem, velocity, &mut descent.other_start)?;
+        self.descent = Some(descent);
+        Ok(())
+    }
+
+    /// Solves equations for the unknowns in them; returns the reason for failure, if it fails. Collective.
+    fn search<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        Reduced { system, krylov, velocity: unknowns }: &mut Reduced<'_>,
+        search: Search,
+        sharpness: f64,
+    ) -> Result<Option<&'static str>> {
         if !self.has_user_search {
             self.snes.search_along_steps(search != Search::FullSteps)?;
         }
-        // Where pressures depend on the velocity alone, there is no other equilibrium to fall into.
-        let may_fall = self.flow.is_some()
-            || problem
-                .body
-                .contacts
-                .iter()
-                .any(|c| c.law.depends_on_displacement() || c.friction().is_some());
+        // A tolerance relative to the first residual of the step suffices: the right-hand side is almost zero where only an obstacle
+        // moves the body.
+        let absolute = sharpness * system.tolerance.max(self.settings.tolerance * self.counts.first);
+        let tolerances = (absolute, self.settings.tolerance);
+        let limit = self.settings.max_newton_iterations as usize;
+        let directions = match search {
+            Search::ShortDescent => SHORT_DESCENT,
+            _ if self.flow.is_some() || problem.body.contacts.iter().any(may_fall) => {
+                DIRECTIONS_PER_ITERATION * limit
+            }
+            _ => limit,
+        };
         self.counts.sets.clear();
-        let may_end_at_floor = search != Search::Equilibrated;
-        let floor = if may_end_at_floor { system.floor } else { Floor::default() };
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = match (&mut self.flow, problem.flow_start) {
             (Some(flow), Some(start)) => Some(flow.of(cells, start)),
             _ => None,
         };
-        let first = self.counts.first;
+        let is_equilibrated = search == Search::Equilibrated;
         let mut equations = ContactEquations {
             matrix: system.matrix,
             cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
             contacts,
             obstacles: &mut self.obstacles,
             right_hand_side: system.right_hand_side,
-            floor,
+            floor: if is_equilibrated { Floor::default() } else { system.floor },
             scratch: &mut self.scratch,
             linear_solver: krylov,
-            session,
+            session: problem.session,
             stop_at_cycles: search == Search::FullSteps,
-            equilibrated: search == Search::Equilibrated,
+            equilibrated: is_equilibrated,
             counts: std::mem::take(&mut self.counts),
         };
-        // A tolerance relative to the first residual of the step suffices: the right-hand side is almost zero where only an obstacle
-        // moves the body.
-        let absolute = self.sharpness * system.tolerance.max(self.settings.tolerance * first);
-        let tolerances = (absolute, self.settings.tolerance);
-        let limit = self.settings.max_newton_iterations as usize;
-        let descent = self.descent.as_mut().filter(|_| search.minimises());
-        let solved = if let Some(descent) = descent {
-            let directions = match search {
-                Search::ShortDescent => SHORT_DESCENT,
-                _ if may_fall => DIRECTIONS_PER_ITERATION * limit,
-                _ => limit,
-            };
-            let solved = descent.solve(&mut equations, trial, tolerances, directions);
-            equations.set_softening(1.0);
-            solved.map(|converged| (!converged).then_some(NO_MINIMUM))
-        } else {
-            let solved = self.snes.solve(&mut equations, trial, tolerances, limit);
-            solved.map(|outcome| (!outcome.converged()).then(|| outcome.description()))
+        let solved = match self.descent.as_mut().filter(|_| search.minimises()) {
+            Some(descent) => {
+                let solved = descent.solve(&mut equations, unknowns, tolerances, directions);
+                equations.set_softening(1.0);
+                solved.map(|converged| (!converged).then_some(NO_MINIMUM))
+            }
+            None => {
+                let solved = self.snes.solve(&mut equations, unknowns, tolerances, limit);
+                solved.map(|outcome| (!outcome.converged()).then(|| outcome.description()))
+            }
         };
         self.counts = equations.counts;
-        let at_floor = self.scratch.is_at_floor && matches!(&solved, Ok(None));
-        let iterations = self.counts.sets.len();
-        let not_converged = !matches!(&solved, Ok(None));
+        solved
+    }
+
+    /// The reason why a search failed, if it failed on any rank. Collective.
+    fn agree_on_failure(
+        &self,
+        session: &Session,
+        solved: Result<Option<&'static str>>,
+    ) -> Result<Option<String>> {
+        let has_failed = !matches!(&solved, Ok(None));
         // All ranks take the same branch, on whichever rank the failure occurred.
-        let [not_converged] = session.largest([f64::from(u8::from(not_converged))]);
-        let mut failure = if not_converged == 0.0 {
-            None
-        } else {
-            match session.agree(solved) {
-                Ok(reason) => Some(explain(reason.unwrap_or("another rank failed"), &self.counts)),
-                Err(error) if error.is_failure() => Some(error.to_string()),
-                Err(error) => return Err(error.into()),
-            }
-        };
-        if search == Search::Equilibrated {
-            trial.copy_from(&self.scratch.velocity)?;
-        } else {
-            let mut velocity = trial.owned_mut()?;
-            problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+        if session.total(usize::from(has_failed)) == 0 {
+            return Ok(None);
         }
-        if may_end_at_floor && (at_floor || failure.is_some()) {
-            let speed = trial.norm()? + self.obstacles.speed(&problem.body.contacts);
-            if at_floor || floor.is_reached(self.last_residual().norm()?, speed) {
-                failure = None;
-                // The accuracy of pressures is limited by the same errors.
-                let forces = floor.at(speed) / self.settings.inclusion_tolerance
-                    * ((problem.body.mesh.total_nodes * D) as f64).sqrt();
-                let contacts = &mut problem.body.contacts;
-                contacts.iter_mut().for_each(|c| c.reference.forces = c.reference.forces.max(forces));
-            }
+        match session.agree(solved) {
+            Ok(reason) => Ok(Some(explain(reason.unwrap_or("another rank failed"), &self.counts))),
+            Err(error) if error.is_failure() => Ok(Some(error.to_string())),
+            Err(error) => Err(error.into()),
         }
-        if failure.is_none() {
-            failure = self.obstacles.failure(self.last_residual().norm()?, self.settings.tolerance);
+    }
+
+    /// Whether a search that converged or failed has ended at the rounding errors of the forces. These limit the accuracy of pressures,
+    /// too: sets the reference forces of the contacts accordingly. Collective.
+    fn is_at_floor<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &Reduced<'_>,
+        has_converged: bool,
+    ) -> Result<bool> {
+        if has_converged && !self.scratch.is_at_floor {
+            return Ok(false);
         }
-        Ok(Attempt { iterations, failure })
+        let (contacts, floor) = (&mut problem.body.contacts, equations.system.floor);
+        let speed = equations.velocity.norm()? + self.obstacles.speed(contacts);
+        if !has_converged && !floor.is_reached(self.last_residual().norm()?, speed) {
+            return Ok(false);
+        }
+        let forces = floor.at(speed) / self.settings.inclusion_tolerance
+            * ((problem.body.mesh.total_nodes * D) as f64).sqrt();
+        contacts.iter_mut().for_each(|c| c.reference.forces = c.reference.forces.max(forces));
+        Ok(true)
     }
 
     /// Writes the unknowns of the velocity before the last step, with that of the supports in this one: after a sudden change it is a
@@ -474,40 +534,53 @@ impl Newton {
         let Some(flow) = self.flow.as_mut().filter(|_| has_earlier) else { return Ok(false) };
         start.copy_from(trial)?;
         flow.copy_free_parts(&problem.body.held, &problem.state.previous_velocity, start)?;
-        let mut unknowns = start.owned_mut()?;
-        problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+        write_unknowns(&problem.body.contacts, start)?;
         Ok(true)
     }
 
-    /// Whether the velocity in `trial` and the pressures of the contacts lie on the graphs. Collective.
-    fn lies_on_graphs<const D: usize, const S: usize>(
-        &self,
-        problem: &StepProblem<'_, D, S>,
-        trial: &mut DistributedVector,
-    ) -> Result<bool> {
-        trial.update_ghosts()?;
-        let inclusion = self.inclusion_residual(problem.session, problem.body, trial)?;
-        Ok(inclusion <= self.settings.inclusion_tolerance)
+    /// Solves to smaller residuals until the velocity and the pressures of the contacts lie on the graphs, and summarises the work of the
+    /// step. Collective.
+    fn finish<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+        search: Search,
+    ) -> Result<StepOutcome> {
+        let mut inclusion = self.inclusion_residual(problem, equations.velocity)?;
+        for times in 1..=MOST_SHARPER {
+            if inclusion <= self.settings.inclusion_tolerance {
+                break;
+            }
+            let sharpness = SHARPER.powi(times);
+            self.set_linear_tolerances(equations, sharpness)?;
+            self.scratch.restart();
+            // Its last iterate is no solution, even if it is on the graphs.
+            if let Some(reason) = self.attempt(problem, equations, search, sharpness)? {
+                return Err(problem.failed(&reason, INCLUSION_REMEDY));
+            }
+            inclusion = self.inclusion_residual(problem, equations.velocity)?;
+        }
+        let outcome = self.check_inclusion(problem, equations.velocity, inclusion)?;
+        // With points that yield nothing falls: the energies are those of fixed friction bounds.
+        let may_have_fallen = self.has_descended && search != Search::Yielding;
+        Ok(StepOutcome { fell: may_have_fallen && self.counts.unstable > 0, ..outcome })
     }
 
-    /// Checks that the velocity in `trial` and the pressures of the contacts lie on the graphs, and summarises the work of the
-    /// step. Collective.
+    /// Checks the distance from the graphs of this solution, whose ghosts are updated, and summarises the work of the step. Collective.
     fn check_inclusion<const D: usize, const S: usize>(
         &mut self,
         problem: &StepProblem<'_, D, S>,
-        trial: &mut DistributedVector,
-        newton_iterations: usize,
+        trial: &DistributedVector,
+        inclusion: f64,
     ) -> Result<StepOutcome> {
         let (session, body) = (problem.session, &*problem.body);
-        trial.update_ghosts()?;
-        write_branches(body, trial, &mut self.branches_after)?;
-        let changes = self.branches_before.iter().zip(&self.branches_after).filter(|(a, b)| a != b).count();
-        let inclusion = self.inclusion_residual(session, body, trial)?;
-        let residual = self.last_residual().norm()?;
         if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
             let reason = format!("velocity and pressure deviate from the contact graph by {inclusion:.1e}");
             return Err(problem.failed(&reason, INCLUSION_REMEDY));
         }
+        write_branches(body, trial, &mut self.branches_after)?;
+        let changes = self.branches_before.iter().zip(&self.branches_after).filter(|(a, b)| a != b).count();
+        let residual = self.last_residual().norm()?;
         let velocity = trial.local()?;
         let mut points = [0.0; COUNTS];
         for contact in &body.contacts {
@@ -515,20 +588,14 @@ impl Newton {
             points.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
         }
         Ok(StepOutcome {
-            newton_iterations,
+            newton_iterations: self.counts.newton_iterations,
             linear_iterations: self.counts.linear_iterations,
             active_changes: session.total(changes),
             points: PointCount::from_array(session.sum(points)),
             indefinite_solves: self.counts.indefinite,
             inclusion_residual: inclusion,
             residual,
-            fell: self.has_descended && self.counts.unstable > 0,
-            solutions: 0,
-            solutions_differ: false,
-            landed_on: None,
-            energy: Energy::default(),
-            powers: Energy::default(),
-            peaks: Peaks::default(),
+            ..StepOutcome::default()
         })
     }
 
@@ -541,22 +608,39 @@ impl Newton {
         }
     }
 
-    /// The largest of all contacts over all ranks. Collective.
+    /// The largest distance of the velocity in `trial` and of the pressures of the contacts from the graphs. Collective.
     fn inclusion_residual<const D: usize, const S: usize>(
         &self,
-        session: &Session,
-        body: &Body<D, S>,
-        velocity: &DistributedVector,
+        problem: &StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
     ) -> Result<f64> {
-        let (velocity, residual) = (velocity.local()?, self.last_residual().owned()?);
+        trial.update_ghosts()?;
+        let (velocity, residual) = (trial.local()?, self.last_residual().owned()?);
         let mut largest = 0.0;
-        for contact in &body.contacts {
-            let range = session.largest(contact.range(&velocity));
+        for contact in &problem.body.contacts {
+            let range = problem.session.largest(contact.range(&velocity));
             let distance = contact.inclusion_residual(&velocity, &residual, range);
             largest = larger(largest, distance);
         }
-        Ok(session.largest([largest])[0])
+        Ok(problem.session.largest([largest])[0])
     }
+}
+
+/// Converts velocities into unknowns.
+fn write_unknowns<const D: usize>(contacts: &[Contact<D>], velocities: &mut DistributedVector) -> Result<()> {
+    let mut values = velocities.owned_mut()?;
+    contacts.iter().for_each(|contact| contact.unmap(&mut values));
+    Ok(())
+}
+
+/// Converts unknowns into velocities, and sets the pressures of the contacts.
+fn write_velocities<const D: usize>(
+    contacts: &mut [Contact<D>],
+    unknowns: &mut DistributedVector,
+) -> Result<()> {
+    let mut values = unknowns.owned_mut()?;
+    contacts.iter_mut().for_each(|contact| contact.map(&mut values));
+    Ok(())
 }
 
 /// Lets friction points yield by this ratio of the compliance of the body.
@@ -564,38 +648,14 @@ fn set_give<const D: usize, const S: usize>(body: &mut Body<D, S>, ratio: f64) {
     body.contacts.iter_mut().for_each(|contact| contact.set_give(ratio / contact.friction_scale()));
 }
 
-/// The failure of a step, which may lie at laws that soften or at friction whose bounds grow steeply. Collective.
-fn explain_failure<const D: usize, const S: usize>(
-    problem: &StepProblem<'_, D, S>,
-    why: &str,
-    softens: bool,
-) -> Error {
-    let contacts = &problem.body.contacts;
-    let rises = contacts.iter().map(Contact::rise_of_bound);
-    let [rise] = problem.session.largest([rises.fold(0.0, larger)]);
-    if rise > STEEP_RISE {
-        return problem.failed(why, &rise_remedy(rise));
-    }
-    if !softens {
-        return problem.failed(why, REMEDY);
-    }
-    let falls = contacts.iter().any(|contact| contact.monotonicity_constant() > 0.0);
-    let weakens = contacts.iter().any(Contact::has_decreasing_friction);
-    let own = [falls.then_some("contact"), weakens.then_some("friction")];
-    let names: Vec<&str> = problem.body.softening().chain(own.into_iter().flatten()).collect();
-    let why = format!("{why}; forces of {} fall here as the body moves", names.join(", "));
-    let is_massless = weakens && problem.body.redistributed_mass.is_some();
-    if is_massless {
-        return problem.failed(&why, MASSLESS_REMEDY);
-    }
-    let body = &problem.body;
-    let has = [Form::Mass, Form::Viscosity].map(|form| body.has_form(form));
-    problem.failed(&why, &softening_remedy(has, body.softens_at_surface()))
-}
-
 /// Whether pressure or friction of a contact decrease with the motion.
 fn decreases<const D: usize>(contact: &Contact<D>) -> bool {
     contact.monotonicity_constant() > 0.0 || contact.has_decreasing_friction()
+}
+
+/// Whether a contact may have several equilibria: not where pressures depend on the velocity alone.
+fn may_fall<const D: usize>(contact: &Contact<D>) -> bool {
+    contact.law.depends_on_displacement() || contact.friction().is_some()
 }
 
 /// The reason why Newton's method failed, as a message.

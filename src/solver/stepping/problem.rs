@@ -6,9 +6,13 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, effect::Step, state::State},
+    fem::{
+        body::Body,
+        effect::{Contact, Form, Step},
+        state::State,
+    },
     laws::digits::Digits,
-    linear_algebra::petsc::DistributedVector,
+    linear_algebra::{petsc::DistributedVector, tensor::larger},
     parallel::session::Session,
 };
 
@@ -58,6 +62,30 @@ impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
         let Step { time, length, .. } = self.step;
         Error::Failed(format!("step to t = {time:.6e} s (length {length:.3e} s) failed: {why}; {remedy}"))
     }
+
+    /// The same where all fallbacks of Newton's method failed, which may lie at friction whose bounds grow steeply or, if they do, at
+    /// laws that soften. Collective.
+    pub(super) fn explain(&self, why: &str, softens: bool) -> Error {
+        let body = &*self.body;
+        let rises = body.contacts.iter().map(Contact::rise_of_bound);
+        let [rise] = self.session.largest([rises.fold(0.0, larger)]);
+        if rise > STEEP_RISE {
+            return self.failed(why, &rise_remedy(rise));
+        }
+        if !softens {
+            return self.failed(why, REMEDY);
+        }
+        let falls = body.contacts.iter().any(|contact| contact.monotonicity_constant() > 0.0);
+        let weakens = body.contacts.iter().any(Contact::has_decreasing_friction);
+        let own = [falls.then_some("contact"), weakens.then_some("friction")];
+        let names: Vec<&str> = body.softening().chain(own.into_iter().flatten()).collect();
+        let why = format!("{why}; forces of {} fall here as the body moves", names.join(", "));
+        if weakens && body.redistributed_mass.is_some() {
+            return self.failed(&why, MASSLESS_REMEDY);
+        }
+        let has = [Form::Mass, Form::Viscosity].map(|form| body.has_form(form));
+        self.failed(&why, &softening_remedy(has, body.softens_at_surface()))
+    }
 }
 
 impl System<'_> {
@@ -79,7 +107,7 @@ pub(super) const REMEDY: &str =
 
 /// The same where laws soften, given whether the body has a density and a viscosity and whether bonds soften: shorter steps help only if
 /// something resists fast motions.
-pub(super) fn softening_remedy([has_density, has_viscosity]: [bool; 2], has_bonds: bool) -> String {
+fn softening_remedy([has_density, has_viscosity]: [bool; 2], has_bonds: bool) -> String {
     let first = match (has_density, has_viscosity) {
         (false, false) => "give the body a density or a viscosity and try a smaller [time] step",
         (true, false) => "try a smaller [time] step, give the body a viscosity",
@@ -95,11 +123,11 @@ pub(super) fn softening_remedy([has_density, has_viscosity]: [bool; 2], has_bond
 
 /// Growth of friction bounds with the pressure above which it is named as the reason of a failure. With Coulomb's law a step may have no
 /// solution or several from a coefficient of about 1 on, which depends on the body.
-pub(super) const STEEP_RISE: f64 = 2.0;
+const STEEP_RISE: f64 = 2.0;
 
 /// The same for friction whose bound grows so steeply with the contact pressure: of points that are about to open or to close, the
 /// rounded pressure decides between no friction and all of it.
-pub(super) fn rise_remedy(rise: f64) -> String {
+fn rise_remedy(rise: f64) -> String {
     format!(
         "friction bounds grow by {} Pa for each Pa of contact pressure where points come under pressure: use a friction coefficient that, \
          multiplied by the pressure, grows by about 1 Pa for each Pa there (in `c/(p + d)` a larger d), or [contact.friction.tresca], whose \
@@ -109,7 +137,7 @@ pub(super) fn rise_remedy(rise: f64) -> String {
 }
 
 /// The same for friction that weakens where the surface has no mass: the velocity jumps, the more the shorter the steps.
-pub(super) const MASSLESS_REMEDY: &str = "friction that weakens makes the velocity of a surface without mass jump, the more the \
+const MASSLESS_REMEDY: &str = "friction that weakens makes the velocity of a surface without mass jump, the more the \
      shorter the steps: leave its mass there (`redistribute_mass = false`, under bdf2 or implicit_euler) or give the material a viscosity";
 
 #[cfg(test)]
