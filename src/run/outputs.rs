@@ -16,7 +16,8 @@ use crate::{
         resultants::ResultantTable,
         whole_file::write_whole,
     },
-    job::{Every, Job},
+    job::{Contact, Every, Job},
+    mesh::other_side,
     parallel::{agreement::Agreed, session::Session},
     solver::stepping::{StepOutcome, without_rounding},
 };
@@ -338,7 +339,9 @@ fn profiles<const D: usize, const S: usize>(
 ) -> Result<Profiles<D>> {
     let contacts_on = |name: &String| {
         let contacts = job.contact.iter().enumerate();
-        contacts.filter(|(_, contact)| contact.on.contains(name)).map(|(at, _)| at).collect()
+        let is_side = |on: &String| on == name || other_side(on) == *name;
+        let acts = |contact: &Contact| contact.on.iter().any(is_side) || contact.against.contains(name);
+        contacts.filter(|(_, contact)| acts(contact)).map(|(at, _)| at).collect()
     };
     let along: Vec<(String, Vec<usize>)> =
         job.output.profile.iter().map(|profile| (profile.on.clone(), contacts_on(&profile.on))).collect();

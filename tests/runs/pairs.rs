@@ -17,7 +17,6 @@ fn cubes() -> Case {
         .without("mesh.rectangle")
         .set("mesh.box", blocks)
         .without("material.hypothesis")
-        .set("output.profile", "[{ on = 'upper.bottom' }]")
         .set(
             "support",
             "[{ on = ['lower.bottom'], fix = ['z'] }, { on = ['lower.left', 'upper.left'], fix = ['x'] }, \
@@ -39,10 +38,62 @@ fn uniform_stress_passes_through_meshes_that_do_not_match() {
     for order in ["1", "2"] {
         for ranks in [1, 2, 3] {
             for case in [Case::of("pressed_blocks"), cubes()] {
-                let case = case.set("mesh.order", order).run_and_keep(ranks);
+                let both = "[{ on = 'upper.bottom' }, { on = 'lower.top' }]";
+                let case = case.set("output.profile", both).set("mesh.order", order).run_and_keep(ranks);
                 for pressure in pressures(&case.results()) {
                     assert!((pressure - 5.0).abs() < 1e-10, "order {order}, {ranks} ranks: {pressure} Pa");
                 }
+            }
+        }
+    }
+}
+
+/// The integral over x of a column of the last profile along a boundary, by the rule that contact has there: of linear cells the trapezoidal
+/// rule, of quadratic ones Simpson's.
+fn integral(results: &Results, (boundary, column): (&str, &str), order: &str) -> f64 {
+    let table = results.table("profiles.csv").only("profile", boundary);
+    let last = table.words("time").last().expect("a row").to_string();
+    let table = table.only("time", &last);
+    let (x, f) = (table.numbers("x"), table.numbers(column));
+    let nodes = x.len();
+    if order == "1" {
+        return (1..nodes).map(|at| 0.5 * (x[at] - x[at - 1]) * (f[at] + f[at - 1])).sum();
+    }
+    let parts = (0..nodes / 2).map(|facet| 2 * facet);
+    parts.map(|at| (x[at + 2] - x[at]) / 6.0 * (f[at] + 4.0 * f[at + 1] + f[at + 2])).sum()
+}
+
+#[test]
+fn both_sides_show_the_same_resultants_of_pressure_and_friction() {
+    for order in ["1", "2"] {
+        let case = |ranks: usize| {
+            sheared("on = ['upper.bottom'], against = ['lower.top']")
+                .set("support", "[{ on = ['lower.bottom'], fix = 'all' }]")
+                .set("traction", "[{ on = ['upper.top'], value = ['0.5*sin(20*t)', '-3 - x'] }]")
+                .set("output.profile", "[{ on = 'upper.bottom' }, { on = 'lower.top' }]")
+                .set("mesh.order", order)
+                .run_and_keep(ranks)
+        };
+        let alone = case(1);
+        let [on, against] = ["upper.bottom", "lower.top"];
+        // Friction at the ends is limited to what acts on the other side.
+        for (column, sign, share) in [("contact_pressure", 1.0, 1e-9), ("friction_traction_x", -1.0, 1e-5)] {
+            let of = |boundary: &str| integral(&alone.results(), (boundary, column), order);
+            let off = of(against) - sign * of(on);
+            let pressed = integral(&alone.results(), (on, "contact_pressure"), order);
+            assert!(off.abs() < share * pressed && of(on) != 0.0, "order {order}: {column} differs by {off}");
+        }
+        for ranks in [2, 3] {
+            let other = case(ranks);
+            for column in ["contact_pressure", "friction_traction_x", "gap", "sliding_velocity_x"] {
+                let [one, other] =
+                    [&alone, &other].map(|case| case.results().table("profiles.csv").numbers(column));
+                let size = one.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+                let off = one.iter().zip(&other).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+                assert!(
+                    off <= 1e-7 * size.max(1.0),
+                    "order {order}, {ranks} ranks: {column} differs by {off:e}"
+                );
             }
         }
     }

@@ -1,6 +1,9 @@
 //! States of contact points for fields and profiles.
 
-use super::output_field::Converged;
+use super::{
+    faced_points::{FacedPoint, Given, faced_points},
+    output_field::Converged,
+};
 use crate::{
     error::Result,
     fem::{
@@ -9,40 +12,63 @@ use crate::{
     },
     linear_algebra::tensor::{Vector, dot, larger},
 };
-use std::cmp::Ordering;
+use std::{cmp::Ordering, collections::BTreeSet};
 
 /// Values of a state that corners have as means, vectors as in space.
 const VALUES: usize = 14;
 /// Pressures and normals that differ by a smaller share are the same: the rest is rounding, which depends on the partition.
 const SAME: f64 = 1e-9;
+/// Cosine of the angle up to which two normals at a node are those of one face.
+const SAME_FACE: f64 = 0.7;
 
 /// The states of the nodal points of all contacts at the nodes of this rank, those of a node together, in the order of
-/// their normals: neither the order of the tables of the job nor the partition matters. Corners where no law acts
+/// their normals: neither the order of the tables of the job nor the partition matters. Nodes of the other side of contact between bodies
+/// have means of those that face them, with opposite tractions and sliding velocities. Corners where no law acts
 /// have the means of the points at the midpoints of edges around, a mean for each face of the body. Collective.
 pub(super) fn contact_points<const D: usize, const S: usize>(
     at: Converged<'_, D, S>,
 ) -> Result<Vec<(usize, PointState<D>)>> {
     let Some(traction) = &at.state.contact_traction else { return Ok(Vec::new()) };
-    let contacts = || at.body.contacts.iter().filter(|contact| !contact.needs_ghosts());
+    let contacts = || at.body.contacts.iter().enumerate().filter(|(_, contact)| !contact.needs_ghosts());
     let mut points: Vec<(usize, PointState<D>)> = Vec::new();
+    let mut given: Vec<Given<VALUES>> = Vec::new();
     let mut visit_all = || {
         let (displacement, velocity) = (at.state.displacement.local()?, at.state.velocity.local()?);
         let [displacement, velocity] =
             [&displacement, &velocity].map(|values| at.body.seen_by_contacts(values));
         let nodal = [&*displacement, &*velocity, &*traction.owned()?];
-        contacts().try_for_each(|contact| {
-            contact.states(at.state.time, nodal, |node, state| points.push((node, state)))
+        contacts().try_for_each(|(number, contact)| {
+            contact.states(at.state.time, nodal, |node, state| {
+                points.push((node, state));
+                if contact.is_paired() {
+                    given.push(Given { contact: number, node, values: values_of(&state) });
+                }
+            })
         })
     };
     let visited = visit_all();
     at.session.agree(visited)?;
     points.sort_by(in_order);
-    let facets: Vec<u32> = contacts().flat_map(|contact| contact.facets()).copied().collect();
+    // Where a node has a law of its own on the same face, this is what acts there.
+    let is_new = |(node, faced): &(usize, PointState<D>)| {
+        let on_face = |state: &PointState<D>| dot(&state.normal, &faced.normal) > SAME_FACE;
+        !points_at(&points, *node).any(on_face)
+    };
+    let faced: Vec<_> = faced_points(at, &given)?
+        .into_iter()
+        .map(|of_point| {
+            (of_point.point.node as usize, faced_state(&of_point, at.body.held.whole(of_point.point).normal))
+        })
+        .filter(is_new)
+        .collect();
+    points.extend(faced);
+    points.sort_by(in_order);
+    let others = at.body.pairs.iter().flat_map(|pair| &pair.against);
+    let facets: Vec<u32> =
+        contacts().flat_map(|(_, contact)| contact.facets()).chain(others).copied().collect();
     let of_midside = |node: u32, normal: &Vector<D>| {
-        let first = points.partition_point(|(other, _)| *other < node as usize);
-        let here = points[first..].iter().take_while(|(other, _)| *other == node as usize);
-        let along = |point: &&(usize, PointState<D>)| dot(&point.1.normal, normal);
-        here.max_by(|a, b| along(a).total_cmp(&along(b))).map(|(_, state)| values_of(state))
+        let along = |state: &&PointState<D>| dot(&state.normal, normal);
+        points_at(&points, node as usize).max_by(|a, b| along(a).total_cmp(&along(b))).map(values_of)
     };
     let corners = corner_means(at.session, &at.body.mesh, &facets, of_midside)?;
     points.extend(corners.into_iter().map(|(point, values)| {
@@ -51,6 +77,32 @@ pub(super) fn contact_points<const D: usize, const S: usize>(
     }));
     points.sort_by(in_order);
     Ok(points)
+}
+
+/// The states at a node, of points in the order of their nodes.
+fn points_at<const D: usize>(
+    points: &[(usize, PointState<D>)],
+    node: usize,
+) -> impl Iterator<Item = &PointState<D>> {
+    let first = points.partition_point(|(other, _)| *other < node);
+    points[first..].iter().take_while(move |(other, _)| *other == node).map(|(_, state)| state)
+}
+
+/// The state of a point on the other side of a contact between bodies.
+fn faced_state<const D: usize>(
+    FacedPoint { of_forces, of_places, .. }: &FacedPoint<D, VALUES>,
+    normal: Vector<D>,
+) -> PointState<D> {
+    let [forces, places]: [PointState<D>; 2] = [of_forces, of_places].map(state_of);
+    let opposite = |vector: Vector<D>| vector.map(|x| 0.0 - x);
+    PointState {
+        normal,
+        pressure: forces.pressure,
+        friction: opposite(forces.friction),
+        direction: opposite(places.direction),
+        sliding: opposite(places.sliding),
+        ..places
+    }
 }
 
 /// The state that counts of those at a node: the one with the largest pressure, or the first.
@@ -73,12 +125,36 @@ pub(super) fn fill_corners<const D: usize, const S: usize>(
         let kept = contact.histories().filter_map(|store| store.values(Moment::Last));
         kept.into_iter().any(|history| history.quantity == quantity)
     };
-    let facets: Vec<u32> =
-        at.body.contacts.iter().filter(keeps).flat_map(|contact| contact.facets()).copied().collect();
+    let others = at.body.pairs.iter().filter(|pair| keeps(&&at.body.contacts[pair.contact]));
+    let facets = at.body.contacts.iter().filter(keeps).flat_map(|contact| contact.facets());
+    let facets: Vec<u32> = facets.chain(others.flat_map(|pair| &pair.against)).copied().collect();
     let of_midside = |node: u32, _: &Vector<D>| Some([values[node as usize]]);
     for (point, [mean]) in corner_means(at.session, &at.body.mesh, &facets, of_midside)? {
         let value = &mut values[point.node as usize];
         *value = larger(*value, mean);
+    }
+    Ok(())
+}
+
+/// Fills a history of contact points, given at the owned nodes, at those of the other side of contact between bodies, which have no value
+/// of their own: with means of the nodes that face them. Collective.
+pub(super) fn fill_faced<const D: usize, const S: usize>(
+    at: Converged<'_, D, S>,
+    values: &mut [f64],
+) -> Result<()> {
+    let nodes = at
+        .body
+        .pairs
+        .iter()
+        .flat_map(|pair| pair.nodes.iter().map(|node| (pair.contact, node.node as usize)));
+    let given: Vec<Given<1>> =
+        nodes.map(|(contact, node)| Given { contact, node, values: [values[node]] }).collect();
+    let with_law: BTreeSet<usize> = at.body.contacts.iter().flat_map(Contact::nodes).collect();
+    for FacedPoint { point, of_places: [mean], .. } in faced_points(at, &given)? {
+        let node = point.node as usize;
+        if !with_law.contains(&node) {
+            values[node] = larger(values[node], mean);
+        }
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The field file of a run.
 
 use super::{
-    contact_points::fill_corners,
+    contact_points::{fill_corners, fill_faced},
     field_list::{COUNT, ERROR_INDICATOR, FIELDS, computations},
     fields::{Field, FieldFile, FieldMesh, Place, Shape},
     log::Log,
@@ -97,6 +97,11 @@ impl<const D: usize> FieldOutput<D> {
             fields.push(Field { name: history.name(), place: Place::Cell, shape, values: &history.values });
         }
         let mut of_nodes: Vec<History> = at.body.node_histories().collect();
+        for history in of_nodes.iter_mut().filter(|history| history.width == 1) {
+            if !at.body.pairs.is_empty() {
+                fill_faced(at, history.values.to_mut())?;
+            }
+        }
         for history in of_nodes.iter_mut().filter(|_| omits_corners(&at.body.mesh)) {
             fill_corners(at, history.quantity, history.values.to_mut())?;
         }

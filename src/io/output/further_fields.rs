@@ -78,12 +78,13 @@ pub(super) fn of_contacts<'a, const D: usize, const S: usize, const W: usize>(
     Ok(Computed::of(values))
 }
 
-/// Contact traction at the nodes; `None` if no contact acts at nodes. Corners where no law acts have means. Collective.
+/// Contact traction at the nodes; `None` if no contact acts at nodes. Corners where no law acts, and the other side of contact between
+/// bodies, have means. Collective.
 pub(super) fn contact_traction<'a, const D: usize, const S: usize>(
     at: Converged<'a, D, S>,
 ) -> Result<Option<Computed<'a>>> {
     let Some(traction) = &at.state.contact_traction else { return Ok(None) };
-    if !omits_corners(&at.body.mesh) {
+    if !omits_corners(&at.body.mesh) && at.body.pairs.is_empty() {
         return Ok(Some(Computed::of(traction.owned()?)));
     }
     let mut values = vec![0.0; at.body.mesh.owned * D];

@@ -8,6 +8,7 @@ pub(crate) mod columns;
 mod contact_points;
 pub(crate) mod csv;
 pub mod error_indicator;
+mod faced_points;
 mod field;
 pub(crate) mod field_list;
 pub(crate) mod field_output;

@@ -1,7 +1,7 @@
 //! Further quantities of probes: fields and histories at their points.
 
 use super::{
-    contact_points::fill_corners,
+    contact_points::{fill_corners, fill_faced},
     field::{Place, Shape, plain_components},
     field_list::{FIELDS, Position, computations},
     output_field::Converged,
@@ -186,6 +186,9 @@ impl Probed {
                 Source::OfNodes(name, _) => {
                     let found = at.body.node_histories().find(|history| history.name() == name);
                     if let Some(History { quantity, mut values, .. }) = found {
+                        if !at.body.pairs.is_empty() {
+                            at.session.agree(fill_faced(at, values.to_mut()))?;
+                        }
                         if omits_corners(&at.body.mesh) {
                             at.session.agree(fill_corners(at, quantity, values.to_mut()))?;
                         }

@@ -28,10 +28,8 @@ struct Profile<const D: usize> {
     name: String,
     facets: Vec<u32>,
     points: Vec<SurfacePoint<D>>,
-    /// The contacts of the body on this boundary, each on a part of it.
+    /// The contacts of the body on this boundary, each on a part of it, on either of their sides.
     contacts: Vec<usize>,
-    /// Whether nodes of another body act on it.
-    is_faced: bool,
 }
 
 /// The columns that only some contacts have.
@@ -66,9 +64,7 @@ impl<const D: usize> Profiles<D> {
             // With the normals of the contact points.
             let whole = |point| if contacts.is_empty() { point } else { body.held.whole(point) };
             let points = points.into_iter().map(whole).collect();
-            let is_faced =
-                body.pairs.iter().any(|pair| facets.iter().any(|facet| pair.against.contains(facet)));
-            Ok(Profile { name: entry(name), facets, points, contacts: contacts.clone(), is_faced })
+            Ok(Profile { name: entry(name), facets, points, contacts: contacts.clone() })
         };
         let contacts = || boundaries.iter().flat_map(|(_, contacts)| contacts).map(|at| &body.contacts[*at]);
         let with = OptionalColumns {
@@ -183,9 +179,7 @@ impl<const D: usize> Profile<D> {
                 out.push(here.map_or(f64::NAN, |state| state.gap));
             }
             if with.friction {
-                // Known at the nodes that act on it, which are not its own.
-                let without = if self.is_faced { f64::NAN } else { 0.0 };
-                let rubbing = here.map_or([[without; D]; 2], |state| [state.friction, state.sliding]);
+                let rubbing = here.map_or([[0.0; D]; 2], |state| [state.friction, state.sliding]);
                 out.extend(rubbing.concat());
             }
             out.extend(add_scaled(&point.value(&displacement), -normal_displacement, &point.normal));

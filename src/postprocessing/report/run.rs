@@ -178,7 +178,10 @@ fn contact_directions(found: &RunFiles, snapshot: &Snapshot) -> Vec<[f64; 3]> {
         return Vec::new();
     };
     let names = profiles.names();
-    let touching = names.iter().filter(|name| job.contact.iter().any(|contact| contact.on.contains(name)));
+    let has_side = |name: &&String| {
+        job.contact.iter().any(|contact| contact.on.contains(name) || contact.against.contains(name))
+    };
+    let touching = names.iter().filter(has_side);
     let rows = |name| profiles.of(name).last("time");
     touching.filter_map(|name| Boundary::new(rows(name), name, Some(snapshot)).direction()).collect()
 }
@@ -220,10 +223,14 @@ fn boundary_sections(sections: &mut Sections, found: &RunFiles, body: Option<&Dr
                 };
                 pictures.extend(part.graphs()?.into_iter().map(named));
             }
-            if let Some(body) = body.filter(|_| !here.is_empty()) {
+            // The other side of contact between bodies has no law, but the opposite tractions.
+            let is_faced =
+                found.job.iter().flat_map(|job| &job.contact).any(|contact| contact.against.contains(name));
+            let touches = is_faced || !here.is_empty();
+            if let Some(body) = body.filter(|_| touches) {
                 pictures.extend(boundary.arrows(body)?);
             }
-            let heading = format!("{} {name}", if here.is_empty() { "Boundary" } else { "Contact boundary" });
+            let heading = format!("{} {name}", if touches { "Contact boundary" } else { "Boundary" });
             let tables: String = parts.iter().map(Boundary::branch_table).collect();
             sections.push((heading, not_drawn(&constant) + &tables, pictures));
         }
