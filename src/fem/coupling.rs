@@ -6,15 +6,16 @@
 //! `z = v` at all other nodes, `v = T z`, and the equations `K v + C = b` of a step become `T^T K T z + C(z) = T^T b`: each law acts on
 //! the components of its own node alone, as against a rigid obstacle. Rows of `P` sum to 1, so that action equals reaction.
 //!
-//! Where supports hold components of a slave node, these are not relative; held components of master nodes move as the supports do.
-//! No slave node is a master node. Source: Wohlmuth and Krause (2003), Hueeber and Wohlmuth (2005).
+//! Where supports hold a slave node along a direction, its velocity there is known. It is relative to those of its masters that supports
+//! hold along the same direction, if these are most of what it faces, with shares that are scaled to a sum of 1; otherwise to nothing.
+//! Held components of master nodes move as the supports do. No slave node is a master node. Source: Wohlmuth and Krause (2003), Hueeber and Wohlmuth (2005).
 
 use super::space::Held;
 use crate::{
     error::Result,
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
-        tensor::Vector,
+        tensor::{Vector, dot, norm},
     },
     mesh::Mesh,
     parallel::{
@@ -29,6 +30,15 @@ use std::{
     ops::{Deref, Range},
     rc::Rc,
 };
+
+/// The share of what a node faces that supports must hold along a direction in which they hold the node: more than half of it on a plane of
+/// symmetry.
+pub const HELD_TOGETHER: f64 = 0.5;
+
+/// The free part of a unit direction is a rounding error below this.
+const ROUNDING: f64 = 1e-6;
+/// A relative velocity that is smaller than that of the node by this factor is a rounding error.
+const ROUNDED: f64 = 1e-12;
 
 /// Adds the forces that act on bodies at their surface; where they act between bodies, with the opposite ones.
 pub fn add_between<const D: usize>(
@@ -117,9 +127,36 @@ pub struct Coupling<const D: usize> {
     slaves: Vec<(u32, Range<usize>)>,
     /// Local numbers of masters, and their shares.
     masters: Vec<(u32, f64)>,
+    /// The directions along which supports hold slave nodes and masters of theirs, by slave node.
+    held_together: Vec<HeldTogether<D>>,
     /// The blocks of `T` of all ranks: for each slave node, by global numbers, its masters and how they move its free components.
     blocks: BTreeMap<u32, Vec<(u32, Vec<f64>)>>,
     pool: Pool,
+}
+
+/// A direction along which supports hold a slave node and masters of it.
+#[derive(Debug)]
+struct HeldTogether<const D: usize> {
+    /// The slave node, by its local number.
+    slave: u32,
+    direction: Vector<D>,
+    /// The masters that are held along it, by local numbers, with their shares, whose sum is 1.
+    masters: Vec<(u32, f64)>,
+}
+
+impl<const D: usize> HeldTogether<D> {
+    /// The held directions of a slave node along which most of these masters are held.
+    fn of(held: &Held<D>, slave: u32, masters: &[(u32, f64)]) -> Vec<Self> {
+        let (frame, free) = held.frame(slave as usize);
+        let along = |direction: &Vector<D>| {
+            let is_held = |master: &u32| norm(&held.free_part(*master as usize, direction)) < ROUNDING;
+            let masters: Vec<_> = masters.iter().filter(|(master, _)| is_held(master)).copied().collect();
+            let sum: f64 = masters.iter().map(|(_, share)| share).sum();
+            let scaled = masters.into_iter().map(|(master, share)| (master, share / sum)).collect();
+            (sum >= HELD_TOGETHER).then_some(Self { slave, direction: *direction, masters: scaled })
+        };
+        frame[free..].iter().filter_map(along).collect()
+    }
 }
 
 impl<const D: usize> Coupling<D> {
@@ -134,7 +171,7 @@ impl<const D: usize> Coupling<D> {
             Ok(ghost) => mesh.owned + ghost,
             Err(_) => mesh.owned_node(global),
         };
-        let (mut slaves, mut masters) = (Vec::new(), Vec::new());
+        let (mut slaves, mut masters, mut held_together) = (Vec::new(), Vec::new(), Vec::new());
         let (mut numbers, mut values) = (Vec::new(), Vec::new());
         for of_slave in pairs.chunk_by(|a, b| a.slave == b.slave) {
             let slave = local(of_slave[0].slave);
@@ -150,6 +187,7 @@ impl<const D: usize> Coupling<D> {
                 let columns: Vec<Vector<D>> = columns.collect();
                 values.extend((0..D * D).map(|k| columns[k % D][k / D]));
             }
+            held_together.extend(HeldTogether::of(held, slave as u32, &masters[first..]));
             slaves.push((slave as u32, first..masters.len()));
         }
         let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);
@@ -157,7 +195,7 @@ impl<const D: usize> Coupling<D> {
         for (pair, block) in numbers.chunks_exact(2).zip(values.chunks_exact(D * D)) {
             blocks.entry(pair[0]).or_default().push((pair[1], block.to_vec()));
         }
-        Ok(Self { owned: mesh.owned, slaves, masters, blocks, pool: Pool::default() })
+        Ok(Self { owned: mesh.owned, slaves, masters, held_together, blocks, pool: Pool::default() })
     }
 
     /// The slave nodes owned here with their masters and the shares of these, by local numbers.
@@ -179,6 +217,23 @@ impl<const D: usize> Coupling<D> {
             }
             let sum = held.free_part(slave as usize, &sum);
             (0..D).for_each(|i| values[slave as usize * D + i] += factor * sum[i]);
+        }
+        self.add_held_masters(factor, values);
+    }
+
+    /// The same along directions in which supports hold both, alone.
+    fn add_held_masters(&self, factor: f64, values: &mut [f64]) {
+        for HeldTogether { slave, direction, masters } in &self.held_together {
+            let value =
+                |master: u32| dot(direction, &std::array::from_fn(|i| values[master as usize * D + i]));
+            let sum: f64 = masters.iter().map(|(master, share)| share * value(*master)).sum();
+            let slave = &mut values[*slave as usize * D..][..D];
+            let before = dot(direction, &std::array::from_fn(|i| slave[i]));
+            (0..D).for_each(|i| slave[i] += factor * sum * direction[i]);
+            // Bodies that move together do not slide by a rounding error.
+            if slave.iter().all(|x| x.abs() <= ROUNDED * before.abs()) {
+                slave.fill(0.0);
+            }
         }
     }
 
@@ -218,9 +273,16 @@ impl<const D: usize> Coupling<D> {
         mut visit: impl FnMut(u32, Vector<D>),
     ) {
         let Ok(at) = self.slaves.binary_search_by_key(&slave, |(slave, _)| *slave) else { return };
-        let force = held.free_part(slave as usize, force);
+        let free = held.free_part(slave as usize, force);
         for (master, share) in &self.masters[self.slaves[at].1.clone()] {
-            visit(*master, force.map(|force| -share * force));
+            visit(*master, free.map(|force| -share * force));
+        }
+        let first = self.held_together.partition_point(|held| held.slave < slave);
+        for HeldTogether { direction, masters, .. } in
+            self.held_together[first..].iter().take_while(|held| held.slave == slave)
+        {
+            let along = dot(direction, force);
+            masters.iter().for_each(|(master, share)| visit(*master, direction.map(|x| -share * along * x)));
         }
     }
 
@@ -229,6 +291,13 @@ impl<const D: usize> Coupling<D> {
         velocity.update_ghosts()?;
         self.add_masters(-1.0, held, &mut velocity.local_mut()?);
         Ok(())
+    }
+
+    /// `v = T z` of the unknowns `z` that are zero but for the velocities of supports, given these. Collective.
+    pub fn carry(&self, held: &Held<D>, velocity: &mut DistributedVector) -> Result<()> {
+        velocity.update_ghosts()?;
+        self.add_held_masters(-1.0, &mut velocity.local_mut()?);
+        self.make_absolute(held, velocity)
     }
 
     /// `v = T z`. Collective.

@@ -5,7 +5,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
+        coupling::{Coupling, HELD_TOGETHER, ghosts_of_surfaces, needed_ghosts},
         pairs::{Pair, shares},
         space::{Held, facets},
     },
@@ -18,8 +18,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Component of a unit direction along a normal above which it counts as along the normal.
 const ALONG: f64 = 0.5;
-/// The share of what a node faces that must be held along a direction in which a support holds the node, as on a plane of symmetry.
-const HELD_TOGETHER: f64 = 0.5;
 
 /// The contacts of a job between bodies; the mesh gets the ghosts that their equations need. Collective.
 pub(super) fn find<const D: usize>(

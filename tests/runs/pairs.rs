@@ -26,6 +26,61 @@ fn cubes() -> Case {
         .without("output.probe")
 }
 
+/// All nodes of both sides that supports move along the boundary, those at its ends, have a sliding velocity that is relative.
+#[test]
+fn bodies_that_supports_move_along_their_contact_rub_by_their_relative_velocity() {
+    let sides = ["upper.bottom", "lower.top"];
+    let plane = || Case::of("pressed_blocks").without("output.probe");
+    for (job, normal) in [(plane as fn() -> Case, "y"), (cubes, "z")] {
+        for (order, [lower, upper]) in
+            [("1", [0.0, 0.1]), ("2", [0.1, 0.0]), ("1", [0.1, 0.1]), ("2", [0.1, 0.1])]
+        {
+            for [on, against] in [sides, [sides[1], sides[0]]] {
+                let support = |name: &str, speed: f64| match normal {
+                    "y" => format!(
+                        "{{ on = ['{name}.left', '{name}.right'], fix = ['x'], displacement = ['{speed}*t'] }}"
+                    ),
+                    _ => format!(
+                        "{{ on = ['{name}.left', '{name}.right', '{name}.front', '{name}.back'], fix = ['x', 'y'], \
+                         displacement = ['{speed}*t', 0] }}"
+                    ),
+                };
+                let run = job()
+                    .set(
+                        "support",
+                        &format!(
+                            "[{{ on = ['lower.bottom'], fix = ['{normal}'] }}, {}, {}]",
+                            support("lower", lower),
+                            support("upper", upper)
+                        ),
+                    )
+                    .set("contact.0.on", &format!("['{on}']"))
+                    .set("contact.0.against", &format!("['{against}']"))
+                    .set("contact.0.friction", "{ coulomb = { coefficient = 0.2 } }")
+                    .set("mesh.order", order)
+                    .run_and_keep(2);
+                let results = run.results();
+                let table = results.table("resultants.csv");
+                let last =
+                    |source: &str| *table.only("source", source).numbers("force_x").last().expect("a row");
+                let [force, opposite] = [last(&format!("contact {on}")), last(&format!("against {against}"))];
+                let known = 0.2 * 5.0 * (upper - lower).signum() * f64::from(u8::from(upper != lower));
+                let known = if on == sides[0] { -known } else { known };
+                let case = format!("{on} order {order}, {lower} and {upper} m/s");
+                assert!((force - known).abs() < 1e-6, "{case}: {force} N");
+                assert!((force + opposite).abs() < 1e-9, "{case}: {opposite} N against");
+                let history = results.table("history.csv");
+                let work: f64 = history.numbers("contact_dissipation").iter().sum();
+                assert!(
+                    if known == 0.0 { work.abs() < 1e-12 } else { work > 0.05 * known.abs() },
+                    "{case}: {work} J"
+                );
+                assert!(results.number("max_energy_imbalance") < 1e-9, "{case}");
+            }
+        }
+    }
+}
+
 /// All values of a column of the last profile.
 fn pressures(results: &Results) -> Vec<f64> {
     let table = results.table("profiles.csv");

@@ -68,7 +68,7 @@ impl MovingSupports {
         session.agree(written)?;
         self.carried.copy_from(&self.velocity)?;
         match &body.coupling {
-            Some(coupling) => coupling.make_absolute(&body.held, &mut self.carried)?,
+            Some(coupling) => coupling.carry(&body.held, &mut self.carried)?,
             None => self.carried.update_ghosts()?,
         }
         {
