@@ -191,6 +191,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// it can hold the others. Collective.
     pub fn opposite_directions(&self, touched: &[(usize, Vector<D>)]) -> Result<Vec<(usize, Vector<D>)>> {
         let Some(coupling) = &self.coupling else { return Ok(Vec::new()) };
+        let mut touched = touched.to_vec();
+        touched.sort_by_key(|(node, _)| *node);
         let mut all = Vec::new();
         // One direction of each node at a time: those of other nodes must not add up with it.
         for number in 0..D {

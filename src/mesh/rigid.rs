@@ -117,6 +117,12 @@ impl<const D: usize> RigidBody<D> {
         let mut words: Vec<String> =
             slides.iter().map(|&axis| format!("translation along {}", AXES[axis])).collect();
         let mut turns = free.to_vec();
+        // Where contact holds one direction between the axes, another one is free.
+        let oblique = |motion: &&Motion| slides.is_empty() && norm(&[motion[3], motion[4], motion[5]]) < 1e-8;
+        words.extend(free.iter().filter(oblique).map(|motion| {
+            let direction: Vector<D> = std::array::from_fn(|i| motion[i]);
+            format!("translation along the direction {}", place(&direction))
+        }));
         turns.iter_mut().for_each(|turn| slides.iter().for_each(|&axis| turn[axis] = 0.0));
         for turn in reduced(turns) {
             let (slide, spin) = (

@@ -182,7 +182,8 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             ));
         }
         let touched = larger(penetration, held) >= -ROUNDING * size;
-        if has_ended && state.step > 0 && !touched {
+        // Bonds carry forces across a gap.
+        if has_ended && state.step > 0 && !touched && table.adhesion.is_none() {
             let Gaps { smallest, .. } = gaps_of_all(session, contact, state.time, &displacement);
             let nearest = match larger(penetration, held) {
                 f64::NEG_INFINITY => {

@@ -26,6 +26,25 @@ fn cubes() -> Case {
         .without("output.probe")
 }
 
+/// The body that only contact holds is that which carries the law, or the other one.
+#[test]
+fn a_quasistatic_body_may_rest_on_another_one_whichever_carries_the_law() {
+    let sides = ["upper.bottom", "lower.top"];
+    for [on, against] in [sides, [sides[1], sides[0]]] {
+        let case = Case::of("pressed_blocks")
+            .without("output.probe")
+            .set("support", "[{ on = ['lower.bottom'], fix = 'all' }]")
+            .set("traction.0.value", "['0.5 * t', -5]")
+            .set("contact.0.on", &format!("['{on}']"))
+            .set("contact.0.against", &format!("['{against}']"))
+            .set("contact.0.friction", "{ coulomb = { coefficient = 0.2 } }")
+            .run_and_keep(2);
+        let table = case.results().table("resultants.csv").only("source", "support lower.bottom");
+        let last = *table.numbers("force_x").last().expect("a row");
+        assert!((last + 0.5).abs() < 1e-9, "{on}: {last} N");
+    }
+}
+
 /// All nodes of both sides that supports move along the boundary, those at its ends, have a sliding velocity that is relative.
 #[test]
 fn bodies_that_supports_move_along_their_contact_rub_by_their_relative_velocity() {
