@@ -45,6 +45,35 @@ fn a_quasistatic_body_may_rest_on_another_one_whichever_carries_the_law() {
     }
 }
 
+/// What supports hold along the boundary does not hold a body on the other one.
+#[test]
+fn a_body_that_slides_between_guides_rests_on_another_one() {
+    let guides = "on = ['lower.left', 'lower.right', 'lower.front', 'lower.back', 'upper.left', 'upper.right', 'upper.front', 'upper.back']";
+    for youngs_modulus in ["1e9", "2e11", "1e13"] {
+        let case = cubes()
+            .set(
+                "mesh.box",
+                "[{ name = 'lower', size = [1, 1, 0.5], cells = [2, 2, 1] }, \
+                  { name = 'upper', corner = [0, 0, 0.5], size = [1, 1, 0.5], cells = [2, 2, 1] }]",
+            )
+            .without("region")
+            .set(
+                "material.elasticity",
+                &format!("{{ youngs_modulus = {youngs_modulus}, poisson_ratio = 0.0 }}"),
+            )
+            .set(
+                "support",
+                &format!("[{{ on = ['lower.bottom'], fix = ['z'] }}, {{ {guides}, fix = ['x', 'y'] }}]"),
+            )
+            .set("traction.0.value", "[0, 0, -1e6]")
+            .without("check")
+            .run_and_keep(1);
+        let table = case.results().table("resultants.csv").only("source", "contact upper.bottom");
+        let last = *table.numbers("force_z").last().expect("a row");
+        assert!((last - 1e6).abs() < 1e-3, "{youngs_modulus} Pa: {last} N");
+    }
+}
+
 /// All nodes of both sides that supports move along the boundary, those at its ends, have a sliding velocity that is relative.
 #[test]
 fn bodies_that_supports_move_along_their_contact_rub_by_their_relative_velocity() {

@@ -7,7 +7,10 @@
 use crate::{
     error::{Error, Result},
     fem::body::Body,
-    linear_algebra::petsc::{BlockRows, DistributedVector},
+    linear_algebra::{
+        petsc::{BlockRows, DistributedVector},
+        tensor::Vector,
+    },
     mesh::{Mesh, free_motions},
     parallel::{agreement::Agreed, session::Session},
 };
@@ -99,7 +102,7 @@ impl Springs {
                 }
             }
             if let Some(&resistance) = weakest.get(&node) {
-                together = resistance;
+                together = (0..D).map(|i| resistance[i] * rigid[i] * rigid[i]).sum();
             }
             let whole = (total * together).max(quadratic_form(&inertia, &motion));
             if whole < NEGLIGIBLE * own { STIFFNESS_RATIO * own } else { 0.0 }
@@ -129,16 +132,16 @@ impl Springs {
     }
 }
 
-/// For the nodes of this rank that face another body, the resistance in N s/m of the one of both surfaces there that resists the translation
-/// of its body less, in steps of this length in s. Collective.
+/// For the nodes of this rank that face another body, the resistance in N s/m along each axis of the one of both surfaces there that resists
+/// the translation of its body less, in steps of this length in s. Collective.
 fn weakest_side<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
     length: f64,
-) -> Result<BTreeMap<usize, f64>, Agreed> {
+) -> Result<BTreeMap<usize, Vector<D>>, Agreed> {
     let Some(coupling) = &body.coupling else { return Ok(BTreeMap::new()) };
     let rows = body.matrix_of_bodies(session, length)?;
-    let resistances = || -> Result<BTreeMap<usize, f64>> {
+    let resistances = || -> Result<BTreeMap<usize, Vector<D>>> {
         let mut all = DistributedVector::ghosted(D, body.mesh.owned, &body.mesh.ghosts)?;
         {
             let mut values = all.owned_mut()?;
@@ -151,11 +154,13 @@ fn weakest_side<const D: usize, const S: usize>(
             }
         }
         all.update_ghosts()?;
-        let of_node = |values: &[f64], node: u32| values[node as usize * D..][..D].iter().sum::<f64>();
         let values = all.local()?;
         let weaker = |(slave, masters): (u32, &[(u32, f64)])| {
-            let facing: f64 = masters.iter().map(|(master, share)| share * of_node(&values, *master)).sum();
-            (slave as usize, facing.min(of_node(&values, slave)))
+            let along = |i: usize| {
+                let facing = masters.iter().map(|(master, share)| share * values[*master as usize * D + i]);
+                facing.sum::<f64>().min(values[slave as usize * D + i])
+            };
+            (slave as usize, std::array::from_fn(along))
         };
         Ok(coupling.slaves().map(weaker).collect())
     };
