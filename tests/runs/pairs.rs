@@ -441,6 +441,37 @@ fn a_stage_of_bodies_in_contact_starts_in_balance() {
     }
 }
 
+/// The first stage slides by less than a quarter of a facet, so that it keeps what nodes face; the second one has it from the first one, also
+/// where only the second one finds it anew after sliding.
+#[test]
+fn a_stage_keeps_what_nodes_face_in_bodies_that_slide() {
+    let stage = |sliding: &str, velocity: &str| {
+        Case::of("pressed_blocks")
+            .set("mesh.order", "2")
+            .set(
+                "support",
+                &format!(
+                    "[{{ on = ['lower.bottom'], fix = 'all' }}, {{ on = ['upper.top'], fix = ['x'], velocity = ['{velocity}'] }}]"
+                ),
+            )
+            .set("contact.0.sliding", &format!("'{sliding}'"))
+            .set("contact.0.friction", "{ coulomb = { coefficient = 0.2 } }")
+            .set("checkpoint.every", "100")
+    };
+    for sliding in ["finite", "small"] {
+        let first = stage(sliding, "0.02*(t<0.6)").run_and_keep(2);
+        let from = first.folder().join("out").display().to_string();
+        let second = stage("finite", "0").set("initial.from", &format!("'{from}'")).run_and_keep(3);
+        for column in ["force_x", "force_y", "largest_pressure"] {
+            let of = |case: &Case| {
+                case.results().table("resultants.csv").only("source", "contact upper.bottom").numbers(column)
+            };
+            let (before, after) = (*of(&first).last().expect("a row"), of(&second)[0]);
+            assert!((after - before).abs() < 1e-6 * before.abs(), "{sliding}: {column} {before} to {after}");
+        }
+    }
+}
+
 #[test]
 fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
     let swapped = |on: &str, against: &str| {

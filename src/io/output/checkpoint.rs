@@ -279,7 +279,14 @@ pub fn transfer<const D: usize, const S: usize>(
         fill(previous, &values[0])?;
     }
     if body.paired_displacement.is_some() {
-        body.form_pairs(session, &state.displacement)?;
+        // What was in contact stays paired as it was: under small sliding without any displacement.
+        let mut paired = state.displacement.like()?;
+        if surfaces_in_contact(&header.physics) != surfaces_in_contact(physics) {
+            paired.copy_from(&state.displacement)?;
+        } else if of_nodes.iter().any(|name| name == PAIRED) {
+            fill(&mut paired, &checkpoint.read("nodes", total_nodes, &[(PAIRED, D)], &nodes)?[0])?;
+        }
+        body.form_pairs(session, &paired)?;
     }
     let mut known: Vec<&str> = vec!["displacement", "velocity", PAIRED];
     if let Some(traction) = &mut state.contact_traction
@@ -321,6 +328,15 @@ pub fn transfer<const D: usize, const S: usize>(
     transfer_motions(&header, physics, body, &mut found);
     found.physics = header.physics;
     Ok(found)
+}
+
+/// The keys of a job that say which surfaces act on each other.
+fn surfaces_in_contact(physics: &BTreeMap<String, String>) -> Vec<(&String, &String)> {
+    let is_surface = |key: &str| {
+        key.starts_with("contact.")
+            && ["on", "against", "where", "closed"].contains(&key.rsplit('.').next().unwrap_or_default())
+    };
+    physics.iter().filter(|(key, _)| is_surface(key)).collect()
 }
 
 /// Lets the obstacles moved by forces continue their motion, where both jobs have it: a contact on the same boundaries, or the same part
