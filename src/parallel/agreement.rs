@@ -48,12 +48,23 @@ impl From<Agreed> for Error {
 /// Combines the results of the ranks into one outcome: a value on every rank, or on every rank the failure of the lowest rank
 /// that failed. Collective.
 pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result<T, E>) -> Result<T, Agreed> {
-    let (size, rank) = (communicator.size(), communicator.rank());
     // The value may be a file that all ranks close together; it is kept until the ranks have agreed.
     let (value, error) = match result {
         Ok(value) => (Some(value), pass().err()),
         Err(error) => (None, Some(error.into())),
     };
+    match (first_failure(communicator, error), value) {
+        (None, Some(value)) => Ok(value),
+        (failure, _) => {
+            Err(failure.unwrap_or(Agreed { rank: 0, exit: Exit::Internal, words: String::new() }))
+        }
+    }
+}
+
+/// The failure of the lowest rank that failed; none if no rank did. Apart from [`agree`], so that it is compiled once for all values.
+/// Collective.
+fn first_failure(communicator: &impl Communicator, error: Option<Error>) -> Option<Agreed> {
+    let (size, rank) = (communicator.size(), communicator.rank());
     let own = if error.is_none() { size } else { rank };
     let mut lowest = size;
     let watch = error
@@ -62,10 +73,8 @@ pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result
         .map(|error| end_alone_after_grace(rank, error));
     communicator.all_reduce_into(&own, &mut lowest, SystemOperation::min());
     drop(watch);
-    if lowest == size
-        && let Some(value) = value
-    {
-        return Ok(value);
+    if lowest == size {
+        return None;
     }
     let mut failure = Agreed { rank: 0, exit: Exit::Internal, words: String::new() };
     if let Some(error) = error.filter(|_| rank == lowest) {
@@ -80,7 +89,7 @@ pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result
     culprit.broadcast_into(&mut numbers[..]);
     text.resize(numbers[2] as usize, 0);
     culprit.broadcast_into(&mut text[..]);
-    Err(Agreed {
+    Some(Agreed {
         rank: numbers[0] as usize,
         exit: Exit::from_code(numbers[1] as i32),
         words: String::from_utf8_lossy(&text).into_owned(),
