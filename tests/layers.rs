@@ -480,6 +480,8 @@ fn names_handed_on_and_names_in_tests_make_no_circle() {
 
 /// Largest number of parameters of a function besides `self`.
 const MAX_PARAMETERS: usize = 5;
+/// Functions with more parameters that traits of other crates prescribe.
+const OF_OTHER_CRATES: [&str; 1] = ["curve_to"];
 
 /// The parts of a list between its commas.
 fn parts(list: &[TokenTree]) -> impl Iterator<Item = &[TokenTree]> {
@@ -546,7 +548,9 @@ fn functions_have_few_parameters() {
         let mut found = Vec::new();
         parameters(tokens(&text), &mut found);
         seen += found.len();
-        let many = found.into_iter().filter(|(_, count)| *count > MAX_PARAMETERS);
+        let many = found
+            .into_iter()
+            .filter(|(name, count)| *count > MAX_PARAMETERS && !OF_OTHER_CRATES.contains(&&**name));
         faults.extend(many.map(|(name, count)| format!("{path}: {name} has {count} parameters")));
     }
     assert!(seen > 2000, "only {seen} functions were seen");
