@@ -99,11 +99,6 @@ impl Case {
         Results::of(self.folder().join("out"))
     }
 
-    /// Starts the job.
-    pub fn start(&self, ranks: usize) -> Running {
-        self.start_with(ranks, &[])
-    }
-
     /// Starts the job with these arguments after its name.
     pub fn start_with(&self, ranks: usize, arguments: &[&str]) -> Running {
         Running::start(ranks, &self.arguments(arguments))

@@ -262,7 +262,7 @@ fn files_that_vanish_during_a_run_are_an_error_and_the_run_continues_from_its_st
             .set("time.end", "8")
             .set("output.fields", "{every = 1000000}")
             .set("checkpoint.every", "8");
-        let mut running = case.start(ranks);
+        let mut running = case.start_with(ranks, &["--verbose"]);
         running.wait_for("step   27/");
         std::fs::remove_file(case.folder().join("out").join(name)).expect("removed");
         let words = format!("{name} was removed or replaced during the run");

@@ -364,7 +364,15 @@ fn the_log_is_plain_text_and_says_what_the_terminal_said() {
     let is_long =
         |line: &&str| line.chars().count() > 100 && !line.starts_with("output") && !line.starts_with("files");
     assert_eq!(log.lines().find(is_long), None, "{log}");
-    assert_eq!(log.trim_end(), outcome.stdout.trim_end());
+    // Steps are shown once a second.
+    let without_steps = |text: &str| -> Vec<String> {
+        text.lines().filter(|line| !line.starts_with("step")).map(str::to_owned).collect()
+    };
+    assert_eq!(without_steps(&log), without_steps(&outcome.stdout));
+    assert!(outcome.stdout.contains("step 16/16"), "{}", outcome.stdout);
+    assert!(outcome.stdout.lines().count() < log.lines().count(), "{}", outcome.stdout);
+    let outcome = case.run_with(2, &["--force", "--verbose"]).expect(0);
+    assert_eq!(case.results().text("run.log").trim_end(), outcome.stdout.trim_end());
     for words in [
         "Clarke ",
         "2 ranks",

@@ -19,7 +19,7 @@ fn endless() -> Case {
 
 /// Sends a signal after some steps.
 fn stop(case: &Case, ranks: usize, signal: &str, target: Target) -> Outcome {
-    let mut running = case.start(ranks);
+    let mut running = case.start_with(ranks, &["--verbose"]);
     running.wait_for("step   27/");
     running.signal(signal, target);
     running.wait()
