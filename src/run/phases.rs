@@ -17,18 +17,19 @@ pub(super) fn seconds(
     output: Duration,
 ) -> Map<String, Value> {
     let total = run.began.elapsed();
-    let mut phases = [
+    let setup = setup.saturating_sub(clock.first_assembly);
+    let steps = clock.assembly + clock.history + clock.solve + clock.balance;
+    let phases = [
         ("total", total),
         ("launch", run.launched),
-        ("setup", setup.saturating_sub(clock.first_assembly)),
+        ("setup", setup),
         ("assembly", clock.assembly),
         ("history", clock.history),
         ("solve", clock.solve),
         ("balance", clock.balance),
         ("output", output),
-        ("other", Duration::ZERO),
+        ("other", total.saturating_sub(run.launched + setup + steps + output)),
     ];
-    phases[8].1 = total.saturating_sub(phases[1..8].iter().map(|(_, spent)| *spent).sum());
     let seconds = session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
     phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
 }
