@@ -8,7 +8,8 @@
 //!
 //! Where supports hold a slave node along a direction, its velocity there is known. It is relative to those of its masters that supports
 //! hold along the same direction, if these are most of what it faces, with shares that are scaled to a sum of 1; otherwise to nothing.
-//! Held components of master nodes move as the supports do. No slave node is a master node. Source: Wohlmuth and Krause (2003), Hueeber and Wohlmuth (2005).
+//! Held components of master nodes move as the supports do. No slave node is a master node. Source: Wohlmuth and Krause (2003), Hueeber and
+//! Wohlmuth (2005).
 
 use super::space::Held;
 use crate::{
