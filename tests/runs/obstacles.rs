@@ -285,6 +285,31 @@ fn a_plane_with_mass_that_falls_on_held_nodes_comes_to_rest() {
 }
 
 #[test]
+fn a_plane_with_mass_rebounds_from_a_dashpot_on_a_stiff_block_with_its_restitution() {
+    // exp(-b t) after the time t at which the force vanishes, with b = c / 2 m and omega^2 = k / m - b^2 for 10 kg on 2e6 N/m and
+    // 848.5 kg/s. The plane leaves while the dashpot lets the springs recover, so it is inside of them without a force.
+    let [mass, stiffness, damping] = [10.0, 2e6, 848.5];
+    let rate = damping / (2.0 * mass);
+    let frequency = f64::sqrt(stiffness / mass - rate * rate);
+    let angle =
+        std::f64::consts::PI - f64::atan2(2.0 * rate * frequency, frequency * frequency - rate * rate);
+    let restitution = f64::exp(-rate * angle / frequency);
+    for (modulus, ranks) in [("1e9", 1), ("1e13", 1), ("1e13", 2)] {
+        let case = under("{plane = {point = [0, 0.51], normal = [0, -1]}}")
+            .set("mesh.rectangle.cells", "[1, 1]")
+            .set("material.elasticity", &format!("{{youngs_modulus = {modulus}, poisson_ratio = 0.0}}"))
+            .set("support", "[{on = ['bottom'], fix = 'all'}]")
+            .set("contact.0.normal", "{compliance = {stiffness = 1e6, damping = 424.25}}")
+            .set("contact.0.obstacle_load", "{direction = [0, -1], mass = 10, velocity = 1}")
+            .set("time", "{end = 0.03, step = 1e-4, scheme = 'bdf2'}");
+        case.run(ranks);
+        let resultants = case.results().table("resultants.csv");
+        let velocity = -resultants.only("source", "contact top").last("obstacle_velocity");
+        assert!((velocity / restitution - 1.0).abs() < 2e-3, "{velocity} for {restitution} at {modulus} Pa");
+    }
+}
+
+#[test]
 fn a_plane_that_a_force_presses_on_held_nodes_sinks_in_by_force_over_stiffness() {
     // 1e6 Pa/m over 2 m: 1000 N/m press the plane in by 0.5 mm; 1e8 Pa/m^1.5 by (500/1e8)^(2/3) m. The support takes the force.
     let [linear, hertzian] =

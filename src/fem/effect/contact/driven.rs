@@ -20,7 +20,8 @@ use crate::{
     parallel::session::Session,
 };
 
-/// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
+/// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken; and the accuracy of
+/// velocities at which pressures begin.
 const NEAR: f64 = 1e-6;
 
 /// Distance from a point that stops the obstacle at which they touch, as a share of the body's size.
@@ -350,7 +351,30 @@ impl<const D: usize> Contact<D> {
         point.unknown != Unknown::Velocity && point.carries(&self.law) && point.can_touch()
     }
 
-    /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it touches a point on this rank in the step, at these
+    /// The change in m/s of the normal velocity with which a point in the obstacle comes under pressure: a dashpot lets go of a surface that
+    /// recedes fast, however deep it is.
+    fn change_to_press(&self, point: &Point<D>, velocity: &[f64]) -> f64 {
+        let now = point.normal_component(Newton, velocity);
+        let presses = |change: f64| self.law.pressure(now + change, point.context) > 0.0;
+        let size = now.abs() + depth(point, velocity) / point.context.step_length;
+        if self.law.has_vertical_parts() || presses(0.0) || size == 0.0 {
+            return 0.0;
+        }
+        let mut bracket = [0.0, NEAR * size];
+        while !presses(bracket[1]) {
+            bracket = [bracket[1], 2.0 * bracket[1]];
+            if !bracket[1].is_finite() {
+                return f64::INFINITY;
+            }
+        }
+        while bracket[1] - bracket[0] > NEAR * bracket[1] {
+            let middle = f64::midpoint(bracket[0], bracket[1]);
+            bracket[usize::from(presses(middle))] = middle;
+        }
+        bracket[1]
+    }
+
+    /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it presses on a point on this rank in the step, at these
     /// velocities of Newton's method; infinite if it does not come nearer.
     pub fn change_to_touch(&self, velocity: &[f64], sign: f64) -> f64 {
         let direction = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
@@ -359,9 +383,15 @@ impl<const D: usize> Contact<D> {
                 Some((direction, _)) if point.unknown != Unknown::Parameter => dot(&point.normal, direction),
                 _ => point.follows,
             };
-            let approach = -sign * along * point.context.step_length;
+            let approach = -sign * along;
             let depth = depth(point, velocity);
-            if approach > 0.0 && depth.is_finite() { (-depth / approach).max(0.0) } else { f64::INFINITY }
+            if approach <= 0.0 || !depth.is_finite() {
+                f64::INFINITY
+            } else if depth < 0.0 {
+                -depth / (approach * point.context.step_length)
+            } else {
+                self.change_to_press(point, velocity) / approach
+            }
         };
         self.points.iter().filter(|point| self.is_pressed(point)).map(change).fold(f64::INFINITY, f64::min)
     }
