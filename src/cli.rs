@@ -8,6 +8,7 @@ use crate::{
     },
     job::{self, Job, Loaded},
     laws::{lines::wrapped, nearest::nearest},
+    linear_algebra::petsc::{launched_rank, start_without_daemon},
     mesh::file::{self, Placement},
     parallel::{
         agreement::Agreed,
@@ -193,6 +194,7 @@ struct RunArguments {
 
 /// Executes the command line of a program whose source has this id, and returns the exit code.
 pub fn main(source: &str) -> ExitCode {
+    start_without_daemon();
     run::state_source(source);
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let result = match Cli::try_parse_from(&arguments) {
@@ -334,12 +336,6 @@ fn misspelt_command(path: &Path) -> Option<String> {
     let near = nearest(word, COMMANDS)?;
     (!path.exists() && path.extension().is_none())
         .then(|| format!("`{word}` is neither a command nor a job file; did you mean `solver {near}`?"))
-}
-
-/// The rank of this process before MPI has started, if a launcher provides it.
-fn launched_rank() -> Option<u64> {
-    let names = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
-    names.iter().find_map(|name| std::env::var(name).ok()?.parse().ok())
 }
 
 /// Prints on the first of the launched processes. All processes end together, because launchers kill the others, with their pending

@@ -41,6 +41,26 @@ pub(super) fn started() -> Result<Rc<Started>> {
     started.ok_or_else(|| Error::Internal("PETSc is not started on this thread".into()))
 }
 
+/// The variables with which launchers tell a process its rank.
+const RANKS: [&str; 4] = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
+/// The option of Open MPI with which a process that no launcher has started needs no daemon.
+const ALONE: &str = "OMPI_MCA_ess_singleton_isolated";
+
+/// The rank of this process before MPI has started, if a launcher provides it.
+pub fn launched_rank() -> Option<u64> {
+    RANKS.iter().find_map(|name| std::env::var(name).ok()?.parse().ok())
+}
+
+/// Lets MPI start without a daemon where no launcher has started this process: Open MPI would start one for processes that this one
+/// starts, and wait for it longer than many a run takes. To be called at the start of a program, before it has threads.
+pub fn start_without_daemon() {
+    if launched_rank().is_none() && std::env::var_os(ALONE).is_none() {
+        // SAFETY: the program has started no thread, and those that the BLAS starts as it is loaded only wait for work: no other
+        // thread reads or writes the environment meanwhile.
+        unsafe { std::env::set_var(ALONE, "1") };
+    }
+}
+
 /// PETSc, started. It is finalised when all such tokens and all handles are dropped, and MPI after it.
 #[derive(Clone)]
 pub struct Petsc {

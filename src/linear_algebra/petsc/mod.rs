@@ -30,7 +30,10 @@ mod vector;
 pub use coarse_space::Interpolation;
 pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
-pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option, within};
+pub use library::{
+    Entered, Petsc, Stage, clear_option, has_option, launched_rank, set_default_option, set_option,
+    start_without_daemon, within,
+};
 pub use matrix::Matrix;
 pub use own_preconditioner::OwnPreconditioner;
 pub use projected::{MISSING_DIRECTIONS, ProjectedKsp};
