@@ -190,7 +190,11 @@ fn from_file(session: &Session, path: &Path, loaded: &Loaded) -> Result<(Scene, 
         (2, None) => Scene::Two(split(session, None, job)?),
         (_, None) => Scene::Three(split(session, None, job)?),
     };
-    Ok((scene, is_second_order == 1, notes.unwrap_or_default()))
+    let mut notes: Vec<String> = notes.unwrap_or_default();
+    if order == 2 {
+        notes.iter_mut().for_each(|note| note.truncate(note.trim_end_matches(file::LINEAR_CELLS).len()));
+    }
+    Ok((scene, is_second_order == 1, notes))
 }
 
 fn placement(of: &job::Mesh) -> Placement {

@@ -17,6 +17,7 @@ use document::Document;
 pub use inspect::inspect;
 pub use placement::{Placement, Rotation};
 use std::path::Path;
+pub use subdivide::ADVICE as LINEAR_CELLS;
 
 /// A mesh of the dimension of its file.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,8 +10,8 @@ use super::document::{Block, Document, Shape};
 use crate::error::{Error, Result};
 use std::collections::HashMap;
 
-/// What the note about cells that were split adds.
-const ADVICE: &str = ": linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not";
+/// What the note about cells that were split adds, for runs with linear cells.
+pub const ADVICE: &str = ": linear ones resist bending too much, quadratic ones ([mesh] order = 2) do not";
 
 /// Divides all elements that are no simplices; notes how many cells were divided. If a cell is divided, the others lose the nodes on
 /// their edges.

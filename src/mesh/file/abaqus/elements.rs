@@ -7,8 +7,18 @@ use crate::mesh::file::document::Shape;
 pub(super) struct Kind {
     pub(super) shape: Shape,
     pub(super) nodes: usize,
-    /// Whether its elements can be cells; others, such as shells, are only parts of the boundary of cells.
-    pub(super) is_continuum: bool,
+    pub(super) part: Part,
+}
+
+/// What elements are of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    /// Its cells.
+    Cells,
+    /// Parts of the boundary of cells; without any cells membranes in a plane are the cells, as Gmsh writes quadrilaterals of second order.
+    Membrane,
+    /// Parts of the boundary of cells.
+    Boundary,
 }
 
 impl Kind {
@@ -36,28 +46,33 @@ pub(super) fn meaning(name: &str) -> Result<Meaning, String> {
     let letters = end + capitals[end..].find(|c: char| c.is_ascii_digit()).unwrap_or(capitals.len() - end);
     let (family, rest) = capitals.split_at(letters);
     let digits: &str = &rest[..rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len())];
-    let of = |shape, nodes, is_continuum| Ok(Meaning::Read(Kind { shape, nodes, is_continuum }));
+    let of = |shape, nodes, part| Ok(Meaning::Read(Kind { shape, nodes, part }));
     match (family, digits) {
-        ("C3D", "4") => of(Shape::Tetrahedron, 4, true),
-        ("C3D", "5") => of(Shape::Pyramid, 5, true),
-        ("C3D", "6") => of(Shape::Wedge, 6, true),
-        ("C3D", "8") => of(Shape::Hexahedron, 8, true),
-        ("C3D", "10") => of(Shape::Tetrahedron, 10, true),
-        ("C3D", "13") => of(Shape::Pyramid, 13, true),
-        ("C3D", "15") => of(Shape::Wedge, 15, true),
-        ("C3D", "20") => of(Shape::Hexahedron, 20, true),
-        ("C3D", "27") => of(Shape::Hexahedron, 27, true),
-        ("CPS" | "CPE" | "CAX", "3") => of(Shape::Triangle, 3, true),
-        ("CPS" | "CPE" | "CAX", "4") => of(Shape::Quadrilateral, 4, true),
-        ("CPS" | "CPE" | "CAX", "6") => of(Shape::Triangle, 6, true),
-        ("CPS" | "CPE" | "CAX", "8") => of(Shape::Quadrilateral, 8, true),
-        ("S" | "M3D" | "SFM3D" | "R3D" | "STRI", "3") => of(Shape::Triangle, 3, false),
-        ("S" | "M3D" | "SFM3D" | "R3D", "4") => of(Shape::Quadrilateral, 4, false),
-        ("S" | "M3D" | "SFM3D", "6") | ("STRI", "65") => of(Shape::Triangle, 6, false),
-        ("S" | "M3D" | "SFM3D", "8") => of(Shape::Quadrilateral, 8, false),
-        ("S" | "M3D", "9") => of(Shape::Quadrilateral, 9, false),
-        ("T2D" | "T3D" | "R2D", "2") | ("B", "21" | "23" | "31" | "33") => of(Shape::Line, 2, false),
-        ("T2D" | "T3D", "3") | ("B", "22" | "32") => Ok(Meaning::Ignored),
+        ("C3D", "4") => of(Shape::Tetrahedron, 4, Part::Cells),
+        ("C3D", "5") => of(Shape::Pyramid, 5, Part::Cells),
+        ("C3D", "6") => of(Shape::Wedge, 6, Part::Cells),
+        ("C3D", "8") => of(Shape::Hexahedron, 8, Part::Cells),
+        ("C3D", "10") => of(Shape::Tetrahedron, 10, Part::Cells),
+        ("C3D", "13") => of(Shape::Pyramid, 13, Part::Cells),
+        ("C3D", "15") => of(Shape::Wedge, 15, Part::Cells),
+        ("C3D", "20") => of(Shape::Hexahedron, 20, Part::Cells),
+        ("C3D", "27") => of(Shape::Hexahedron, 27, Part::Cells),
+        ("CPS" | "CPE" | "CAX", "3") => of(Shape::Triangle, 3, Part::Cells),
+        ("CPS" | "CPE" | "CAX", "4") => of(Shape::Quadrilateral, 4, Part::Cells),
+        ("CPS" | "CPE" | "CAX", "6") => of(Shape::Triangle, 6, Part::Cells),
+        ("CPS" | "CPE" | "CAX", "8") => of(Shape::Quadrilateral, 8, Part::Cells),
+        ("M3D", "3") => of(Shape::Triangle, 3, Part::Membrane),
+        ("M3D", "4") => of(Shape::Quadrilateral, 4, Part::Membrane),
+        ("M3D", "6") => of(Shape::Triangle, 6, Part::Membrane),
+        ("M3D", "8") => of(Shape::Quadrilateral, 8, Part::Membrane),
+        ("M3D", "9") => of(Shape::Quadrilateral, 9, Part::Membrane),
+        ("S" | "SFM3D" | "R3D" | "STRI", "3") => of(Shape::Triangle, 3, Part::Boundary),
+        ("S" | "SFM3D" | "R3D", "4") => of(Shape::Quadrilateral, 4, Part::Boundary),
+        ("S" | "SFM3D", "6") | ("STRI", "65") => of(Shape::Triangle, 6, Part::Boundary),
+        ("S" | "SFM3D", "8") => of(Shape::Quadrilateral, 8, Part::Boundary),
+        ("S", "9") => of(Shape::Quadrilateral, 9, Part::Boundary),
+        ("T2D" | "T3D" | "R2D", "2") | ("B", "21" | "23" | "31" | "33") => of(Shape::Line, 2, Part::Boundary),
+        ("T2D" | "T3D", "3") | ("B", "22" | "32") => of(Shape::Line, 3, Part::Boundary),
         ("MASS" | "ROTARYI" | "SPRINGA" | "SPRING" | "DASHPOTA" | "DASHPOT" | "CONN3D" | "CONN2D", _) => {
             Ok(Meaning::Ignored)
         }
@@ -98,7 +113,7 @@ mod tests {
     #[test]
     fn types_are_known_with_all_suffixes() {
         for name in ["C3D8", "c3d8r", "C3D8I", "C3D8RH"] {
-            let kind = Kind { shape: Shape::Hexahedron, nodes: 8, is_continuum: true };
+            let kind = Kind { shape: Shape::Hexahedron, nodes: 8, part: Part::Cells };
             assert_eq!(meaning(name), Ok(Meaning::Read(kind)), "{name}");
         }
         let shape = |name| match meaning(name) {
@@ -113,6 +128,7 @@ mod tests {
         assert_eq!(shape("STRI65"), Some((Shape::Triangle, 6)));
         assert_eq!(meaning("SpringA"), Ok(Meaning::Ignored));
         assert_eq!(shape("S9R5"), Some((Shape::Quadrilateral, 9)));
+        assert_eq!(shape("T3D3"), Some((Shape::Line, 3)));
         for name in ["", "C3D", "C3D7", "DC3D8", "CGAX4", "8", "é3D2D"] {
             assert!(meaning(name).is_err(), "{name}");
         }

@@ -1,10 +1,12 @@
 //! The keywords of a file.
 
-use super::elements::{Kind, Meaning, meaning};
+use super::elements::{Kind, Meaning, Part, meaning};
 use super::lines::{Keyword, Lines, refuse, short};
 use super::sets::{Name, Scope, Sets};
 use super::surface::Surface;
 use crate::error::{Error, Result};
+use crate::mesh::file::document::Shape;
+use std::collections::HashSet;
 
 /// Keywords that cannot be ignored, with the reason.
 const REFUSED: [(&str, &str); 8] = [
@@ -71,6 +73,8 @@ pub(super) struct Model {
     ignored_types: Vec<String>,
     /// Whether elements are those of a body of revolution.
     is_revolved: bool,
+    /// Whether membranes are its cells.
+    has_membranes: bool,
     ignored_keywords: Vec<String>,
     place: Place,
 }
@@ -112,7 +116,42 @@ impl Model {
         if model.node_tags.is_empty() {
             return Err(Error::Refused("the file has no *NODE with nodes: it contains no mesh".into()));
         }
+        model.sort_lines();
+        model.accept_membranes();
         Ok(model)
+    }
+
+    /// Puts the node between the ends of each line of three nodes last: Abaqus has it in the middle, Gmsh writes it at the end. The ends are
+    /// corners of other elements.
+    fn sort_lines(&mut self) {
+        let is_curved = |kind: &Kind| (kind.shape, kind.nodes) == (Shape::Line, 3);
+        if !self.runs.iter().any(|run| is_curved(&run.kind)) {
+            return;
+        }
+        let others = self.runs.iter().filter(|run| run.kind.shape.dimension() > 1);
+        let corners: HashSet<u64> = others
+            .flat_map(|run| run.elements().flat_map(|(_, nodes)| &nodes[..run.kind.shape.corners()]))
+            .copied()
+            .collect();
+        for run in self.runs.iter_mut().filter(|run| is_curved(&run.kind)) {
+            for line in run.nodes.chunks_exact_mut(3) {
+                let between = line.iter().position(|node| !corners.contains(node)).unwrap_or(1);
+                line.swap(between, 2);
+            }
+        }
+    }
+
+    /// Takes membranes in a plane for the cells of a body that has no others.
+    fn accept_membranes(&mut self) {
+        let is = |part: Part| move |run: &&mut Run| run.kind.part == part && !run.tags.is_empty();
+        let is_plane = self.points.iter().all(|point| point[2] == self.points[0][2]);
+        if !is_plane || self.runs.iter_mut().any(|run| is(Part::Cells)(&run)) {
+            return;
+        }
+        for run in self.runs.iter_mut().filter(is(Part::Membrane)) {
+            run.kind.part = Part::Cells;
+            self.has_membranes = true;
+        }
     }
 
     fn keyword(&mut self, keyword: &Keyword, lines: &mut Lines) -> Result<()> {
@@ -266,11 +305,11 @@ impl Model {
 
     /// The dimension of the cells.
     pub(super) fn dimension(&self) -> Result<usize> {
-        let cells = self.runs.iter().filter(|run| run.kind.is_continuum && !run.tags.is_empty());
+        let cells = self.runs.iter().filter(|run| run.kind.part == Part::Cells && !run.tags.is_empty());
         cells.map(|run| run.kind.shape.dimension()).max().ok_or_else(|| {
             Error::Refused(
                 "the file has no cells: *ELEMENT with TYPE=C3D4, C3D8 and the like in space, or CPS3, CPE4, CAX4 and the like in the \
-                 plane; shells and membranes are none"
+                 plane; shells are none, nor are membranes that do not lie in a plane z = constant"
                     .into(),
             )
         })
@@ -303,6 +342,9 @@ impl Model {
                 "a body of revolution (CAX): state [material] hypothesis = \"axisymmetric\" in the job"
                     .into(),
             );
+        }
+        if self.has_membranes {
+            notes.push("membranes (M3D) in a plane are the cells: the file has no others".into());
         }
         if !self.ignored_types.is_empty() {
             notes.push(format!("elements of these types are ignored: {}", list(&self.ignored_types, "")));

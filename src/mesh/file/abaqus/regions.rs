@@ -1,5 +1,6 @@
 //! Cells and their regions.
 
+use super::elements::Part;
 use super::model::{Model, Run};
 use super::sets::{Resolved, find, shown};
 use crate::error::{Error, Result};
@@ -21,7 +22,7 @@ pub(super) fn add(
     let cells: Vec<&Run> = model
         .runs
         .iter()
-        .filter(|run| run.kind.is_continuum && run.kind.shape.dimension() == dimension)
+        .filter(|run| run.kind.part == Part::Cells && run.kind.shape.dimension() == dimension)
         .collect();
     let count = cells.iter().map(|run| run.tags.len()).sum();
     let regions = match of_sections(model, sets, count)?.or_else(|| of_partition(&cells, sets, count)) {

@@ -270,6 +270,31 @@ fn cells_of_a_body_of_revolution_are_those_of_the_plane_with_a_note() {
 }
 
 #[test]
+fn lines_of_three_nodes_name_boundaries_whichever_node_is_in_the_middle() {
+    let nodes = "*NODE\n1,0,0\n2,1,0\n3,0,1\n4,.5,-.1\n5,.5,.5\n6,0,.5\n";
+    for line in ["1,2,4", "1,4,2", "4,2,1"] {
+        for kind in ["T3D3", "B32"] {
+            let cells = "*ELEMENT, type=CPS6, ELSET=body\n1,1,2,3,4,5,6\n";
+            let text = format!("{nodes}*ELEMENT, type={kind}, ELSET=low\n7,{line}\n{cells}");
+            let (mesh, notes) = in_plane(&text);
+            assert!(mesh.is_second_order && notes.is_empty(), "{notes:?}");
+            assert_eq!(boundary(&mesh, "low"), (1.0, [0.0, -1.0]), "{kind} {line}");
+        }
+    }
+}
+
+#[test]
+fn membranes_in_a_plane_are_the_cells_of_a_file_without_others() {
+    let nodes = "*NODE\n1,0,0,H\n2,2,0,H\n3,2,1,H\n4,0,1,H\n5,1,0,H\n6,2,.5,H\n7,1,1,H\n8,0,.5,H\n9,1,.5,H\n";
+    let cells = "*ELEMENT, type=M3D9, ELSET=sheet\n2,1,2,3,4,5,6,7,8,9\n";
+    let text = format!("{nodes}*ELEMENT, type=T3D3, ELSET=left\n1,4,1,8\n{cells}").replace('H', "0.5");
+    let (mesh, notes) = in_plane(&text);
+    assert_eq!((mesh.regions.as_slice(), boundary(&mesh, "left").0), (&["sheet".into()][..], 1.0));
+    assert!(notes.iter().any(|note| note.contains("membranes (M3D) in a plane are the cells")), "{notes:?}");
+    refused(&text.replace("3,2,1,0.5", "3,2,1,0.6"), &["no cells", "membranes that do not lie in a plane"]);
+}
+
+#[test]
 fn bodies_may_touch_where_each_has_a_boundary_of_its_own_beside_those_of_both() {
     let nodes = "*NODE, NSET=all\n1,0,0\n2,2,0\n3,2,1\n4,0,1\n5,.5,1\n6,1.5,1\n7,1.5,2\n8,.5,2\n";
     let sets = "*NSET, NSET=low_top\n3,4\n*NSET, NSET=up_bottom\n5,6\n";
