@@ -456,3 +456,17 @@ fn a_punch_as_wide_as_the_block_presses_as_a_plane_does() {
         assert!((contact.last("touching_area") - 2.0).abs() < 1e-12, "{}", contact.last("touching_area"));
     }
 }
+
+#[test]
+fn the_residual_of_a_step_that_only_adhesion_to_an_obstacle_loads_is_a_share_of_its_forces() {
+    let case = under("{plane = {point = [0, '0.50005 + 1e-3*t'], normal = [0, -1]}}")
+        .set("mesh.rectangle.cells", "[8, 2]")
+        .set("contact.0.normal", "{displacement_graph = {points = [[-2e-4, 0], [-1e-4, -1e3], [0, 0]]}}")
+        .set("contact.0.normal.displacement_graph.slope_after", "inf")
+        .set("solver", "{accept = ['uniqueness']}")
+        .set("time", "{end = 0.02, step = 0.01, scheme = 'implicit_euler'}");
+    case.run(1);
+    assert!(forces(&case)[1] > 10.0, "{:?}", forces(&case));
+    let residual = case.results().number("max_residual");
+    assert!(residual < 1e-9, "{residual}");
+}

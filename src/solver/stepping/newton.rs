@@ -599,6 +599,11 @@ impl Newton {
         })
     }
 
+    /// The norm of the first residual of the last solve, in N.
+    pub(super) fn first_residual(&self) -> f64 {
+        self.counts.first
+    }
+
     /// The residual at the end of the last solve, in N.
     fn last_residual(&self) -> &DistributedVector {
         match (&self.bounded, &self.descent) {
