@@ -54,12 +54,13 @@ impl Case {
     /// A job of the repository with 16 steps a second.
     pub fn from(file: &Path) -> Self {
         let text = std::fs::read_to_string(file).expect("job");
+        Self::written_as(&text).set("time.step", "0.0625").without("checkpoint").without("check")
+    }
+
+    /// The job of this text.
+    pub fn written_as(text: &str) -> Self {
         let job = Value::Table(text.parse::<Table>().expect("TOML"));
-        Self { folder: tempfile::tempdir().expect("folder"), job }
-            .set("time.step", "0.0625")
-            .set("output.folder", "'out'")
-            .without("checkpoint")
-            .without("check")
+        Self { folder: tempfile::tempdir().expect("folder"), job }.set("output.folder", "'out'")
     }
 
     /// Sets a key, given by names and positions joined by dots, to a TOML value.

@@ -194,8 +194,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut touched = touched.to_vec();
         touched.sort_by_key(|(node, _)| *node);
         let mut all = Vec::new();
-        // One direction of each node at a time: those of other nodes must not add up with it.
-        for number in 0..D {
+        // One direction of each node at a time: those of other nodes must not add up with it. Contact and bonds have up to `D` each.
+        for number in 0..2 * D {
             let mut sum = DistributedVector::ghosted(D, self.mesh.owned, &self.mesh.ghosts)?;
             {
                 let mut values = sum.local_mut()?;

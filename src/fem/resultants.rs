@@ -266,7 +266,7 @@ impl<const D: usize> Resultants<D> {
         }
         surface.clear();
         body.write_surface_forces(state, surface)?;
-        for SurfaceForce { contact, node, force } in surface {
+        for SurfaceForce { contact, node, force, .. } in surface {
             sums.add_both(body, *contact, (*node, force));
         }
         let at = |node: usize, i: usize| velocity[node * D + i];

@@ -90,6 +90,7 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
         }
     }
     let mut touched: Vec<_> = body.contacts.iter().flat_map(Contact::holding_directions).collect();
+    touched.extend(body.surface_effects.iter().flat_map(|effect| effect.holding_directions()));
     touched.extend(session.agree(body.opposite_directions(&touched))?);
     touched.extend(body.support_directions());
     let free = free_motions(session, mesh, &held, &touched)?;

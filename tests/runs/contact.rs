@@ -512,3 +512,74 @@ fn a_body_that_bounces_turns_as_much_as_the_moment_of_its_contact_forces_says() 
         }
     }
 }
+
+/// A quasistatic bar on the line y = 0, 0.1 m x 0.002 m, bonded along its bottom and held in y along its top.
+const BONDED: &str = "
+    mesh.rectangle = {size = [0.1, 0.002], cells = [20, 2]}
+    time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+    [material]
+    hypothesis = 'plane_stress'
+    elasticity = {youngs_modulus = 7e9, poisson_ratio = 0.0}
+    [[support]]
+    on = ['top']
+    fix = ['y']
+    [[traction]]
+    on = ['right']
+    value = [1e6, 0.0]
+    [[contact]]
+    on = ['bottom']
+    normal.unilateral = {}
+    adhesion = {stiffness = 1e13, tangential_stiffness = 1e12, energy = 50.0}";
+
+/// That bar on another one.
+const TWO: &str = "[{name = 'up', size = [0.1, 0.002], cells = [20, 2]}, \
+                    {name = 'low', corner = [0.0, -0.002], size = [0.1, 0.002], cells = [30, 2]}]";
+
+#[test]
+fn bonds_alone_hold_a_body_along_an_obstacle_and_another_body() {
+    let case = Case::written_as(BONDED);
+    case.run(1);
+    let force = |case: &Case, source: &str| {
+        case.results().table("resultants.csv").only("source", source).last("force_x")
+    };
+    assert!((force(&case, "contact bottom") + 2000.0).abs() < 1e-6, "{}", force(&case, "contact bottom"));
+    for [on, against] in [["up.bottom", "low.top"], ["low.top", "up.bottom"]] {
+        let case = Case::written_as(BONDED)
+            .set("mesh", &format!("{{rectangle = {TWO}}}"))
+            .set("support", "[{on = ['up.top'], fix = ['y']}, {on = ['low.bottom'], fix = 'all'}]")
+            .set("traction.0.on", "['up.right']")
+            .set("contact.0.on", &format!("['{on}']"))
+            .set("contact.0.against", &format!("['{against}']"));
+        case.run(2);
+        let held = force(&case, "support low.bottom");
+        assert!((held + 2000.0).abs() < 1e-6, "{held} N on {on}");
+    }
+    let sliding = Case::written_as(BONDED).set("contact.0.adhesion.tangential_stiffness", "0.0");
+    sliding
+        .run_with(1, &[])
+        .expect(2)
+        .says("nothing prevents these rigid motions")
+        .says("translation along x");
+}
+
+#[test]
+fn the_contact_traction_at_bonds_is_the_stress_on_either_side() {
+    let output = "{probe_also = ['contact_traction', 'stress'], probe = [{name = 'm', point = [0.05, 0.0]}], folder = 'out'}";
+    let pulled = "{fix = 'all', displacement = ['0', '1e-7*t']";
+    let alone = Case::written_as(BONDED).set("support", &format!("[{pulled}, on = ['top']}}]"));
+    let pair = |[on, against]: [&str; 2]| {
+        let supports = format!("[{pulled}, on = ['up.top']}}, {{on = ['low.bottom'], fix = 'all'}}]");
+        Case::written_as(BONDED)
+            .set("mesh", &format!("{{rectangle = {TWO}}}"))
+            .set("support", &supports)
+            .set("contact.0.on", &format!("['{on}']"))
+            .set("contact.0.against", &format!("['{against}']"))
+    };
+    for case in [alone, pair(["up.bottom", "low.top"]), pair(["low.top", "up.bottom"])] {
+        let case = case.without("traction").set("output", output);
+        case.run(1);
+        let probes = case.results().table("probes.csv");
+        let [traction, stress] = ["contact_traction_y", "stress_yy"].map(|column| probes.last(column));
+        assert!(stress > 1e5 && (traction.abs() / stress - 1.0).abs() < 1e-9, "{traction} of {stress} Pa");
+    }
+}

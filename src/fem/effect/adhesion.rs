@@ -1,11 +1,12 @@
 use super::{
     Curvature, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Role, Step, StressError,
-    SurfaceEffect, SurfaceForce, Tangents, evolution::Evolution, node_history::NodeHistory, quantity,
+    SurfaceEffect, SurfaceForce, Tangents, contact::tangents, evolution::Evolution,
+    node_history::NodeHistory, quantity,
 };
 use crate::{
     fem::space::{Nodal, SurfacePoint},
     laws::contact::{self, Toughness},
-    linear_algebra::tensor::{add_scaled, dot},
+    linear_algebra::tensor::{Vector, add_scaled, dot},
 };
 
 /// Stored in stretched adhesive bonds.
@@ -217,6 +218,21 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         self.points.iter().filter(|(_, point)| point.weight > 0.0).map(|(_, point)| point.node).collect()
     }
 
+    fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
+        let mut all = Vec::new();
+        for (group, bonding) in self.groups().zip(&self.bonding.converged) {
+            // Of several faces at a node one is enough: its bonds hold the whole motion, unless they slide freely.
+            let bond = group.iter().find(|(_, point)| point.weight > 0.0 && *bonding > 0.0);
+            let Some((law, point)) = bond else { continue };
+            let (law, node) = (&self.laws[*law], point.node as usize);
+            all.push((node, point.normal));
+            if law.tangential_stiffness() > 0.0 {
+                all.extend(tangents(&point.normal).map(|tangent| (node, tangent)));
+            }
+        }
+        all
+    }
+
     fn evaluate(
         &mut self,
         at: Evaluation,
@@ -281,7 +297,12 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
                     add_scaled(&point.value(nodal.displacement), -length, &point.value(nodal.velocity));
                 let traction = self.laws[*law].traction(&displacement, &point.normal);
                 let force = traction.map(|t| point.weight * bonding * bonding * t);
-                forces.push(SurfaceForce { contact: self.contacts[*law], node: point.node, force });
+                forces.push(SurfaceForce {
+                    contact: self.contacts[*law],
+                    node: point.node,
+                    weight: point.weight,
+                    force,
+                });
             }
         }
     }

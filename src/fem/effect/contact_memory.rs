@@ -133,7 +133,7 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
         let points = self.points.iter().zip(&self.contacts).zip(&self.pressure.converged);
         forces.extend(points.map(|(((_, point), &contact), pressure)| {
             let force = point.normal.map(|n| -point.weight * pressure * n);
-            SurfaceForce { contact, node: point.node, force }
+            SurfaceForce { contact, node: point.node, weight: point.weight, force }
         }));
     }
 

@@ -8,6 +8,8 @@ pub struct SurfaceForce<const D: usize> {
     pub contact: usize,
     /// Local number of the node.
     pub node: u32,
+    /// Weight of the point in m^(D-1): the force over it is the traction.
+    pub weight: f64,
     /// Force on the body in N.
     pub force: Vector<D>,
 }
@@ -24,6 +26,11 @@ pub trait SurfaceEffect<const D: usize> {
 
     /// The local numbers of the nodes where it has forces.
     fn nodes(&self) -> Vec<u32>;
+
+    /// The nodes of this rank with directions along which it resists a motion of a body at rest.
+    fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
+        Vec::new()
+    }
 
     /// Evaluates its law at this displacement (`D` values a node, with ghosts) and writes its trial history.
     ///

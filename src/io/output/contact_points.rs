@@ -7,8 +7,8 @@ use super::{
 use crate::{
     error::Result,
     fem::{
-        effect::{Contact, Moment, PointState, Quantity},
-        space::corner_means,
+        effect::{Contact, Moment, PointState, Quantity, SurfaceForce},
+        space::{SurfacePoint, corner_means},
     },
     linear_algebra::tensor::{Vector, dot, larger},
 };
@@ -157,6 +157,39 @@ pub(super) fn fill_faced<const D: usize, const S: usize>(
         }
     }
     Ok(())
+}
+
+/// The tractions of effects at the surface, such as bonds, on what the body touches, `D` values for each owned node, with means at
+/// corners and on the other side of contact between bodies as in [`contact_points`]; empty without such effects. Collective.
+pub(super) fn further_tractions<const D: usize, const S: usize>(at: Converged<'_, D, S>) -> Result<Vec<f64>> {
+    if at.body.surface_effects.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (mesh, mut forces) = (&at.body.mesh, Vec::new());
+    at.session.agree(at.body.write_surface_forces(at.state, &mut forces))?;
+    let mut values = vec![0.0; mesh.owned * D];
+    let mut given: Vec<Given<D>> = Vec::new();
+    for SurfaceForce { contact, node, weight, force } in forces.iter().filter(|force| force.weight > 0.0) {
+        let traction: Vector<D> = force.map(|force| -force / weight);
+        let target = &mut values[*node as usize * D..][..D];
+        (0..D).for_each(|i| target[i] += traction[i]);
+        if at.body.contacts[*contact].is_paired() {
+            given.push(Given { contact: *contact, node: *node as usize, values: traction });
+        }
+    }
+    for FacedPoint { point, of_forces, .. } in faced_points(at, &given)? {
+        let target = &mut values[point.node as usize * D..][..D];
+        (0..D).for_each(|i| target[i] -= of_forces[i]);
+    }
+    let others = at.body.pairs.iter().flat_map(|pair| &pair.against);
+    let facets = at.body.contacts.iter().flat_map(Contact::facets).chain(others);
+    let facets: Vec<u32> = facets.copied().collect();
+    let of_midside = |node: u32, _: &Vector<D>| Some(std::array::from_fn(|i| values[node as usize * D + i]));
+    let corners: Vec<(SurfacePoint<D>, Vector<D>)> = corner_means(at.session, mesh, &facets, of_midside)?;
+    for (point, mean) in corners {
+        values[point.node as usize * D..][..D].copy_from_slice(&mean);
+    }
+    Ok(values)
 }
 
 fn in_order<const D: usize>(a: &(usize, PointState<D>), b: &(usize, PointState<D>)) -> Ordering {

@@ -1,7 +1,7 @@
 //! Fields that are written only if a job asks for them in `[output] also`.
 
 use super::{
-    contact_points::{contact_points, largest},
+    contact_points::{contact_points, further_tractions, largest},
     field::{Place, Shape},
     output_field::{Computed, Converged, OutputField},
 };
@@ -78,16 +78,18 @@ pub(super) fn of_contacts<'a, const D: usize, const S: usize, const W: usize>(
     Ok(Computed::of(values))
 }
 
-/// Contact traction at the nodes; `None` if no contact acts at nodes. Corners where no law acts, and the other side of contact between
-/// bodies, have means. Collective.
+/// Contact traction at the nodes, with that of bonds; `None` if no contact acts at nodes. Corners where no law acts, and the other side of
+/// contact between bodies, have means. Collective.
 pub(super) fn contact_traction<'a, const D: usize, const S: usize>(
     at: Converged<'a, D, S>,
 ) -> Result<Option<Computed<'a>>> {
     let Some(traction) = &at.state.contact_traction else { return Ok(None) };
-    if !omits_corners(&at.body.mesh) && at.body.pairs.is_empty() {
+    let further = further_tractions(at)?;
+    if !omits_corners(&at.body.mesh) && at.body.pairs.is_empty() && further.is_empty() {
         return Ok(Some(Computed::of(traction.owned()?)));
     }
     let mut values = vec![0.0; at.body.mesh.owned * D];
+    values.iter_mut().zip(&further).for_each(|(value, further)| *value = *further);
     for (node, state) in contact_points(at)? {
         let target = &mut values[node * D..][..D];
         (0..D).for_each(|i| target[i] += state.pressure * state.direction[i] + state.friction[i]);

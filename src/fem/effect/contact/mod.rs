@@ -72,6 +72,7 @@ pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use sliding::Decrease;
 pub use sweep::OVERRUN;
+pub(super) use tangential_point::tangents;
 pub use unknowns::{choose_unknowns, set_walls};
 
 /// The law along the normal of a contact boundary, and its points.
