@@ -21,6 +21,9 @@ const TOO_DEEP: f64 = 0.01;
 
 /// The slip between bodies, as a share of the size of a facet, beyond which they no longer act on the surface that they face.
 const LARGEST_SLIP: f64 = 0.5;
+/// The angle in rad between a boundary and a plane above which a warning is given: the tangential force of a frictionless plane is then
+/// missing, more than 3 % of the pressure.
+const TILTED: f64 = 2.0 * std::f64::consts::PI / 180.0;
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -53,6 +56,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             }
             continue;
         }
+        out.extend(warning_of_tilt(session, (number, contact), &on, job.time.end));
         if deepest > TOO_DEEP * size {
             out.push(format!(
                 "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject the body; correct the gap, the obstacle or [initial] displacement",
@@ -83,6 +87,28 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         ));
     }
     Ok(out)
+}
+
+/// A warning about a plane to which no part of the boundary is parallel, at the start, the end or in the middle of a run to this time in s.
+/// Collective.
+fn warning_of_tilt<const D: usize>(
+    session: &Session,
+    (number, contact): (usize, &Contact<D>),
+    on: &str,
+    end: f64,
+) -> Option<String> {
+    let [angle, time] = [0.0, 0.5 * end, end]
+        .map(|time| [-session.largest([-contact.tilt(time)])[0], time])
+        .into_iter()
+        .fold([0.0; 2], |most, found| if found[0].is_finite() && found[0] > most[0] { found } else { most });
+    (angle > TILTED).then(|| {
+        format!(
+            "contact.{number}: the plane in front of the boundary {on} is inclined to it by {:.1} degrees or more at t = {time} s: contact \
+             acts along the normals of the undeformed body, so that no force pushes the body down this slope; incline the body and \
+             [gravity] instead of the plane",
+            angle.to_degrees()
+        )
+    })
 }
 
 /// The gaps of a contact that depends on them. Names are those of `solver check --json`.

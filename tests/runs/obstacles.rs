@@ -470,3 +470,14 @@ fn the_residual_of_a_step_that_only_adhesion_to_an_obstacle_loads_is_a_share_of_
     let residual = case.results().number("max_residual");
     assert!(residual < 1e-9, "{residual}");
 }
+
+#[test]
+fn a_plane_that_is_inclined_to_the_body_is_warned_of() {
+    let plane = |normal: &str| under(&format!("{{plane = {{point = [0, 0.52], normal = {normal}}}}}"));
+    let words = "is inclined to it by 5.0 degrees or more";
+    for (normal, angle) in [("['sin(pi/36*t)', '-cos(pi/36*t)']", true), ("[0.03, -1.0]", false)] {
+        let case = plane(normal);
+        let checked = launch::run_alone(&["check".as_ref(), case.written().as_os_str()]);
+        assert_eq!(launch::unwrapped(&checked.stdout).contains(words), angle, "{normal}\n{}", checked.stdout);
+    }
+}

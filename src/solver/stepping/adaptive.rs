@@ -134,7 +134,7 @@ impl<const D: usize> Adaptive<D> {
         if self.time_dependent_data.is_none() {
             self.time_dependent_data = Some(TimeDependentData::of(session, body, self.end));
         }
-        if self.step_level.velocity == 0.0 && self.step_level.stress == 0.0 {
+        if self.is_at_rest() {
             self.estimate_reference_norms(session, stepper, body, state, target)?;
         }
         loop {
@@ -148,13 +148,24 @@ impl<const D: usize> Adaptive<D> {
                     self.adjust_level(step, error);
                     return Ok(outcome);
                 }
-                Ok((_, error, _)) => self.reject(step, self.level_within_tolerance(step, error)),
+                Ok((_, error, found)) => {
+                    // The trial step at rest had no solution: a shorter one says how large velocity and stress will be.
+                    if self.is_at_rest() {
+                        self.step_level.keep_largest(&found);
+                    }
+                    self.reject(step, self.level_within_tolerance(step, error));
+                }
                 Err(error) if error.is_failure() && !is_shortest => {
                     self.reject(step, self.level_of(step) - 1)
                 }
                 Err(error) => return Err(error),
             }
         }
+    }
+
+    /// Whether no step has moved or stressed the body yet.
+    fn is_at_rest(&self) -> bool {
+        self.step_level.velocity == 0.0 && self.step_level.stress == 0.0
     }
 
     /// The length of the next attempt and the time that it must not pass. Within the length, loads and obstacles deviate from

@@ -8,6 +8,7 @@ use super::{
         Point, Unknown,
         Vectors::{self, Body},
     },
+    tangential_point::tangents,
 };
 use crate::{
     error::{Error, Result},
@@ -137,6 +138,23 @@ impl<const D: usize> Contact<D> {
     /// How near body and obstacle have come in the steps so far, on any rank. Collective.
     pub fn closeness_of_all(&self, session: &Session) -> Closeness {
         Closeness::of(session.largest(self.closeness.numbers()))
+    }
+
+    /// The smallest angle in rad between the surface at a point on this rank and a plane in front of it at `time`; infinite where none is.
+    pub fn tilt(&self, time: f64) -> f64 {
+        let of_point = |point: &Point<D>| {
+            let gap = |along: &Vector<D>| {
+                self.gap
+                    .at(time, &add_scaled(&point.place, self.size, along), &point.normal)
+                    .unwrap_or(f64::NAN)
+            };
+            let here = gap(&[0.0; D]);
+            let squares = tangents(&point.normal).map(|tangent| ((gap(&tangent) - here) / self.size).powi(2));
+            squares.sum::<f64>().sqrt().atan()
+        };
+        let is_plane = matches!(self.gap, Gap::Plane(_));
+        let angles = self.points.iter().filter(|point| is_plane && point.can_touch()).map(of_point);
+        angles.fold(f64::INFINITY, f64::min)
     }
 
     /// The gaps of points on this rank at `time`, from displacements with ghosts. A gap that is NaN is ignored: the first step refuses
