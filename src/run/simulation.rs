@@ -94,7 +94,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if state.time >= time.end {
             return Ok(None);
         }
-        let target = landings.next(state.time);
+        let target = landings.next([state.time, state.step_length]);
         let was_single = scheme.factor_precision() == Some(Precision::Single);
         let mut outcome = if let Some(adaptive) = adaptive {
             let outcome = adaptive.advance(session, scheme, body, state, target)?;

@@ -2,13 +2,15 @@
 
 use crate::{
     job::{Every, Job, Scalar},
-    solver::stepping::{Adaptive, Breakpoint, Landings, StepRange, TIME_TOLERANCE},
+    solver::stepping::{Adaptive, Breakpoint, Forgets, Landings, StepRange, TIME_TOLERANCE},
 };
 use std::borrow::Cow;
 
 /// Steps end at the kinks of a table if at most this number lies within steps, or one in every ten steps.
 const MOST_KINKS: usize = 100;
 const STEPS_A_KINK: f64 = 10.0;
+/// Steps within which ends of pieces are searched for.
+const MOST_STEPS: f64 = 1e6;
 /// Share of a time within which the exact time of a jump is found.
 const SEARCHED: f64 = 1e-10;
 /// A value jumps if it changes by more than this share of its largest value.
@@ -101,11 +103,37 @@ fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
     found
 }
 
+/// The times at which `min`, `max`, `abs` and the like pass from one piece of a value to another, at most one in a step.
+fn ends_of_pieces(job: &Job, value: &Scalar) -> Vec<f64> {
+    if !value.has_pieces() {
+        return Vec::new();
+    }
+    let steps = (job.time.end / longest_step(job)).ceil().min(MOST_STEPS) as u32;
+    let time = |at: u32| job.time.end * f64::from(at) / f64::from(steps);
+    let ends = (0..steps).filter_map(|at| {
+        let [mut low, mut high] = [time(at), time(at + 1)];
+        let before = value.pieces(low, &[]);
+        if value.pieces(high, &[]) == before {
+            return None;
+        }
+        while high - low > SEARCHED * high {
+            let middle = 0.5 * (low + high);
+            if value.pieces(middle, &[]) == before { low = middle } else { high = middle }
+        }
+        // Without the rounding of the search.
+        format!("{high:.8e}").parse().ok()
+    });
+    ends.collect()
+}
+
 /// The kinks of the tables of a value within the run. `Err` is the number of those within steps if steps do not end there, because
 /// they are too many.
 fn kinks(job: &Job, value: &Scalar) -> Result<Vec<f64>, usize> {
     let length = longest_step(job);
     let mut kinks = value.breakpoints().kinks;
+    if kinks.is_empty() && forgets(job) == Forgets::Kinks {
+        kinks = ends_of_pieces(job, value);
+    }
     kinks.retain(|time| *time > 0.0 && *time < job.time.end);
     let is_within_step = |time: &&f64| {
         let steps = **time / length;
@@ -201,8 +229,19 @@ pub(super) fn landings(job: &Job) -> Landings {
         breakpoints: breakpoints(job),
         length: shortest_step(job),
         is_fixed: job.time.adaptive.is_none(),
-        starts_anew: job.time.scheme.states() > 1,
+        forgets: forgets(job),
         end: job.time.end,
+    }
+}
+
+/// After what the steps of a job forget the step before.
+fn forgets(job: &Job) -> Forgets {
+    let has_mass = job.materials().all(|(_, material)| material.density.is_some());
+    match job.time.scheme.states() {
+        0 | 1 => Forgets::Nothing,
+        _ if has_mass => Forgets::Jumps,
+        _ if job.contact.iter().all(|contact| contact.friction.is_none()) => Forgets::StepsOverJumps,
+        _ => Forgets::Kinks,
     }
 }
 

@@ -172,3 +172,37 @@ fn reactions_are_those_at_the_time_of_their_row_with_the_order_of_the_scheme() {
         assert!((observed - order).abs() < 0.3, "{scheme}: {errors:?}");
     }
 }
+
+/// A quasistatic block on a plane with friction, under a pressure of this time.
+fn pressed(pressure: &str, scheme: &str) -> Case {
+    Case::written_as(&format!(
+        "
+        mesh.rectangle = {{size = [1.0, 1.0], cells = [8, 8]}}
+        time = {{end = 1.0, step = 0.1, scheme = '{scheme}'}}
+        support = [{{on = ['left'], fix = ['x']}}]
+        traction = [{{on = ['top'], value = [0.0, '-1e4*{pressure}']}}]
+        contact = [{{on = ['bottom'], normal.unilateral = {{}}, friction.coulomb.coefficient = 0.1}}]
+        output.probe = [{{name = 'edge', point = [1.0, 0.0]}}]
+        [material]
+        hypothesis = 'plane_strain'
+        elasticity = {{youngs_modulus = 1e6, poisson_ratio = 0.3}}"
+    ))
+}
+
+#[test]
+fn bodies_without_mass_stick_after_a_jump_or_kink_of_their_loads_under_a_two_step_scheme() {
+    let ends = |case: &Case| case.results().table("probes.csv").last("displacement_x");
+    for pressure in ["1", "step(t - 0.3)", "min(t/0.5, 1)"] {
+        let [one, two] = ["implicit_euler", "bdf2"].map(|scheme| {
+            let case = pressed(pressure, scheme);
+            case.run(1);
+            ends(&case)
+        });
+        assert!((two / one - 1.0).abs() < 1e-6, "{pressure}: {two} m, in steps of implicit Euler {one} m");
+        let adaptive = pressed(pressure, "bdf2")
+            .set("time.adaptive", "{smallest_step = 1e-3, largest_step = 0.1}")
+            .run_and_keep(2);
+        let found = ends(&adaptive);
+        assert!((found / one - 1.0).abs() < 2e-3, "{pressure}: {found} m in adaptive steps, not {one} m");
+    }
+}

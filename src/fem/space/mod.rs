@@ -24,6 +24,6 @@ pub use quadratic::{
 };
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};
 pub use surface::{
-    FacetPoint, SurfacePoint, corner_means, facet_points, facets, longest_side, omits_corners, surface_means,
-    surface_points,
+    FacetPoint, SurfacePoint, corner_means, facet_points, facet_sizes, facets, longest_side, omits_corners,
+    surface_means, surface_points,
 };

@@ -12,6 +12,7 @@ use crate::{
     },
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
+use std::collections::BTreeMap;
 
 /// A node of a boundary with the normal and the measure of the boundary that it stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,6 +162,21 @@ struct Share<const D: usize, const N: usize> {
 /// on the axis of bodies of revolution.
 pub fn omits_corners<const D: usize>(mesh: &Mesh<D>) -> bool {
     mesh.order() == 2 && (D == 3 || mesh.is_revolved)
+}
+
+/// The mean size in m of the facets around each node of these boundaries that is owned here: their length, or that of the legs of a right
+/// triangle of their area. Collective.
+pub fn facet_sizes<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    facets: &[u32],
+) -> Result<BTreeMap<usize, f64>, Agreed> {
+    let size = |facet: u32| {
+        let area = norm(&facet_normal(&mesh.facet_corners(facet)));
+        [if D == 2 { area } else { (2.0 * area).sqrt() }]
+    };
+    let points = surface_means(session, mesh, facets, size)?;
+    Ok(points.into_iter().map(|(point, [size])| (point.node as usize, size)).collect())
 }
 
 /// Whether a corner is one of them.

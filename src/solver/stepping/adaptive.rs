@@ -175,7 +175,7 @@ impl<const D: usize> Adaptive<D> {
             let length = self.next_length(target.time - state.time, state.step_length);
             let landing = self.landing(session, state, target, length);
             let length = self.next_length(landing.time - state.time, state.step_length);
-            let step = next_step([state.time, state.step_length], length, landing.time);
+            let step = next_step(times_before(state, target), length, landing.time);
             let deviation = self
                 .time_dependent_data
                 .as_ref()
@@ -232,7 +232,7 @@ impl<const D: usize> Adaptive<D> {
         target: Landing,
     ) -> Result<(), Agreed> {
         let landing = self.landing(session, state, target, self.longest());
-        let step = next_step([state.time, state.step_length], self.longest(), landing.time);
+        let step = next_step(times_before(state, target), self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
             Ok((_, _, found)) => {
                 self.step_level.keep_largest(&found);
@@ -310,6 +310,11 @@ impl<const D: usize> Adaptive<D> {
             self.step_level.taken = 0;
         }
     }
+}
+
+/// The start of a step to this time and the length of the step before it in s, which may be forgotten.
+fn times_before(state: &State, target: Landing) -> [f64; 2] {
+    [state.time, if target.starts_anew { 0.0 } else { state.step_length }]
 }
 
 #[cfg(test)]

@@ -47,6 +47,6 @@ pub use obstacle_motions::ObstacleMotions;
 pub use outcome::StepOutcome;
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};
-pub use step_length::{Breakpoint, Landing, Landings, TIME_TOLERANCE, without_rounding};
+pub use step_length::{Breakpoint, Forgets, Landing, Landings, TIME_TOLERANCE, without_rounding};
 pub use step_range::StepRange;
 pub use stepper::{MatrixOfStep, Stepper, StepperSettings};

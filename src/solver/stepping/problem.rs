@@ -31,6 +31,8 @@ pub(super) struct StepProblem<'a, const D: usize, const S: usize> {
     pub forces: &'a DistributedVector,
     /// The size of the forces in N, by which the accuracy of the step is measured.
     pub scale: f64,
+    /// Their norm in N, without what supports need to carry the body along.
+    pub norm: f64,
     /// The residual norm in N due to rounding errors of the forces.
     pub rounding: f64,
     /// The displacement from which the step starts, if stresses are those at the end of the step.

@@ -16,6 +16,21 @@ pub struct Landing {
     pub time: f64,
     /// Its name, if the log reports it.
     pub name: Option<&'static str>,
+    /// Whether the step that begins before it forgets the step before.
+    pub starts_anew: bool,
+}
+
+/// After what a step forgets the step before it, each with those before it in this list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Forgets {
+    /// One-step schemes remember none.
+    Nothing,
+    /// Jumps of loads.
+    Jumps,
+    /// Steps over jumps, in which a body without mass jumps, too, and the first step, over the jump of loads that are there at its start.
+    StepsOverJumps,
+    /// Kinks of loads: a point that sticks from then on would slide on with a share of its last velocity.
+    Kinks,
 }
 
 /// A time at which a load or an obstacle motion has a kink or a jump.
@@ -44,16 +59,17 @@ pub struct Landings {
     pub length: f64,
     /// Whether steps are fixed.
     pub is_fixed: bool,
-    /// Whether a fixed step after a jump, or after a much shorter step, forgets the step before it.
-    pub starts_anew: bool,
+    /// After what a step forgets the step before it; a fixed step of a two-step scheme also does after a much shorter one.
+    pub forgets: Forgets,
     /// The end of the run in s.
     pub end: f64,
 }
 
 impl Landings {
-    /// The first of these times after `time`.
-    pub fn next(&self, time: f64) -> Landing {
+    /// The first of these times after `time`, the end of a step of the length `last` in s.
+    pub fn next(&self, [time, last]: [f64; 2]) -> Landing {
         let landing = self.next_prescribed(time);
+        let landing = Landing { starts_anew: self.starts_anew([time, last]), ..landing };
         let near = TIME_TOLERANCE * self.length;
         let fixed_end = snapped_to_multiple(time + self.length, self.length);
         // A jump is passed over only if it coincides with the last end, a kink also if the step to it would be too short.
@@ -66,14 +82,14 @@ impl Landings {
         let following = self.breakpoints.partition_point(|breakpoint| breakpoint.time <= time + near);
         let mut within = self.breakpoints[following..].iter().take_while(|next| next.time <= landing.time);
         let first = within.find(must_land);
-        first.map_or(landing, |first| Landing { time: first.time, name: Some(first.name) })
+        first.map_or(landing, |first| Landing { time: first.time, name: Some(first.name), ..landing })
     }
 
     /// The fixed step from this time in s, after a step of the length `last` in s, that does not pass `target`.
     pub fn fixed_step(&self, [time, last]: [f64; 2], target: Landing) -> Step {
         let mut step = next_step([time, last], self.length, target.time);
         let has_grown = step.length > LARGEST_GROWTH * step.previous_length;
-        if self.starts_anew && (has_grown || self.has_jump(time)) {
+        if target.starts_anew || (has_grown && self.forgets > Forgets::Nothing) {
             step.previous_length = 0.0;
         }
         step
@@ -83,9 +99,9 @@ impl Landings {
     pub(super) fn visit_fixed_steps(&self, mut visit: impl FnMut(Step)) {
         let [mut time, mut last] = [0.0; 2];
         while time < self.end {
-            let step = self.fixed_step([time, last], self.next(time));
+            let step = self.fixed_step([time, last], self.next([time, last]));
             visit(step);
-            let whole = ((self.next(step.time).time - step.time) / self.length - 2.0).floor();
+            let whole = ((self.next([step.time, step.length]).time - step.time) / self.length - 2.0).floor();
             let repeats = step.length == self.length && step.previous_length == last && whole >= 1.0;
             // The end of a step is exact: rounded, it might never be that of the run.
             time = if repeats && last == self.length {
@@ -112,12 +128,22 @@ impl Landings {
         gaps.filter(|gap| *gap > TIME_TOLERANCE * self.length).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a load or an obstacle motion jumps at this time, the end of a step.
-    fn has_jump(&self, time: f64) -> bool {
+    /// Whether the step from this time in s, after a step of the length `last` in s, forgets that one.
+    fn starts_anew(&self, [time, last]: [f64; 2]) -> bool {
+        let near = TIME_TOLERANCE * self.length;
+        let start = time - last;
+        let jumped = || (last > 0.0 && start <= near) || self.breaks_at(start, true);
+        (self.forgets >= Forgets::Jumps && self.breaks_at(time, true))
+            || (self.forgets >= Forgets::StepsOverJumps && jumped())
+            || (self.forgets >= Forgets::Kinks && self.breaks_at(time, false))
+    }
+
+    /// Whether a load or an obstacle motion jumps, or has a kink, at this time, the end of a step.
+    fn breaks_at(&self, time: f64, is_jump: bool) -> bool {
         let near = TIME_TOLERANCE * self.length;
         let first = self.breakpoints.partition_point(|breakpoint| breakpoint.time < time - near);
         let mut following = self.breakpoints[first..].iter().take_while(|next| next.time <= time + near);
-        following.any(|breakpoint| breakpoint.is_jump)
+        following.any(|breakpoint| breakpoint.is_jump == is_jump)
     }
 
     /// The first of the times of the job and the outputs after `time`.
@@ -127,8 +153,8 @@ impl Landings {
         let last = self.interval.map_or(self.end, multiple).min(self.end);
         let last = self.output_times.iter().find(|at| **at > after).map_or(last, |at| at.min(last));
         match self.times.iter().find(|landing| **landing > after && **landing <= last) {
-            Some(landing) => Landing { time: *landing, name: Some("[time] land_on") },
-            None => Landing { time: last, name: None },
+            Some(landing) => Landing { time: *landing, name: Some("[time] land_on"), starts_anew: false },
+            None => Landing { time: last, name: None, starts_anew: false },
         }
     }
 
@@ -195,7 +221,7 @@ mod tests {
             breakpoints,
             length: 0.1,
             is_fixed,
-            starts_anew: false,
+            forgets: Forgets::Nothing,
             end: 1.0,
         }
     }
@@ -208,11 +234,12 @@ mod tests {
     fn kinks_within_fixed_steps_are_landed_on_and_those_at_their_ends_change_nothing() {
         let kinks = [0.1, 0.2 + 1e-9, 0.25, 0.25 + 1e-9, 0.4].map(|time| breakpoint(time, false));
         let landings = landings(kinks.to_vec(), true, vec![0.4 + 1e-9]);
-        let next = |time: f64| landings.next(time);
-        assert_eq!(next(0.0), Landing { time: 0.2 + 1e-9, name: Some("a traction") }, "a step to 0.1 first");
-        assert_eq!(next(0.1), Landing { time: 0.25, name: Some("a traction") }, "0.2 s is the end anyway");
-        assert_eq!(next(0.25), Landing { time: 0.4 + 1e-9, name: Some("[time] land_on") });
-        assert_eq!(next(0.4 + 1e-9), Landing { time: 1.0, name: None });
+        let next = |time: f64| landings.next([time, 0.0]);
+        let to = |time, name| Landing { time, name, starts_anew: false };
+        assert_eq!(next(0.0), to(0.2 + 1e-9, Some("a traction")), "a step to 0.1 first");
+        assert_eq!(next(0.1), to(0.25, Some("a traction")), "0.2 s is the end anyway");
+        assert_eq!(next(0.25), to(0.4 + 1e-9, Some("[time] land_on")));
+        assert_eq!(next(0.4 + 1e-9), to(1.0, None));
         assert_eq!(landings.steps_after(0.0, 0.1), 3 + 2 + 6);
     }
 
@@ -221,10 +248,11 @@ mod tests {
         let before = 0.1f64.next_down();
         for (is_fixed, times) in [(true, vec![]), (false, vec![]), (true, vec![0.1])] {
             let landings = landings(vec![breakpoint(before, true), breakpoint(0.103, true)], is_fixed, times);
-            assert_eq!(landings.next(0.0).time, before);
-            assert_eq!(landings.next(before).time, 0.103, "not 0.1 in a step of rounding errors");
-            assert_eq!(landings.next(0.103).time, 1.0);
-            assert!(landings.has_jump(before) && landings.has_jump(0.1) && !landings.has_jump(0.2));
+            let next = |time: f64| landings.next([time, 0.0]).time;
+            assert_eq!(next(0.0), before);
+            assert_eq!(next(before), 0.103, "not 0.1 in a step of rounding errors");
+            assert_eq!(next(0.103), 1.0);
+            assert_eq!([before, 0.1, 0.2].map(|time| landings.breaks_at(time, true)), [true, true, false]);
         }
     }
 
@@ -232,8 +260,30 @@ mod tests {
     fn adaptive_steps_to_kinks_are_not_shorter_than_the_shortest() {
         let kinks = [0.3, 0.35, 0.41].map(|time| breakpoint(time, false));
         let landings = landings(kinks.to_vec(), false, Vec::new());
-        assert_eq!(landings.next(0.0).time, 0.3);
-        assert_eq!(landings.next(0.3).time, 0.41);
+        assert_eq!(landings.next([0.0; 2]).time, 0.3);
+        assert_eq!(landings.next([0.3, 0.3]).time, 0.41);
+    }
+
+    #[test]
+    fn steps_forget_what_lies_before_jumps_and_kinks() {
+        let breakpoints = vec![breakpoint(0.3f64.next_down(), true), breakpoint(0.6, false)];
+        let anew = |forgets| {
+            let landings = Landings { forgets, ..landings(breakpoints.clone(), true, Vec::new()) };
+            let mut begun = Vec::new();
+            let [mut time, mut last] = [0.0; 2];
+            while time < landings.end {
+                let step = landings.fixed_step([time, last], landings.next([time, last]));
+                if step.previous_length == 0.0 {
+                    begun.push((10.0 * time).round() as i32);
+                }
+                [time, last] = [step.time, step.length];
+            }
+            begun
+        };
+        assert_eq!(anew(Forgets::Nothing), [0]);
+        assert_eq!(anew(Forgets::Jumps), [0, 3]);
+        assert_eq!(anew(Forgets::StepsOverJumps), [0, 1, 3, 4], "the first step, and that over the jump");
+        assert_eq!(anew(Forgets::Kinks), [0, 1, 3, 4, 6]);
     }
 
     #[test]
@@ -251,13 +301,13 @@ mod tests {
         let times = |landings: &Landings| {
             let mut times = vec![0.0];
             while times[times.len() - 1] < landings.end {
-                times.push(landings.next(times[times.len() - 1]).time);
+                times.push(landings.next([times[times.len() - 1], 0.0]).time);
             }
             times
         };
         assert_eq!(times(&landings), [0.0, 0.25, 0.7, 1.0]);
-        assert_eq!(landings.next(0.0).name, Some("[time] land_on"));
-        assert_eq!(landings.next(0.7).name, None);
+        assert_eq!(landings.next([0.0; 2]).name, Some("[time] land_on"));
+        assert_eq!(landings.next([0.7, 0.45]).name, None);
         // 0.1, 0.2, 0.25; 0.35 to 0.65, 0.7; 0.8 to 1.
         assert_eq!(landings.steps_after(0.0, 0.1), 3 + 5 + 3);
         assert_eq!(landings.steps_after(0.7, 0.1), 3);
@@ -265,15 +315,19 @@ mod tests {
         assert_eq!(times(&with_output), [0.0, 0.25, 0.5, 0.7, 1.0]);
         let with_listed = Landings { output_times: vec![0.1, 0.6], ..with_output.clone() };
         assert_eq!(times(&with_listed), [0.0, 0.1, 0.25, 0.5, 0.6, 0.7, 1.0]);
-        assert_eq!((with_listed.next(0.5).name, with_listed.next(0.6).name), (None, Some("[time] land_on")));
+        assert_eq!(
+            (with_listed.next([0.5, 0.1]).name, with_listed.next([0.6, 0.1]).name),
+            (None, Some("[time] land_on"))
+        );
         // One, then 0.2, 0.25; 0.35, 0.45, 0.55, 0.6; 0.7; 0.8 to 1.
         assert_eq!(with_listed.steps_after(0.0, 0.1), 1 + 2 + 4 + 1 + 3);
-        let named =
-            |times, interval| Landings { interval, ..self::landings(Vec::new(), true, times) }.next(0.4).name;
+        let named = |times, interval| {
+            Landings { interval, ..self::landings(Vec::new(), true, times) }.next([0.4, 0.1]).name
+        };
         assert_eq!(named(vec![0.5], Some(0.5)), Some("[time] land_on"), "also where an interval ends");
         assert_eq!(named(vec![1.0], None), Some("[time] land_on"), "also at the end of the run");
         let none = self::landings(Vec::new(), true, Vec::new());
-        assert_eq!((none.next(0.3).time, none.steps_after(0.0, 0.3)), (1.0, 4));
+        assert_eq!((none.next([0.3, 0.3]).time, none.steps_after(0.0, 0.3)), (1.0, 4));
     }
 
     #[test]

@@ -61,6 +61,7 @@ impl StepRange {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::stepping::step_length::Forgets;
 
     fn fixed(scheme: Scheme, times: Vec<f64>, end: f64) -> StepRange {
         let landings = Landings {
@@ -70,7 +71,7 @@ mod tests {
             breakpoints: Vec::new(),
             length: 0.1,
             is_fixed: true,
-            starts_anew: scheme.states() > 1,
+            forgets: if scheme.states() > 1 { Forgets::Jumps } else { Forgets::Nothing },
             end,
         };
         StepRange::fixed(scheme, &landings)

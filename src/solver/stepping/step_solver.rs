@@ -377,7 +377,7 @@ impl StepSolver {
         problem: &mut StepProblem<'_, D, S>,
         start: &DistributedVector,
     ) -> Result<Accuracy> {
-        let mut norm = problem.forces.norm()?;
+        let mut norm = problem.norm;
         if !norm.is_finite() {
             let remedy = "check loads and initial values; use smaller steps";
             return Err(problem.failed("the forces are not finite", remedy));

@@ -21,7 +21,9 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
-        effect::{CONTACT, Contact, Energy, Freedom, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK},
+        effect::{
+            CONTACT, Contact, Energy, Form, Freedom, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK,
+        },
         resultants::BalancedMotion,
         state::State,
     },
@@ -36,6 +38,8 @@ use std::time::Instant;
 
 /// The slip between bodies, as a share of the size of a facet, after which what they face is found anew.
 const SLIP_BETWEEN_PAIRINGS: f64 = 0.25;
+/// Residuals of the start of a step beyond this multiple of its forces are those of supports that have moved ahead of the body.
+const FAR: f64 = 1e3;
 
 /// The choices of a job that determine a [`Stepper`].
 #[derive(Debug, Clone, Copy)]
@@ -317,11 +321,21 @@ impl Stepper {
             coupling.reduce_forces(&body.held, &mut self.right_hand_side)?;
             converged = unknowns;
         }
+        let mut norm = self.right_hand_side.norm()?;
         if let Some(supports) = &mut self.moving_supports {
-            let residual = &mut supports.held;
-            self.solver.multiply(&self.trial, residual)?;
-            residual.add_scaled(-1.0, &self.right_hand_side)?;
-            scale = scale.max(residual.norm()?);
+            let open = supports.write_residual(&self.solver, (&self.trial, &self.right_hand_side))?;
+            if open > FAR * scale && !body.has_form(Form::Mass) {
+                let length = self.integrator.matrix_length(step);
+                let following = supports.follow(
+                    &mut self.solver,
+                    body,
+                    (&mut self.trial, &self.right_hand_side),
+                    length,
+                )?;
+                (norm, scale) = (supports.known.norm()?.max(following), scale.max(following));
+            } else {
+                scale = scale.max(open);
+            }
         }
         let mut problem = StepProblem {
             session,
@@ -330,6 +344,7 @@ impl Stepper {
             converged,
             step,
             forces: &self.right_hand_side,
+            norm,
             scale,
             rounding: self.integrator.rounding(session),
             flow_start: self.integrator.flow_start(),

@@ -5,13 +5,17 @@
 //! is the whole velocity `v`, which is `g` at held components. The reactions are `K v + F - b`, with the forces `F` of flow, and
 //! their work in a step of length `k` is `k g . (K v + F - b) = k (v . K g + g . (F - b))`.
 
-use super::flow::FlowStart;
+use super::{flow::FlowStart, step_solver::StepSolver};
 use crate::{
     error::Result,
     fem::{body::Body, effect::Step, state::State},
     linear_algebra::petsc::DistributedVector,
     parallel::session::Session,
 };
+
+/// Corrections of velocities that follow supports, and the share of the residual that one must leave less than to be followed by another.
+const MOST_CORRECTIONS: usize = 5;
+const LEAST_REDUCTION: f64 = 0.1;
 
 /// Work vectors.
 pub(super) struct MovingSupports {
@@ -89,6 +93,58 @@ impl MovingSupports {
     ) -> Result<()> {
         body.held.clear(&mut velocity.owned_mut()?);
         velocity.add_scaled(1.0, &self.velocity)
+    }
+
+    /// Writes the residual of these velocities under these forces, without contact, and returns its norm in N. Collective.
+    pub(super) fn write_residual(
+        &mut self,
+        solver: &StepSolver,
+        (velocity, forces): (&DistributedVector, &DistributedVector),
+    ) -> Result<f64> {
+        solver.multiply(velocity, &mut self.held)?;
+        self.held.add_scaled(-1.0, forces)?;
+        self.held.norm()
+    }
+
+    /// Lets a velocity whose residual was written follow the supports, as far as contact alone does not hold the body. Returns the norm in N
+    /// of the forces in the body, those of supports among them: they are not those with which supports that move ahead would press it.
+    /// Collective.
+    pub(super) fn follow<const D: usize, const S: usize>(
+        &mut self,
+        solver: &mut StepSolver,
+        body: &Body<D, S>,
+        (velocity, forces): (&mut DistributedVector, &DistributedVector),
+        length: f64,
+    ) -> Result<f64> {
+        let mut change = velocity.like()?;
+        let mut open = self.held.norm()?;
+        for _ in 0..MOST_CORRECTIONS {
+            solver.precondition(&self.held, &mut change)?;
+            velocity.add_scaled(-1.0, &change)?;
+            let left = self.write_residual(solver, (velocity, forces))?;
+            if left.is_nan() || left > open {
+                velocity.add_scaled(1.0, &change)?;
+                break;
+            }
+            let is_slow = left > LEAST_REDUCTION * open;
+            open = left;
+            if is_slow {
+                break;
+            }
+        }
+        change.copy_from(velocity)?;
+        match &body.coupling {
+            Some(coupling) => coupling.make_absolute(&body.held, &mut change)?,
+            None => change.update_ghosts()?,
+        }
+        let sum = &mut self.held;
+        {
+            let (velocity, mut sum) = (change.local()?, sum.local_mut()?);
+            sum.fill(0.0);
+            body.add_matrix_product(length, &velocity, &mut self.values, &mut sum);
+        }
+        sum.add_ghosts_to_owners()?;
+        Ok(sum.norm()?.max(open))
     }
 
     /// The work in J of the supports in a step that was solved, with this velocity with ghosts, and not yet committed. Collective.

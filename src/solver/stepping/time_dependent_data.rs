@@ -98,7 +98,7 @@ impl<const D: usize> TimeDependentData<D> {
         // All ranks use the same samples: their results differ by rounding at most.
         let [first, number] = session.largest(mine);
         let name = self.expressions.get(number as usize).map(|expression| expression.name);
-        first.is_finite().then_some(Landing { time: -first, name })
+        first.is_finite().then_some(Landing { time: -first, name, starts_anew: false })
     }
 
     /// The largest deviation within a step from the linear function between its ends, relative to the largest value. Collective.

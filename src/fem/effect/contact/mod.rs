@@ -49,7 +49,7 @@ use crate::{
     fem::{
         effect::Blend,
         pairs::PairedNode,
-        space::{Held, longest_side, surface_points},
+        space::{Held, facet_sizes, longest_side, surface_points},
     },
     laws::contact::{Gap, NormalResponse, Rate, Wear},
     linear_algebra::tensor::Vector,
@@ -174,6 +174,12 @@ impl<const D: usize> Contact<D> {
                 }
             }
             point.place = place;
+        }
+        if is_paired {
+            let sizes = facet_sizes(session, mesh, facets)?;
+            for point in &mut points {
+                point.facet_size = sizes.get(&point.node()).copied().unwrap_or(f64::INFINITY);
+            }
         }
         let scale = 2.0 * law.monotonicity_constant(1.0) + 1.0;
         let needs_ghosts = quadrature == Quadrature::Gauss;

@@ -82,6 +82,8 @@ pub(super) struct Point<const D: usize> {
     pub place: Vector<D>,
     /// The distance in m to the body that it faces along the normal, of the undeformed bodies; 0 if it faces none.
     pub distance: f64,
+    /// Mean size in m of the facets around it, where it faces another body.
+    pub facet_size: f64,
     /// Displacement in m relative to the body that it faces when it began to face it.
     pub faced_at: Vector<D>,
     /// The gap in m at the end of the step of the undeformed surface without wear.
@@ -133,6 +135,7 @@ impl<const D: usize> Point<D> {
             unknown: Unknown::Velocity,
             place: [0.0; D],
             distance: 0.0,
+            facet_size: f64::INFINITY,
             faced_at: [0.0; D],
             reach: 0.0,
             moved: 0.0,

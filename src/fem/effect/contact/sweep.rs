@@ -25,7 +25,7 @@ pub const OVERRUN: f64 = 1e-6;
 fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
     let moved: Vector<D> = std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i]);
     let along = norm(&add_scaled(&moved, -dot(&moved, &point.normal), &point.normal));
-    along / if D == 2 { point.weight } else { point.weight.sqrt() }
+    along / point.facet_size
 }
 
 impl<const D: usize> Contact<D> {
