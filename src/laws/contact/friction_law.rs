@@ -42,13 +42,22 @@ pub struct SlidingContext {
     pub time: f64,
     /// Undeformed place of the point in m; 0 where the body has no axis.
     pub place: [f64; 3],
+    /// Whether the point faces nothing on which it could rub.
+    pub is_bare: bool,
 }
 
 impl SlidingContext {
     /// A step without length from a history of 0, at time 0 and the origin.
     #[cfg(test)]
-    pub(super) const FIRST: Self =
-        Self { history: 0.0, step_length: 0.0, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] };
+    pub(super) const FIRST: Self = Self {
+        history: 0.0,
+        step_length: 0.0,
+        is_blended: false,
+        held: 0.0,
+        time: 0.0,
+        place: [0.0; 3],
+        is_bare: false,
+    };
 
     /// The same beside a held part of the sliding velocity with this speed in m/s.
     pub fn beside(self, held: f64) -> Self {

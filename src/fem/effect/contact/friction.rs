@@ -152,6 +152,11 @@ impl<const D: usize> Friction<D> {
         }
     }
 
+    /// Marks the points that face nothing in the step.
+    pub(super) fn mark_bare_points(&mut self, points: &[Point<D>]) {
+        self.points.iter_mut().for_each(|point| point.context.is_bare = !points[point.at].can_touch());
+    }
+
     /// Advances the histories by a step from this blend of earlier ones, at these velocities at its end, with ghosts.
     pub(super) fn advance_histories(&mut self, velocity: &[f64], blend: Blend) {
         if self.law.history().is_none() {
@@ -398,7 +403,8 @@ impl<const D: usize> Friction<D> {
     fn status(&self, point: &TangentialPoint<D>, sliding: &Vector<D>) -> FrictionStatus {
         // A node that is held over an obstacle at rest has no friction of its own.
         let is_idle = !point.is_free() && norm(sliding) == 0.0;
-        if is_idle || (self.law.follows_pressure() && point.pressure <= 0.0) {
+        let is_apart = point.context.is_bare || (self.law.follows_pressure() && point.pressure <= 0.0);
+        if is_idle || is_apart {
             return FrictionStatus::Separated;
         }
         let parameter = add_scaled(&point.whole_traction(), self.scale, sliding);

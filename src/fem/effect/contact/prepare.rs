@@ -56,6 +56,9 @@ impl<const D: usize> Contact<D> {
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
+        if let Some(friction) = &mut self.friction {
+            friction.mark_bare_points(&self.points);
+        }
         if self.law.damping() > 0.0 {
             self.set_depths_before(time_before - step.previous_length)?;
         }

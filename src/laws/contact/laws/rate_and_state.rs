@@ -296,7 +296,7 @@ mod tests {
     }
 
     fn after(history: f64, step_length: f64) -> SlidingContext {
-        SlidingContext { history, step_length, is_blended: false, held: 0.0, time: 0.0, place: [0.0; 3] }
+        SlidingContext { history, step_length, ..SlidingContext::FIRST }
     }
 
     #[test]

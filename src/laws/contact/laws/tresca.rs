@@ -18,8 +18,8 @@ impl FrictionBound for Tresca {
         0.0
     }
 
-    fn bound(&self, _speed: f64, _pressure: f64, _: SlidingContext) -> f64 {
-        self.bound
+    fn bound(&self, _speed: f64, _pressure: f64, at: SlidingContext) -> f64 {
+        if at.is_bare { 0.0 } else { self.bound }
     }
 
     fn follows_pressure(&self) -> bool {
@@ -37,5 +37,8 @@ mod tests {
         assert_eq!(FrictionBound::bound(&law, 7.0, -1.0, SlidingContext::FIRST), 3.0);
         let slides = law.resolve(7.0, 2.0, -1.0, SlidingContext::FIRST);
         assert_eq!((slides.speed, slides.traction, slides.coefficient), (2.0, 3.0, 0.0));
+        let bare = SlidingContext { is_bare: true, ..SlidingContext::FIRST };
+        let free = law.resolve(7.0, 2.0, -1.0, bare);
+        assert_eq!((free.speed, free.traction), (3.5, 0.0), "there is nothing to rub on");
     }
 }
