@@ -40,6 +40,19 @@ impl<const D: usize> PairedNode<D> {
     }
 }
 
+/// Why the side `against` of the job carries the law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exchange {
+    /// The job states it.
+    Requested,
+    /// So it was in the run from whose state this one starts.
+    Continued,
+    /// Supports hold nodes on the side `on`.
+    Held,
+    /// The mesh of the side `on` is coarser.
+    Coarser,
+}
+
 /// A contact between bodies, with the facets of this rank on both sides.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair<const D: usize> {
@@ -49,6 +62,8 @@ pub struct Pair<const D: usize> {
     pub on: Vec<u32>,
     /// The other side.
     pub against: Vec<u32>,
+    /// Why the slave side is `against` in the job; none if it is `on`.
+    pub exchange: Option<Exchange>,
     /// Whether what nodes face is found anew as bodies slide. All nodes of the slave side carry the law then; those that face nothing are at
     /// an infinite distance.
     pub slides: bool,
@@ -59,6 +74,13 @@ pub struct Pair<const D: usize> {
 }
 
 impl<const D: usize> Pair<D> {
+    /// The pair with its sides exchanged, before it is formed, for this reason if its slave side becomes `against` in the job.
+    #[must_use]
+    pub fn exchanged(self, why: Exchange) -> Self {
+        let exchange = if self.exchange.is_some() { None } else { Some(why) };
+        Self { on: self.against, against: self.on, exchange, nodes: Vec::new(), ..self }
+    }
+
     /// Lets nodes face those at the same place on the other side, of a mesh that was split; nodes that both sides have carry no law.
     /// Collective.
     pub fn join(&mut self, session: &Session, mesh: &Mesh<D>) -> Result<(), Agreed> {
@@ -115,6 +137,11 @@ impl<const D: usize> Pair<D> {
         self.nodes = all.into_values().map(node_at).collect();
         Ok(())
     }
+}
+
+/// Whether the nodes that carry the law of a contact are those of `against` in the job.
+pub fn is_exchanged<const D: usize>(pairs: &[Pair<D>], contact: usize) -> bool {
+    pairs.iter().any(|pair| pair.contact == contact && pair.exchange.is_some())
 }
 
 /// The nodes that carry the law of a contact, if it is one of these pairs.

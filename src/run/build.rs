@@ -109,8 +109,11 @@ fn contacts<const D: usize>(
 ) -> Result<(Vec<Contact<D>>, Vec<Vec<u32>>)> {
     let (mut contacts, mut parts, mut taken) = (Vec::new(), Vec::new(), BTreeSet::new());
     for (number, contact) in job.contact.iter().enumerate() {
-        let facets = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
+        let mut facets = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         session.agree(take_facets(contact, mesh, &facets, &mut taken))?;
+        if let Some(pair) = pairs.iter().find(|pair| pair.contact == number) {
+            facets.clone_from(&pair.on);
+        }
         if let Some(motion) = motion {
             let points = surface_points(session, mesh, &facets)?;
             session.agree(refuse_moving_contact(contact, mesh, &points, (held, motion)))?;

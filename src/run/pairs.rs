@@ -1,29 +1,31 @@
 //! Contact between bodies: finds what boundaries face, before the body is built, and refuses what cannot be solved.
 
-use super::parts::part_of;
+use super::{
+    parts::part_of,
+    sides::{Circumstances, conflict, rubs},
+};
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        coupling::{Coupling, HELD_TOGETHER, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Pair, shares},
+        coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
+        pairs::{Pair, is_exchanged, shares},
         space::{Held, facets},
     },
-    job::{self, Job, Scalar, Sliding},
-    linear_algebra::tensor::{Vector, dot, norm},
+    job::{self, Job, Scalar, Side, Sliding},
+    linear_algebra::tensor::{Vector, norm},
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Component of a unit direction along a normal above which it counts as along the normal.
-const ALONG: f64 = 0.5;
-
-/// The contacts of a job between bodies; the mesh gets the ghosts that their equations need. Collective.
+/// The contacts of a job between bodies, with the side of each that carries the law; the mesh gets the ghosts that their equations need.
+/// Collective.
 pub(super) fn find<const D: usize>(
     session: &Session,
     job: &Job,
     mesh: &mut Mesh<D>,
+    circumstances: &Circumstances<D>,
 ) -> Result<Vec<Pair<D>>, Agreed> {
     let mut pairs = Vec::new();
     let is_fault = |contact: &job::Contact| {
@@ -34,8 +36,9 @@ pub(super) fn find<const D: usize>(
             let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
             let other: Vec<String> = contact.on.iter().map(|name| other_side(name)).collect();
             let against = facets(mesh, &other);
+            let (exchange, nodes) = (None, Vec::new());
             let mut pair =
-                Pair { contact: number, on, against, slides: false, is_closed: true, nodes: Vec::new() };
+                Pair { contact: number, on, against, exchange, slides: false, is_closed: true, nodes };
             pair.join(session, mesh)?;
             pairs.push(pair);
         }
@@ -54,9 +57,9 @@ pub(super) fn find<const D: usize>(
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         let against = facets(mesh, &contact.against);
         let slides = contact.sliding == Sliding::Finite;
-        let mut pair =
-            Pair { contact: number, on, against, slides, is_closed: contact.closed, nodes: Vec::new() };
-        pair.form(session, mesh, &mesh.nodes)?;
+        let (exchange, is_closed, nodes) = (None, contact.closed, Vec::new());
+        let pair = Pair { contact: number, on, against, exchange, slides, is_closed, nodes };
+        let pair = circumstances.form(session, mesh, job, pair)?;
         let names = [&contact.on, &contact.against].map(|names| names.join(", "));
         let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
         session.agree(if session.total(facing) == 0 && !slides {
@@ -134,48 +137,46 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
     job: &Job,
     body: &Body<D, S>,
 ) -> Result<(), Agreed> {
-    let Body { mesh, contacts, coupling: Some(coupling), held, .. } = body else { return Ok(()) };
-    let masters_of: BTreeMap<usize, &[(u32, f64)]> =
-        coupling.slaves().map(|(slave, masters)| (slave as usize, masters)).collect();
-    // The share of the masters that is held along a direction as well.
-    let held_share = |node: usize, direction: &Vector<D>| -> f64 {
-        let free = |master: u32| norm(&held.free_part(master as usize, direction)).powi(2);
-        let masters = masters_of.get(&node).copied().unwrap_or(&[]);
-        masters.iter().map(|(master, share)| share * (1.0 - free(*master))).sum()
-    };
+    let Body { mesh, contacts, coupling: Some(coupling), held, pairs, .. } = body else { return Ok(()) };
+    let masters_of: BTreeMap<u32, &[(u32, f64)]> = coupling.slaves().collect();
     let mut paired = BTreeMap::new();
-    let mut conflict: Option<(usize, usize, String)> = None;
-    for (number, contact) in contacts.iter().enumerate().filter(|(_, contact)| contact.is_paired()) {
-        let rubs = job.contact[number].friction.is_some() || job.contact[number].adhesion.is_some();
-        for (node, normal) in contact.normal_directions().filter(|(node, _)| masters_of.contains_key(node)) {
-            paired.insert(node, number);
-            let (frame, free) = held.frame(node);
-            for direction in &frame[free..] {
-                let along = dot(direction, &normal).abs();
-                let (word, matters) = match along > ALONG {
-                    true => ("along the normal", true),
-                    false => ("along the boundary, where friction or adhesion act", rubs),
-                };
-                if matters && held_share(node, direction) < HELD_TOGETHER {
-                    let why = format!("a support holds it {word}, and not what it faces");
-                    conflict.get_or_insert((node, number, why));
-                }
+    let mut found: Option<(usize, usize, String)> = None;
+    for pair in pairs {
+        let rubs = rubs(&job.contact[pair.contact]);
+        for node in pair.nodes.iter().filter(|node| !node.masters.is_empty()) {
+            paired.insert(node.node as usize, pair.contact);
+            let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
+                let free = |master: u32| norm(&held.free_part(master as usize, direction));
+                let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);
+                masters.iter().map(|(master, share)| (*share, free(*master))).collect()
+            };
+            if let Some(why) = conflict(node, held, rubs, facing) {
+                found.get_or_insert((node.node as usize, pair.contact, why.into()));
             }
         }
     }
     for (number, contact) in contacts.iter().enumerate() {
         let of_others = contact.nodes().filter_map(|node| Some((node, *paired.get(&node)?)));
         for (node, pair) in of_others.filter(|(_, pair)| *pair != number) {
-            conflict.get_or_insert((node, pair, format!("it also belongs to contact.{number}")));
+            found.get_or_insert((node, pair, format!("it also belongs to contact.{number}")));
         }
     }
-    session.agree(match conflict {
+    session.agree(match found {
         None => Ok(()),
-        Some((node, pair, why)) => Err(Error::Refused(format!(
-            "contact.{pair}: the node at {:?} m of the boundary {} faces another body, and {why}; exchange `on` and `against`, or exclude the \
-             facets around it by `where`",
-            mesh.nodes[node],
-            job.contact[pair].on.join(", ")
-        ))),
+        Some((node, pair, why)) => {
+            let contact = &job.contact[pair];
+            let is_exchanged = is_exchanged(pairs, pair);
+            let remedy = match (contact.side, is_exchanged) {
+                (Side::Auto, _) => "hold both bodies there in the same directions, or none of them",
+                (_, true) => "delete `side`",
+                (_, false) => "delete `side`, or exchange `on` and `against`",
+            };
+            Err(Error::Refused(format!(
+                "contact.{pair}: the node at {:?} m of the boundary {} faces another body, and {why}; {remedy}, or exclude the facets \
+                 around it by `where`",
+                mesh.nodes[node],
+                if is_exchanged { &contact.against } else { &contact.on }.join(", ")
+            )))
+        }
     })
 }

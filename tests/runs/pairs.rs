@@ -2,6 +2,7 @@
 
 use crate::{
     case::Case,
+    launch,
     results::{Results, relative_difference},
 };
 use std::path::Path;
@@ -478,6 +479,117 @@ fn a_stage_keeps_what_nodes_face_in_bodies_that_slide() {
     }
 }
 
+/// The log of a run, with each entry on one line.
+fn log_of(case: &Case) -> String {
+    launch::unwrapped(&case.results().text("run.log"))
+}
+
+/// Two blocks that are sheared, of which the lower one is held at the ends of its upper side, with a contact that has this table.
+fn worn(table: &str) -> Case {
+    sheared(&format!("{table}, wear = {{ coefficient = 1e-3 }}"))
+        .set("support", "[{ on = ['lower.bottom', 'lower.left', 'lower.right'], fix = 'all' }]")
+        .set("traction", "[{ on = ['upper.top'], value = ['2*sin(20*t)', '-3 - x'] }]")
+        .set("output.profile", "[{ on = 'upper.bottom' }, { on = 'lower.top' }]")
+        .set("solver.tolerance", "1e-12")
+}
+
+/// The largest difference of what a contact between these blocks does in two runs, as a share.
+fn difference_of_sides(one: &Results, other: &Results) -> f64 {
+    let mut most = 0.0f64;
+    // The table of a contact and the side that it names differ, what acts on a body does not.
+    let forces = |results: &Results, body: &str| -> Vec<f64> {
+        let table = results.table("resultants.csv");
+        let sources = table.words("source");
+        let source = sources.iter().find(|source| !source.starts_with("support") && source.ends_with(body));
+        let rows = table.only("source", source.expect("it acts"));
+        [rows.numbers("force_x"), rows.numbers("force_y")].concat()
+    };
+    for body in ["upper.bottom", "lower.top"] {
+        most = most.max(relative_difference(&forces(one, body), &forces(other, body)));
+    }
+    for column in ["contact_pressure", "friction_traction_x", "gap", "sliding_velocity_x"] {
+        let [a, b] = [one, other].map(|results| results.table("profiles.csv").numbers(column));
+        most = most.max(relative_difference(&a, &b));
+    }
+    for column in ["contact_dissipation", "elastic_energy"] {
+        let [a, b] = [one, other].map(|results| results.table("history.csv").numbers(column));
+        most = most.max(relative_difference(&a, &b));
+    }
+    most
+}
+
+#[test]
+fn the_side_that_carries_the_law_is_chosen_where_supports_hold_the_other_one() {
+    let of_upper = "on = ['upper.bottom'], against = ['lower.top']";
+    let of_lower = "on = ['lower.top'], against = ['upper.bottom']";
+    for order in ["1", "2"] {
+        let case = |table: &str| worn(table).set("mesh.order", order);
+        let reference = case(of_upper).run_and_keep(1);
+        assert!(!log_of(&reference).contains("carry the law"));
+        for (side, why) in
+            [("auto", "because supports hold nodes of lower.top"), ("against", "as `side` states")]
+        {
+            for ranks in [1, 2, 3] {
+                let other = case(&format!("{of_lower}, side = '{side}'")).run_and_keep(ranks);
+                let log = log_of(&other);
+                assert!(log.contains(&format!("nodes of upper.bottom carry the law, {why}")), "{log}");
+                let difference = difference_of_sides(&reference.results(), &other.results());
+                let limit = if ranks == 1 { 1e-10 } else { 1e-7 };
+                assert!(difference < limit, "order {order}, {side}, {ranks} ranks: {difference:e}");
+            }
+        }
+        let refused = case(&format!("{of_lower}, side = 'on'"));
+        refused
+            .run_with(1, &[])
+            .expect(2)
+            .says("a support holds it along the boundary, where friction or adhesion act, and not what it faces; delete `side`");
+        let whole = case(of_lower).run_and_keep(1);
+        let part = case(of_lower).set("checkpoint.every", "10").set("time.end", "0.2").run_and_keep(1);
+        part.run_with(1, &["--restart", "--set", "time.end=0.5"]).expect(0);
+        assert_eq!(part.results().text("history.csv"), whole.results().text("history.csv"), "order {order}");
+    }
+}
+
+#[test]
+fn the_side_with_the_finer_mesh_carries_the_law_unless_the_job_states_it() {
+    let of = |side: &str, cells: usize| {
+        let blocks = format!(
+            "[{{ name = 'lower', size = [1, 0.5], cells = [{cells}, 2] }}, \
+              {{ name = 'upper', corner = [0, 0.5], size = [1, 0.5], cells = [9, 2] }}]"
+        );
+        worn(&format!("on = ['lower.top'], against = ['upper.bottom']{side}"))
+            .set("support", "[{ on = ['lower.bottom'], fix = 'all' }]")
+            .set("mesh.rectangle", &blocks)
+            .run_and_keep(2)
+    };
+    let finer = "nodes of upper.bottom carry the law, because the mesh of lower.top is coarser";
+    let auto = of("", 3);
+    assert!(log_of(&auto).contains(finer));
+    assert!(difference_of_sides(&auto.results(), &of(", side = 'against'", 3).results()) < 1e-7);
+    for (side, cells) in [(", side = 'on'", 3), ("", 6)] {
+        assert!(!log_of(&of(side, cells)).contains("carry the law"), "{cells}{side}");
+    }
+}
+
+#[test]
+fn a_stage_keeps_the_side_that_carries_the_law() {
+    let from = |case: &Case| format!("'{}'", case.folder().join("out").display());
+    let table = "on = ['lower.top'], against = ['upper.bottom']";
+    let first = worn(table).set("checkpoint.every", "100").run_and_keep(2);
+    let second = |table: &str| {
+        let case = worn(table).set("support", "[{ on = ['lower.bottom'], fix = 'all' }]");
+        case.set("initial.from", &from(&first)).set("time.end", "0.04")
+    };
+    let kept = second(table).run_and_keep(3);
+    let log = log_of(&kept);
+    assert!(
+        log.contains("nodes of upper.bottom carry the law, as in the run from which this one starts"),
+        "{log}"
+    );
+    let outcome = second(&format!("{table}, side = 'on'")).run_with(1, &[]).expect(0);
+    outcome.says("contact.0: the other side carried the law in the run from which this one starts");
+}
+
 #[test]
 fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
     let swapped = |on: &str, against: &str| {
@@ -507,11 +619,22 @@ fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
             "only contact `against` another body",
         ),
         (
-            Case::of("pressed_blocks").set(
+            Case::of("pressed_blocks").set("contact.0.side", "'on'").set(
                 "support",
                 "[{ on = ['lower.bottom'], fix = 'all' }, { on = ['upper.left'], fix = 'all' }]",
             ),
-            "a support holds it along the normal, and not what it faces; exchange `on` and `against`",
+            "a support holds it along the normal, and not what it faces; delete `side`, or exchange `on` and `against`",
+        ),
+        (
+            Case::of("pressed_blocks").set(
+                "support",
+                "[{ on = ['lower.bottom', 'lower.right'], fix = 'all' }, { on = ['upper.left'], fix = 'all' }]",
+            ),
+            "a support holds it along the normal, and not what it faces; hold both bodies there in the same directions",
+        ),
+        (
+            Case::of("indented_block").set("contact.0.side", "'against'"),
+            "only contact `against` another body has two sides",
         ),
     ] {
         case.run_with(2, &[]).expect(2).says(words);
