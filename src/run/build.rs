@@ -335,14 +335,6 @@ fn refuse_moving_contact<const D: usize>(
                 "contact at {place:?} m: a support moves this point in a direction that is not tangential to the boundary; {remedy}"
             )));
         }
-        let (frame, count) = held.frame(node);
-        let slides = frame[count..].iter().any(|direction| motion.moves(node, direction));
-        if contact.friction.is_some() && slides && count > usize::from(free) {
-            return Err(Error::Refused(format!(
-                "friction at {place:?} m: a support moves one tangential component there and leaves another free, and friction \
-                 depends on both; hold all components there, or exclude the facets around by the `where` of the contact"
-            )));
-        }
     }
     Ok(())
 }

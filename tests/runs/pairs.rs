@@ -479,6 +479,45 @@ fn a_stage_keeps_what_nodes_face_in_bodies_that_slide() {
     }
 }
 
+/// A block that a support moves along y, on a plane or on another block, slides as fast along x as its load overcomes friction: with the
+/// share r of the load in the bound, v_x / v_y = r / sqrt(1 - r^2).
+#[test]
+fn friction_has_the_direction_of_sliding_where_a_support_moves_one_tangent() {
+    let upper = "name = 'upper', corner = [0, 0, 0.5], size = [1, 1, 0.5], cells = [2, 1, 1]";
+    let lower = "name = 'lower', size = [1, 1, 0.5], cells = [3, 1, 1]";
+    let moved = "{ on = ['upper.front', 'upper.back'], fix = ['y'], displacement = ['0.1*t'] }";
+    let held = "{ on = ['lower.front', 'lower.back'], fix = ['y'] }, { on = ['lower.bottom'], fix = 'all' }";
+    let friction = "normal = { unilateral = {} }, friction = { coulomb = { coefficient = 0.4 } }";
+    for (blocks, supports, sides) in [
+        (format!("[{{ {upper} }}]"), format!("[{moved}]"), "on = ['upper.bottom']"),
+        (
+            format!("[{{ {lower} }}, {{ {upper} }}]"),
+            format!("[{moved}, {held}]"),
+            "on = ['upper.bottom'], against = ['lower.top']",
+        ),
+    ] {
+        let run = cubes()
+            .without("region")
+            .without("output.profile")
+            .set("material.elasticity", "{ youngs_modulus = 1e4, poisson_ratio = 0.0 }")
+            .set("mesh.box", &blocks)
+            .set("support", &supports)
+            // r = 0.24 * 5 / (0.4 * 5)
+            .set("traction.0.value", "[1.2, 0, -5]")
+            .set("contact", &format!("[{{ {sides}, {friction} }}]"))
+            .set("output.probe", "[{ name = 'top', point = [0.5, 0.5, 1] }]")
+            .run_and_keep(1);
+        let results = run.results();
+        let last = |column: &str| *results.table("probes.csv").numbers(column).last().expect("a row");
+        let [along, across] = ["velocity_x", "velocity_y"].map(last);
+        assert!(
+            (along - 0.075).abs() < 1e-6 && (across - 0.1).abs() < 1e-6,
+            "{sides}: {along}, {across} m/s"
+        );
+        assert!(results.number("max_energy_imbalance") < 1e-9, "{sides}");
+    }
+}
+
 /// The log of a run, with each entry on one line.
 fn log_of(case: &Case) -> String {
     launch::unwrapped(&case.results().text("run.log"))
