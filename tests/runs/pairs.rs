@@ -629,6 +629,99 @@ fn a_stage_keeps_the_side_that_carries_the_law() {
     outcome.says("contact.0: the other side carried the law in the run from which this one starts");
 }
 
+/// A block on another one, of 4 x 2 and 3 x 2 cells divided into triangles, with a common left end; the left side of the lower one is at this
+/// angle in degrees to that of the upper one.
+fn write_blocks_with_an_oblique_side(path: &Path, degrees: f64) {
+    let (mut nodes, mut facets, mut cells) = (Vec::new(), Vec::new(), Vec::new());
+    for (block, columns) in [(0, 3), (1, 4)] {
+        let first = nodes.len() + 1;
+        for j in 0..=2 {
+            let y = 0.5 * block as f64 + 0.25 * j as f64;
+            let left = if block == 0 { -(0.5 - y) * degrees.to_radians().tan() } else { 0.0 };
+            nodes.extend((0..=columns).map(|i| [left + (1.0 - left) * i as f64 / columns as f64, y]));
+        }
+        let at = |i: usize, j: usize| first + j * (columns + 1) + i;
+        for i in 0..columns {
+            facets.push((3 * block + 1, [at(i, 0), at(i + 1, 0)]));
+            facets.push((3 * block + 2, [at(i + 1, 2), at(i, 2)]));
+            for j in 0..2 {
+                cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        facets.extend((0..2).map(|j| (3 * block + 3, [at(0, j + 1), at(0, j)])));
+    }
+    facets.sort_unstable();
+    let names = ["lower.bottom", "lower.top", "lower.left", "upper.bottom", "upper.top", "upper.left"];
+    let mut text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n7\n".to_owned();
+    names.iter().enumerate().for_each(|(at, name)| text += &format!("1 {} \"{name}\"\n", at + 1));
+    text += "2 7 \"body\"\n$EndPhysicalNames\n$Entities\n0 6 1 0\n";
+    (1..=6).for_each(|curve| text += &format!("{curve} -1 0 0 1 1 0 1 {curve} 0\n"));
+    text += "1 -1 0 0 1 1 0 1 7 0\n$EndEntities\n$Nodes\n";
+    let count = nodes.len();
+    text += &format!("1 {count} 1 {count}\n2 1 0 {count}\n");
+    (1..=count).for_each(|tag| text += &format!("{tag}\n"));
+    nodes.iter().for_each(|[x, y]| text += &format!("{x} {y} 0\n"));
+    let total = facets.len() + cells.len();
+    text += &format!("$EndNodes\n$Elements\n7 {total} 1 {total}\n");
+    let mut tag = 0;
+    for of_curve in facets.chunk_by(|a, b| a.0 == b.0) {
+        text += &format!("1 {} 1 {}\n", of_curve[0].0, of_curve.len());
+        for (_, [a, b]) in of_curve {
+            tag += 1;
+            text += &format!("{tag} {a} {b}\n");
+        }
+    }
+    text += &format!("2 1 2 {}\n", cells.len());
+    for [a, b, c] in cells {
+        tag += 1;
+        text += &format!("{tag} {a} {b} {c}\n");
+    }
+    std::fs::write(path, text + "$EndElements\n").expect("written");
+}
+
+/// What is known of a velocity is relative to a known one along the same direction, whatever the angle between what supports hold.
+#[test]
+fn nodes_that_supports_hold_in_directions_that_differ_carry_no_law_that_needs_both() {
+    let differ = "supports hold it and what it faces along directions that differ";
+    for degrees in [0.0, 1.0, 5.0, 20.0] {
+        for friction in ["", ", friction = { coulomb = { coefficient = 0.3 } }"] {
+            for side in ["auto", "on", "against"] {
+                let sides = format!("on = ['lower.top'], against = ['upper.bottom'], side = '{side}'");
+                let case = Case::of("pressed_blocks")
+                    .without("region")
+                    .without("output.profile")
+                    .without("output.probe")
+                    .without("mesh.rectangle")
+                    .set("mesh.file", "'blocks.msh'")
+                    .set(
+                        "support",
+                        "[{ on = ['lower.bottom'], fix = ['y'] }, { on = ['lower.left', 'upper.left'], fix = 'normal' }]",
+                    )
+                    .set("contact", &format!("[{{ {sides}, normal = {{ unilateral = {{}} }}{friction} }}]"));
+                write_blocks_with_an_oblique_side(&case.folder().join("blocks.msh"), degrees);
+                let what = format!("{degrees} degrees, {side}{friction}");
+                // Without friction, the side matters that is held along the boundary: that of the upper block.
+                if degrees != 0.0 && (!friction.is_empty() || side == "on") {
+                    case.run_with(1, &[]).expect(2).says(differ);
+                    continue;
+                }
+                let results = case.run(1);
+                let table = results.table("resultants.csv").only("source", "contact lower.top");
+                let force = *table.numbers("force_y").last().expect("a row");
+                assert!((force + 5.0).abs() < 1e-9, "{what}: {force} N");
+                let force = *table.numbers("force_x").last().expect("a row");
+                assert!(
+                    force.abs() < if degrees == 0.0 { 1.5 } else { 1e-9 },
+                    "{what}: {force} N along the boundary"
+                );
+                let upper = if degrees != 0.0 { "nodes of upper.bottom carry the law" } else { "" };
+                assert!(log_of(&case).contains(upper), "{what}");
+            }
+        }
+    }
+}
+
 #[test]
 fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
     let swapped = |on: &str, against: &str| {
