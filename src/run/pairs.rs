@@ -9,7 +9,7 @@ use crate::{
     fem::{
         body::Body,
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Pair, is_exchanged, shares},
+        pairs::{Pair, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
     job::{self, Job, Scalar, Side, Sliding},
@@ -36,9 +36,7 @@ pub(super) fn find<const D: usize>(
             let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
             let other: Vec<String> = contact.on.iter().map(|name| other_side(name)).collect();
             let against = facets(mesh, &other);
-            let (exchange, nodes) = (None, Vec::new());
-            let mut pair =
-                Pair { contact: number, on, against, exchange, slides: false, is_closed: true, nodes };
+            let mut pair = Pair { is_closed: true, ..Pair::of(number, [on, against]) };
             pair.join(session, mesh)?;
             pairs.push(pair);
         }
@@ -57,8 +55,7 @@ pub(super) fn find<const D: usize>(
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         let against = facets(mesh, &contact.against);
         let slides = contact.sliding == Sliding::Finite;
-        let (exchange, is_closed, nodes) = (None, contact.closed, Vec::new());
-        let pair = Pair { contact: number, on, against, exchange, slides, is_closed, nodes };
+        let pair = Pair { slides, is_closed: contact.closed, ..Pair::of(number, [on, against]) };
         let pair = circumstances.form(session, mesh, job, pair)?;
         let names = [&contact.on, &contact.against].map(|names| names.join(", "));
         let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
@@ -76,6 +73,7 @@ pub(super) fn find<const D: usize>(
     if pairs.is_empty() {
         return Ok(pairs);
     }
+    leave_shared_nodes(session, job, mesh, &mut pairs)?;
     let shares = shares(mesh, &pairs);
     let global =
         |facet: &u32| mesh.facet_nodes(*facet).map(|node| mesh.global_node(node)).collect::<Vec<_>>();
@@ -96,6 +94,77 @@ pub(super) fn find<const D: usize>(
     Ok(pairs)
 }
 
+/// Lets nodes of pairs whose law would act there, and that belong to other contacts, too, leave their part of the surface to neighbours,
+/// where the law allows it. Collective.
+fn leave_shared_nodes<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &mut [Pair<D>],
+) -> Result<(), Agreed> {
+    let of_facets = |facets: &[u32]| -> Vec<u32> {
+        facets.iter().flat_map(|facet| mesh.facet_nodes(*facet)).map(|node| mesh.global_node(node)).collect()
+    };
+    let all =
+        |nodes: &[u32]| Ok::<BTreeSet<u32>, Agreed>(gather(session.world(), nodes)?.into_iter().collect());
+    let (mut slaves, mut both) = (Vec::new(), Vec::new());
+    for pair in &*pairs {
+        let own: Vec<u32> = pair.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
+        let faced: Vec<u32> = match pair.slides {
+            true => of_facets(&pair.against),
+            false => pair.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master).collect(),
+        };
+        slaves.push(all(&own)?);
+        both.push(all(&[own, faced].concat())?);
+    }
+    let mut of_obstacles = Vec::new();
+    for (number, contact) in job.contact.iter().enumerate() {
+        if pair_of(pairs, number).is_none() {
+            let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
+            of_obstacles.extend(of_facets(&on));
+        }
+    }
+    let of_obstacles = all(&of_obstacles)?;
+    for (at, pair) in pairs.iter_mut().enumerate() {
+        let contact = &job.contact[pair.contact];
+        if contact.against.is_empty() || !contact.is_without_scale() {
+            continue;
+        }
+        let others = || both.iter().enumerate().filter(|(other, _)| *other != at);
+        let is_shared =
+            |node: &u32| of_obstacles.contains(node) || others().any(|(_, nodes)| nodes.contains(node));
+        pair.lawless = slaves[at].iter().copied().filter(is_shared).collect();
+        if pair.lawless.is_empty() {
+            continue;
+        }
+        pair.form(session, mesh, &mesh.nodes)?;
+        session.agree(if session.total(pair.nodes.len()) > 0 {
+            Ok(())
+        } else {
+            Err(Error::Refused(format!(
+                "contact.{}: all nodes of the boundary {} belong to other contacts, too, so that none is left for the law; refine the mesh \
+                 there, or state the other `side`",
+                pair.contact,
+                side_names(job, pair).join(", ")
+            )))
+        })?;
+    }
+    Ok(())
+}
+
+/// The boundaries at whose nodes the law of a pair acts.
+fn side_names<'a, const D: usize>(job: &'a Job, pair: &Pair<D>) -> &'a [String] {
+    let contact = &job.contact[pair.contact];
+    if pair.exchange.is_some() { &contact.against } else { &contact.on }
+}
+
+/// Why a node of two contacts is refused.
+const ALSO: &str = "it also belongs to contact.";
+const OR_EXCLUDE: &str = "or exclude the facets around it by `where`";
+/// What to do about a node of two contacts.
+const SHARED: &str = "use `unilateral` with the friction `coulomb` or `tresca`, without wear, adhesion and memory, which leave such nodes to \
+                      their neighbours, or exclude the facets around it by the `where` of one of the tables";
+
 /// Refuses nodes that carry the law of one pair and are on the other side of another. Collective.
 fn refuse_chains<const D: usize>(
     session: &Session,
@@ -110,8 +179,7 @@ fn refuse_chains<const D: usize>(
     session.agree(match both {
         None => Ok(()),
         Some(&node) => Err(Error::Refused(format!(
-            "contact: the node at {:?} m is on the side `on` of one pair of boundaries and on the side `against` of another; exchange `on` \
-             and `against` in one of the tables, or exclude the facets around it by `where`",
+            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {SHARED}",
             mesh.nodes[mesh.owned_node(node)]
         ))),
     })
@@ -158,24 +226,23 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
     for (number, contact) in contacts.iter().enumerate() {
         let of_others = contact.nodes().filter_map(|node| Some((node, *paired.get(&node)?)));
         for (node, pair) in of_others.filter(|(_, pair)| *pair != number) {
-            found.get_or_insert((node, pair, format!("it also belongs to contact.{number}")));
+            found.get_or_insert((node, pair, format!("{ALSO}{number}")));
         }
     }
     session.agree(match found {
         None => Ok(()),
         Some((node, pair, why)) => {
             let contact = &job.contact[pair];
-            let is_exchanged = is_exchanged(pairs, pair);
-            let remedy = match (contact.side, is_exchanged) {
-                (Side::Auto, _) => "hold both bodies there in the same directions, or none of them",
-                (_, true) => "delete `side`",
-                (_, false) => "delete `side`, or exchange `on` and `against`",
+            let remedy = match (contact.side, is_exchanged(pairs, pair)) {
+                _ if why.starts_with(ALSO) => SHARED.into(),
+                (Side::Auto, _) => format!("hold both bodies there in the same directions, or none of them, {OR_EXCLUDE}"),
+                (_, true) => format!("delete `side`, {OR_EXCLUDE}"),
+                (_, false) => format!("delete `side`, or exchange `on` and `against`, {OR_EXCLUDE}"),
             };
             Err(Error::Refused(format!(
-                "contact.{pair}: the node at {:?} m of the boundary {} faces another body, and {why}; {remedy}, or exclude the facets \
-                 around it by `where`",
+                "contact.{pair}: the node at {:?} m of the boundary {} faces another body, and {why}; {remedy}",
                 mesh.nodes[node],
-                if is_exchanged { &contact.against } else { &contact.on }.join(", ")
+                pair_of(pairs, pair).map_or(&contact.on[..], |pair| side_names(job, pair)).join(", ")
             )))
         }
     })

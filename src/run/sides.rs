@@ -242,7 +242,8 @@ mod tests {
         let mut held = Held::from(vec![false; 4]);
         held.hold(0, [at(own)].into_iter());
         held.hold(1, [at(other)].into_iter());
-        let node = PairedNode { node: 0, normal, weight: 1.0, distance: 0.0, masters: vec![(1, 1.0)] };
+        let masters = vec![(1, 1.0)];
+        let node = PairedNode { node: 0, normal, weight: 1.0, distance: 0.0, masters, stretch: 1.0 };
         conflict(&node, &held, rubs, |direction| vec![(1.0, norm(&held.free_part(1, direction)))])
     }
 

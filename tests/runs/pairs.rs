@@ -629,6 +629,121 @@ fn a_stage_keeps_the_side_that_carries_the_law() {
     outcome.says("contact.0: the other side carried the law in the run from which this one starts");
 }
 
+/// Three blocks that touch each other and meet at an edge, the lower and the right one on a rigid plane; each contact has the entries `law`.
+fn three_blocks_at_an_edge(dimension: usize, law: &str) -> Case {
+    let contact = |on: &str, against: &str| format!("{{ on = ['{on}'], against = ['{against}'], {law} }}");
+    let floor = |names: &str| format!("{{ on = [{names}], normal = {{ unilateral = {{}} }} }}");
+    let case = Case::of("pressed_blocks").without("region").without("output.profile").set("check", "{}");
+    let case = case.set("output.probe", "[]").set("material.elasticity.poisson_ratio", "0.3");
+    if dimension == 2 {
+        let contacts = [
+            contact("upper.bottom", "lower.top"),
+            contact("upper.right", "right.left"),
+            contact("lower.right", "right.left"),
+            floor("'lower.bottom', 'right.bottom'"),
+        ];
+        return case
+            .set(
+                "mesh.rectangle",
+                "[{ name = 'lower', size = [1, 1], cells = [4, 3] }, \
+                  { name = 'upper', corner = [0, 1], size = [1, 1], cells = [5, 4] }, \
+                  { name = 'right', corner = [1, 0], size = [1, 2], cells = [3, 7] }]",
+            )
+            .set("support", "[{ on = ['lower.left', 'upper.left'], fix = ['x'] }]")
+            .set(
+                "traction",
+                "[{ on = ['upper.top', 'right.top'], value = [0, -5] }, { on = ['right.right'], value = [-3, 0] }]",
+            )
+            .set("output.probe", "[{ name = 'corner', point = [2, 2] }]")
+            .set("contact", &format!("[{}]", contacts.join(", ")));
+    }
+    let contacts = [
+        contact("upper.front", "lower.back"),
+        contact("upper.right", "right.left"),
+        contact("lower.right", "right.left"),
+        floor("'lower.front', 'right.front'"),
+    ];
+    case.without("mesh.rectangle")
+        .without("material.hypothesis")
+        .set(
+            "mesh.box",
+            "[{ name = 'lower', size = [1, 1, 1], cells = [3, 2, 2] }, \
+              { name = 'upper', corner = [0, 1, 0], size = [1, 1, 1], cells = [2, 3, 3] }, \
+              { name = 'right', corner = [1, 0, 0], size = [1, 2, 1], cells = [2, 5, 2] }]",
+        )
+        .set(
+            "support",
+            "[{ on = ['lower.left', 'upper.left'], fix = ['x'] }, \
+              { on = ['lower.bottom', 'upper.bottom', 'right.bottom'], fix = ['z'] }]",
+        )
+        .set(
+            "traction",
+            "[{ on = ['upper.back', 'right.back'], value = [0, -5, 0] }, { on = ['right.right'], value = [-3, 0, 0] }]",
+        )
+        .set("output.probe", "[{ name = 'corner', point = [2, 2, 1] }]")
+        .set("contact", &format!("[{}]", contacts.join(", ")))
+}
+
+/// Nodes of two contacts leave their part of the surface to neighbours, so that a uniform stress passes through.
+#[test]
+fn uniform_stress_passes_through_an_edge_at_which_three_blocks_meet() {
+    let frictionless = "normal = { unilateral = {} }";
+    let rough = "normal = { unilateral = {} }, friction = { coulomb = { coefficient = 0.3 } }";
+    for (dimension, law, order, ranks) in [
+        (2, frictionless, "1", 1),
+        (2, frictionless, "2", 2),
+        (2, rough, "1", 3),
+        (2, rough, "2", 1),
+        (3, frictionless, "1", 1),
+        (3, frictionless, "2", 2),
+        (3, rough, "1", 3),
+    ] {
+        let case = three_blocks_at_an_edge(dimension, law).set("mesh.order", order).run_and_keep(ranks);
+        let results = case.results();
+        let what = format!("{dimension}D, order {order}, {law}");
+        let table = results.table("resultants.csv");
+        let [top, side] = if dimension == 2 { ["bottom", "top"] } else { ["front", "back"] };
+        for (on, against, column, pressure) in [
+            (format!("upper.{top}"), format!("lower.{side}"), "force_y", 5.0),
+            ("upper.right".into(), "right.left".into(), "force_x", -3.0),
+            ("lower.right".into(), "right.left".into(), "force_x", -3.0),
+        ] {
+            let of = |source: String, column: &str| {
+                let table = table.only("source", &source);
+                *table.numbers(column).last().expect("a row")
+            };
+            let force = of(format!("contact {on}"), column);
+            assert!((force - pressure).abs() < 1e-9, "{what}: {on} {force} N");
+            let largest = of(format!("contact {on}"), "largest_pressure");
+            assert!((largest - pressure.abs()).abs() < 1e-9, "{what}: {on} {largest} Pa");
+            let area = of(format!("contact {on}"), "touching_area");
+            assert!((area - 1.0).abs() < 1e-9, "{what}: {on} {area} m2");
+            if against != "right.left" {
+                let opposite = of(format!("against {against}"), column);
+                assert!((opposite + pressure).abs() < 1e-9, "{what}: {against} {opposite} N");
+            }
+        }
+        // (-3 + 0.3 * 5) / 1000 * 2 and (-5 + 0.3 * 3) / 1000 * 2
+        for (column, expected) in [("displacement_x", -0.003), ("displacement_y", -0.0082)] {
+            let found = *results.table("probes.csv").numbers(column).last().expect("a row");
+            assert!((found - expected).abs() < 1e-11, "{what}: {column} {found} m");
+        }
+    }
+}
+
+#[test]
+fn laws_with_a_scale_do_not_act_at_nodes_of_two_contacts() {
+    let law = "normal = { compliance = { stiffness = 1e4 } }";
+    let words = "use `unilateral` with the friction `coulomb` or `tresca`, without wear, adhesion and memory, which leave such nodes to \
+                 their neighbours, or exclude the facets around it by the `where` of one of the tables";
+    three_blocks_at_an_edge(2, law).run_with(2, &[]).expect(2).says(words);
+    // As the message says.
+    three_blocks_at_an_edge(2, law)
+        .set("contact.1.where", "'y > 1.3'")
+        .set("contact.2.where", "'(y > 0.4)*(y < 0.6)'")
+        .run(1);
+}
+
 /// A block on another one, of 4 x 2 and 3 x 2 cells divided into triangles, with a common left end; the left side of the lower one is at this
 /// angle in degrees to that of the upper one.
 fn write_blocks_with_an_oblique_side(path: &Path, degrees: f64) {

@@ -74,10 +74,10 @@ pub struct Contact {
     pub on: Vec<String>,
     /// The names of the boundaries of other bodies that the boundaries `on` may touch, instead of a rigid obstacle. The law acts at nodes
     /// of one side, which `side` chooses, on their velocity and displacement relative to the surface that they face along their normals in
-    /// the undeformed bodies; friction, adhesion, memory and wear as against an obstacle. The side with the finer mesh, with corners and
-    /// without supports is the better one. The distance of the undeformed surfaces is that of the mesh, whose facets are straight; `gap` of the
-    /// normal law adds to it, so that a negative one is an interference, whose work counts as negative contact dissipation. Absent: an
-    /// obstacle or `gap`.
+    /// the undeformed bodies; friction, adhesion, memory and wear as against an obstacle. The better side is that of the softer body, or with
+    /// the finer mesh, with corners and without supports. The distance of the undeformed surfaces is that of the mesh, whose facets are
+    /// straight; `gap` of the normal law adds to it, so that a negative one is an interference, whose work counts as negative contact
+    /// dissipation. Absent: an obstacle or `gap`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1), example = ["top"])]
     pub against: Vec<String>,
@@ -150,6 +150,16 @@ impl Contact {
             has_obstacle: self.obstacle.is_some(),
             obstacle_moves: moves || self.obstacle_load.is_some(),
         }
+    }
+
+    /// Whether its laws are the same for any multiple of displacements, gaps and velocities: constraints, and friction with a bound that
+    /// does not depend on the sliding.
+    pub fn is_without_scale(&self) -> bool {
+        let is_constraint = matches!(self.normal, NormalLaw::Unilateral(_));
+        let has_bound =
+            matches!(self.friction, None | Some(FrictionLaw::Tresca(_) | FrictionLaw::Coulomb(_)));
+        let keeps_more = self.wear.is_some() || self.adhesion.is_some() || self.memory.is_some();
+        is_constraint && has_bound && !keeps_more
     }
 
     /// The moment that turns the obstacle.

@@ -82,6 +82,8 @@ pub(super) struct Point<const D: usize> {
     pub place: Vector<D>,
     /// The distance in m to the body that it faces along the normal, of the undeformed bodies; 0 if it faces none.
     pub distance: f64,
+    /// The ratio of its velocity relative to that body to the mean over the part of the surface for which it stands.
+    pub stretch: f64,
     /// Displacement in m relative to the body that it faces when it began to face it.
     pub faced_at: Vector<D>,
     /// The gap in m at the end of the step of the undeformed surface without wear.
@@ -133,6 +135,7 @@ impl<const D: usize> Point<D> {
             unknown: Unknown::Velocity,
             place: [0.0; D],
             distance: 0.0,
+            stretch: 1.0,
             faced_at: [0.0; D],
             reach: 0.0,
             moved: 0.0,
@@ -193,7 +196,12 @@ impl<const D: usize> Point<D> {
 
     /// A point at a node that faces another body, whose values are relative to that body.
     pub(super) fn paired(node: &PairedNode<D>, held: &Held<D>) -> Self {
-        Self { distance: node.distance, ..Self::nodal(held.whole(node.point()), held) }
+        Self { distance: node.distance, stretch: node.stretch, ..Self::nodal(held.whole(node.point()), held) }
+    }
+
+    /// The part of the surface for which it stands in m^(D-1).
+    pub(super) fn area(&self) -> f64 {
+        self.stretch * self.weight
     }
 
     /// The local number of its first node; a nodal point has no other.
