@@ -212,7 +212,9 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
     for pair in pairs {
         let rubs = rubs(&job.contact[pair.contact]);
         for node in pair.nodes.iter().filter(|node| !node.masters.is_empty()) {
-            paired.insert(node.node as usize, pair.contact);
+            if let Some(other) = paired.insert(node.node as usize, pair.contact) {
+                found.get_or_insert((node.node as usize, pair.contact, format!("{ALSO}{other}")));
+            }
             let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
                 let free = |master: u32| norm(&held.free_part(master as usize, direction));
                 let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);

@@ -744,6 +744,31 @@ fn laws_with_a_scale_do_not_act_at_nodes_of_two_contacts() {
         .run(1);
 }
 
+/// A node between two parts of a boundary that are against other boundaries.
+#[test]
+fn a_side_may_be_in_several_contacts_if_their_laws_have_no_scale() {
+    let parts = |law: &str| {
+        let part = |condition: &str| {
+            format!(
+                "{{ on = ['upper.bottom'], against = ['lower.top'], where = '{condition}', normal = {law} }}"
+            )
+        };
+        Case::of("pressed_blocks").set("contact", &format!("[{}, {}]", part("x < 0.5"), part("x > 0.5")))
+    };
+    for ranks in [1, 3] {
+        let case = parts("{ unilateral = {} }").run_and_keep(ranks);
+        let table = case.results().table("resultants.csv").only("time", "1");
+        for (column, expected) in [("largest_pressure", 5.0), ("touching_area", 0.5), ("force_y", 2.5)] {
+            for source in ["contact upper.bottom", "contact upper.bottom (2)"] {
+                let found = table.only("source", source).numbers(column)[0];
+                assert!((found - expected).abs() < 1e-9, "{source}: {column} {found}");
+            }
+        }
+    }
+    let words = "it also belongs to contact.";
+    parts("{ compliance = { stiffness = 1e4 } }").run_with(1, &[]).expect(2).says(words);
+}
+
 /// A block on another one, of 4 x 2 and 3 x 2 cells divided into triangles, with a common left end; the left side of the lower one is at this
 /// angle in degrees to that of the upper one.
 fn write_blocks_with_an_oblique_side(path: &Path, degrees: f64) {
