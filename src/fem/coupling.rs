@@ -36,6 +36,17 @@ use std::{
 /// symmetry.
 pub const HELD_TOGETHER: f64 = 0.5;
 
+/// The share of what a node faces that supports hold along a unit direction, given for each master its share and the length of the free
+/// part of the direction there.
+pub fn held_share(masters: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    masters.into_iter().filter(|(_, free)| is_held(*free)).map(|(share, _)| share).sum()
+}
+
+/// Whether a node is held along a unit direction whose free part there has this length.
+pub fn is_held(free: f64) -> bool {
+    free < ROUNDING
+}
+
 /// The free part of a unit direction is a rounding error below this.
 const ROUNDING: f64 = 1e-6;
 /// A relative velocity that is smaller than that of the node by this factor is a rounding error.
@@ -150,10 +161,10 @@ impl<const D: usize> HeldTogether<D> {
     fn of(held: &Held<D>, slave: u32, masters: &[(u32, f64)]) -> Vec<Self> {
         let (frame, free) = held.frame(slave as usize);
         let along = |direction: &Vector<D>| {
-            let is_held = |master: &u32| norm(&held.free_part(*master as usize, direction)) < ROUNDING;
-            let masters: Vec<_> = masters.iter().filter(|(master, _)| is_held(master)).copied().collect();
-            let sum: f64 = masters.iter().map(|(_, share)| share).sum();
-            let scaled = masters.into_iter().map(|(master, share)| (master, share / sum)).collect();
+            let free = |master: u32| norm(&held.free_part(master as usize, direction));
+            let sum = held_share(masters.iter().map(|(master, share)| (*share, free(*master))));
+            let of_held = masters.iter().filter(|(master, _)| is_held(free(*master)));
+            let scaled = of_held.map(|(master, share)| (*master, share / sum)).collect();
             (sum >= HELD_TOGETHER).then_some(Self { slave, direction: *direction, masters: scaled })
         };
         frame[free..].iter().filter_map(along).collect()

@@ -30,6 +30,9 @@ pub struct PairedNode<const D: usize> {
     pub distance: f64,
     /// Master nodes, by global numbers, with their shares.
     pub masters: Vec<(u32, f64)>,
+    /// The ratio of its velocity relative to the surface that it faces to the mean over the part of the surface for which it stands, with
+    /// that of neighbours without a law; 1 without such neighbours.
+    pub stretch: f64,
 }
 
 impl<const D: usize> PairedNode<D> {
@@ -38,6 +41,19 @@ impl<const D: usize> PairedNode<D> {
         let Self { node, normal, weight, .. } = *self;
         SurfacePoint { node, normal, weight }
     }
+}
+
+/// Why the side `against` of the job carries the law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exchange {
+    /// The job states it.
+    Requested,
+    /// So it was in the run from whose state this one starts.
+    Continued,
+    /// Supports hold nodes on the side `on`.
+    Held,
+    /// The mesh of the side `on` is coarser.
+    Coarser,
 }
 
 /// A contact between bodies, with the facets of this rank on both sides.
@@ -49,16 +65,35 @@ pub struct Pair<const D: usize> {
     pub on: Vec<u32>,
     /// The other side.
     pub against: Vec<u32>,
+    /// Why the slave side is `against` in the job; none if it is `on`.
+    pub exchange: Option<Exchange>,
     /// Whether what nodes face is found anew as bodies slide. All nodes of the slave side carry the law then; those that face nothing are at
     /// an infinite distance.
     pub slides: bool,
     /// Whether the undeformed surfaces count as touching wherever they face each other.
     pub is_closed: bool,
+    /// The nodes of the slave side, by global numbers, whose part of the surface others of their facets stand for: they belong to other
+    /// contacts, too. The same on all ranks.
+    pub lawless: BTreeSet<u32>,
     /// The nodes owned here that carry the law, ascending.
     pub nodes: Vec<PairedNode<D>>,
 }
 
 impl<const D: usize> Pair<D> {
+    /// A contact of the job between these facets, before it is formed.
+    pub fn of(contact: usize, [on, against]: [Vec<u32>; 2]) -> Self {
+        let (slides, is_closed) = (false, false);
+        let (exchange, lawless, nodes) = (None, BTreeSet::new(), Vec::new());
+        Self { contact, on, against, exchange, slides, is_closed, lawless, nodes }
+    }
+
+    /// The pair with its sides exchanged, before it is formed, for this reason if its slave side becomes `against` in the job.
+    #[must_use]
+    pub fn exchanged(self, why: Exchange) -> Self {
+        let exchange = if self.exchange.is_some() { None } else { Some(why) };
+        Self { on: self.against, against: self.on, exchange, nodes: Vec::new(), ..self }
+    }
+
     /// Lets nodes face those at the same place on the other side, of a mesh that was split; nodes that both sides have carry no law.
     /// Collective.
     pub fn join(&mut self, session: &Session, mesh: &Mesh<D>) -> Result<(), Agreed> {
@@ -76,12 +111,14 @@ impl<const D: usize> Pair<D> {
         let paired = points.filter_map(|SurfacePoint { node, normal, weight }| {
             let twin = *twins.get(&bits(&mesh.nodes[node as usize]))?;
             let masters = vec![(twin, 1.0)];
+            let (distance, stretch) = (0.0, 1.0);
             (twin != mesh.global_node(node)).then_some(PairedNode {
                 node,
                 normal,
                 weight,
-                distance: 0.0,
+                distance,
                 masters,
+                stretch,
             })
         });
         self.nodes = paired.collect();
@@ -90,7 +127,7 @@ impl<const D: usize> Pair<D> {
 
     /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
     pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
-        let mut found = paired_nodes(session, mesh, places, [&self.on, &self.against])?;
+        let mut found = self.paired_nodes(session, mesh, places)?;
         if self.is_closed {
             found.iter_mut().for_each(|node| node.distance = 0.0);
         }
@@ -101,7 +138,10 @@ impl<const D: usize> Pair<D> {
         let mut facing: BTreeMap<u32, PairedNode<D>> =
             found.into_iter().map(|node| (node.node, node)).collect();
         let mut all: BTreeMap<u32, SurfacePoint<D>> = BTreeMap::new();
-        for point in surface_points(session, mesh, &self.on)?.into_iter().filter(|point| point.weight > 0.0) {
+        let carries = |point: &SurfacePoint<D>| {
+            point.weight > 0.0 && !self.lawless.contains(&mesh.global_node(point.node))
+        };
+        for point in surface_points(session, mesh, &self.on)?.into_iter().filter(carries) {
             let kept = all.entry(point.node).or_insert(point);
             if point.weight > kept.weight {
                 *kept = point;
@@ -110,16 +150,84 @@ impl<const D: usize> Pair<D> {
         // The normal remains that of the undeformed body.
         let node_at = |SurfacePoint { node, normal, weight }: SurfacePoint<D>| match facing.remove(&node) {
             Some(found) => PairedNode { normal, ..found },
-            None => PairedNode { node, normal, weight, distance: f64::INFINITY, masters: Vec::new() },
+            None => {
+                let (distance, masters, stretch) = (f64::INFINITY, Vec::new(), 1.0);
+                PairedNode { node, normal, weight, distance, masters, stretch }
+            }
         };
         self.nodes = all.into_values().map(node_at).collect();
         Ok(())
     }
+
+    /// The nodes owned here of the slave facets that face those of the other side on all ranks, ascending, with the local nodes of the mesh
+    /// at `places` in m. Collective.
+    fn paired_nodes(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        places: &[Vector<D>],
+    ) -> Result<Vec<PairedNode<D>>, Agreed> {
+        let slaves: Vec<Facet<D>> = self.on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
+        let masters = gather_facets(session, mesh, places, &self.against)?;
+        let mut outgoing = vec![Vec::new(); session.ranks()];
+        let depth = DEEPEST * longest_side(session, places);
+        let mut all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
+        // Of linear segments both corners carry a law, of all other facets three nodes.
+        let per_facet = if D == 2 && mesh.order() == 1 { 2 } else { 3 };
+        for of_facet in all.chunks_exact_mut(per_facet) {
+            let passed = pass_on(of_facet, &self.lawless);
+            for contribution in of_facet.iter().filter(|one| !self.lawless.contains(&one.node)) {
+                let Contribution { node, normal, weight, whole, gap, masters } = contribution;
+                let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*node)];
+                list.extend([f64::from(*node), *weight, *whole, *gap, passed]);
+                list.extend(normal.map(|n| weight * n));
+                list.push(masters.len() as f64);
+                list.extend(masters.iter().flat_map(|(master, value)| [f64::from(*master), *value]));
+            }
+        }
+        let records = exchange_lists(session.world(), &outgoing)?;
+        Ok(sum_of_contributions(mesh, &records))
+    }
+}
+
+/// Divides what the nodes without a law of a facet would contribute among those with one: with `c` of the former and `a` of the latter,
+/// `psi_a` grows by the same share of `psi_c`, so that the sum of all remains 1 and the products with the shape functions of nodes with a
+/// law are as before. The velocity of `c` counts as that of a master node with the opposite sign. Gives what is added to the part of the
+/// surface for which each of the latter stands, in m^(D-1).
+fn pass_on<const D: usize>(of_facet: &mut [Contribution<D>], lawless: &BTreeSet<u32>) -> f64 {
+    let carries = |one: &Contribution<D>| !lawless.contains(&one.node);
+    let carriers = of_facet.iter().filter(|one| carries(one)).count();
+    if carriers == of_facet.len() || carriers == 0 {
+        return 0.0;
+    }
+    let share = 1.0 / carriers as f64;
+    let (mut weight, mut gap, mut masters) = (0.0, 0.0, Vec::new());
+    for given in of_facet.iter().filter(|one| !carries(one) && !one.masters.is_empty()) {
+        weight += share * given.weight;
+        gap += share * given.gap;
+        masters.extend(given.masters.iter().map(|(master, value)| (*master, share * value)));
+        masters.push((given.node, -share * given.weight));
+    }
+    for carrier in of_facet.iter_mut().filter(|one| carries(one)) {
+        carrier.gap += gap;
+        carrier.masters.extend(&masters);
+    }
+    weight
+}
+
+/// The pair of a contact, if it is one.
+pub fn pair_of<const D: usize>(pairs: &[Pair<D>], contact: usize) -> Option<&Pair<D>> {
+    pairs.iter().find(|pair| pair.contact == contact)
+}
+
+/// Whether the nodes that carry the law of a contact are those of `against` in the job.
+pub fn is_exchanged<const D: usize>(pairs: &[Pair<D>], contact: usize) -> bool {
+    pair_of(pairs, contact).is_some_and(|pair| pair.exchange.is_some())
 }
 
 /// The nodes that carry the law of a contact, if it is one of these pairs.
 pub fn nodes_of<const D: usize>(pairs: &[Pair<D>], contact: usize) -> Option<&[PairedNode<D>]> {
-    pairs.iter().find(|pair| pair.contact == contact).map(|pair| &pair.nodes[..])
+    pair_of(pairs, contact).map(|pair| &pair.nodes[..])
 }
 
 /// The shares of the masters of the nodes of all these pairs, in the order of the nodes.
@@ -139,30 +247,6 @@ const LEAST_SHARE: f64 = 1e-3;
 /// The deepest penetration of undeformed bodies at which they face each other, as a share of the longest side of the box around them; it
 /// is larger where facets are.
 const DEEPEST: f64 = 0.05;
-
-/// The nodes owned here of the slave facets `on` that face the facets `against` of all ranks, ascending, with the local nodes of the mesh
-/// at `places` in m. Collective.
-fn paired_nodes<const D: usize>(
-    session: &Session,
-    mesh: &Mesh<D>,
-    places: &[Vector<D>],
-    [on, against]: [&[u32]; 2],
-) -> Result<Vec<PairedNode<D>>, Agreed> {
-    let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
-    let masters = gather_facets(session, mesh, places, against)?;
-    let mut outgoing = vec![Vec::new(); session.ranks()];
-    let depth = DEEPEST * longest_side(session, places);
-    for contribution in contributions(&slaves, &masters, [depth, f64::INFINITY]) {
-        let Contribution { node, normal, weight, whole, gap, masters } = contribution;
-        let list: &mut Vec<f64> = &mut outgoing[mesh.owner(node)];
-        list.extend([f64::from(node), weight, whole, gap]);
-        list.extend(normal.map(|n| weight * n));
-        list.push(masters.len() as f64);
-        list.extend(masters.iter().flat_map(|(master, value)| [f64::from(*master), *value]));
-    }
-    let records = exchange_lists(session.world(), &outgoing)?;
-    Ok(sum_of_contributions(mesh, &records))
-}
 
 /// A facet of this rank.
 fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) -> Facet<D> {
@@ -196,16 +280,18 @@ fn sum_of_contributions<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<
         weight: f64,
         whole: f64,
         gap: f64,
+        passed: f64,
         normal: [f64; 3],
         masters: BTreeMap<u32, f64>,
     }
     let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
     let mut rest = records;
-    while let [node, weight, whole, gap, after @ ..] = rest {
+    while let [node, weight, whole, gap, passed, after @ ..] = rest {
         let sum = sums.entry(*node as u32).or_default();
         sum.weight += weight;
         sum.whole += whole;
         sum.gap += gap;
+        sum.passed += passed;
         (0..D).for_each(|i| sum.normal[i] += after[i]);
         let count = after[D] as usize;
         let (masters, next) = after[D + 1..].split_at(2 * count);
@@ -230,7 +316,46 @@ fn sum_of_contributions<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<
                     .into_iter()
                     .map(|(master, value)| (master, value / sum.weight))
                     .collect(),
+                stretch: 1.0 + sum.passed / sum.weight,
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a segment of 1 m between two slave nodes has that faces the whole of another one at a distance of 3 m.
+    fn segment() -> [Contribution<2>; 2] {
+        let of = |node: u32, master: u32| Contribution {
+            node,
+            normal: [0.0, 1.0],
+            weight: 0.5,
+            whole: 0.5,
+            gap: 1.5,
+            masters: vec![(master, 0.5)],
+        };
+        [of(0, 10), of(1, 11)]
+    }
+
+    #[test]
+    fn a_node_without_a_law_leaves_its_part_of_a_facet_to_the_other_one() {
+        let mut both = segment();
+        assert_eq!(pass_on(&mut both, &BTreeSet::from([0])), 0.5);
+        // int psi_1 phi is that of a constant multiplier: 1/2 on either node of both sides.
+        assert_eq!(both[1].masters, [(11, 0.5), (10, 0.5), (0, -0.5)]);
+        assert_eq!((both[1].weight, both[1].gap), (0.5, 3.0));
+        let sum: f64 = both[1].masters.iter().map(|(_, value)| value).sum();
+        assert_eq!(sum, both[1].weight, "a common motion of both sides opens nothing");
+    }
+
+    #[test]
+    fn facets_of_which_all_or_no_nodes_carry_a_law_remain_as_they_are() {
+        for lawless in [BTreeSet::new(), BTreeSet::from([0, 1]), BTreeSet::from([10])] {
+            let mut both = segment();
+            assert_eq!(pass_on(&mut both, &lawless), 0.0);
+            assert_eq!(both, segment());
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use super::{
     body::Body,
     effect::{ContactAreas, Form, Supports, SurfaceForce},
+    pairs::{is_exchanged, pair_of},
     space::Held,
     state::State,
 };
@@ -347,17 +348,27 @@ impl<const D: usize> Sums<'_, D> {
         }
     }
 
-    /// Adds the force of a contact at a node, with the opposite ones on the body that it may face there.
+    /// Adds the force of a contact at a node, with the opposite ones on the body that it may face there, each to the side of the job.
     fn add_both<const S: usize>(
         &mut self,
         body: &Body<D, S>,
         contact: usize,
         (node, force): (u32, &Vector<D>),
     ) {
-        self.add_and_react(Source::Contact(contact), node, force);
+        let (mut own, mut other) = (Source::Contact(contact), Source::Against(contact));
+        if is_exchanged(&body.pairs, contact) {
+            std::mem::swap(&mut own, &mut other);
+        }
+        self.add_and_react(own, node, force);
         if let Some(coupling) = body.coupling.as_ref().filter(|_| body.contacts[contact].is_paired()) {
+            let lawless = pair_of(&body.pairs, contact).map(|pair| &pair.lawless);
+            // Neighbours without a law of their own are on the same side.
+            let is_own = |master: u32| {
+                lawless
+                    .is_some_and(|nodes| !nodes.is_empty() && nodes.contains(&self.mesh.global_node(master)))
+            };
             coupling.opposites(&body.held, node, force, |master, force| {
-                self.add_and_react(Source::Against(contact), master, &force);
+                self.add_and_react(if is_own(master) { own } else { other }, master, &force);
             });
         }
     }

@@ -4,7 +4,7 @@ use super::document::{
     Contact, Job, Method, check_contact, check_contact_names, check_material, check_material_in_body,
 };
 use super::findings::{MeshNames, Table, number_of_group};
-use crate::laws::contact::Gap;
+use crate::laws::contact::{Gap, Side};
 use crate::laws::expression::Scalar;
 use crate::laws::law::header;
 use crate::laws::material::Material;
@@ -150,12 +150,20 @@ fn check_claims(job: &Job, table: &mut Table<'_>) {
     let holds = |name: &String| {
         job.support.iter().any(|support| support.on.contains(name) && support.holds_all(dimension))
     };
+    let any_held = |names: &[String]| names.iter().any(holds);
     for (number, contact) in job.contact.iter().enumerate() {
+        // The side that carries the law.
+        let carries = contact.against.is_empty()
+            || match contact.side {
+                Side::On => true,
+                Side::Against => false,
+                Side::Auto => any_held(&contact.against),
+            };
         let is_rival = |other: &&Contact| contact.part.is_none() || other.part.is_none();
         let taken = |name| job.contact[..number].iter().filter(is_rival).any(|other| other.on.contains(name));
         for (index, name) in contact.on.iter().enumerate() {
             let path = format!("contact.{number}.on.{index}");
-            if holds(name) {
+            if carries && holds(name) {
                 let message =
                     format!("the boundary \"{name}\" has a contact, but a support fixes all its components");
                 table.fault(&path, message, "remove it from one of the two tables");

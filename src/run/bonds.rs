@@ -12,7 +12,7 @@ use crate::{
 /// Number of cells that the zone in which bonds give way needs.
 const CELLS: f64 = 3.0;
 
-/// Warnings about bonds with a strength. With `G` the energy of both sides of a crack, twice that of an obstacle, the zone in which they
+/// Warnings about bonds, whose strength may follow from energy and stiffness. With `G` the energy of both sides of a crack, twice that of an obstacle, the zone in which they
 /// give way is `E' G / strength^2` long in a thick body and `(E' G / strength^2)^(1/4) h^(3/4)` in a layer of the thickness `h` (A. Turon,
 /// C. Davila, P. Camanho, J. Costa, An engineering solution for mesh size effects in the simulation of delamination using cohesive zone
 /// models, Engrg. Fracture Mech. 74 (2007), 1665-1682; Q. Yang, B. Cox, Int. J. Fracture 133 (2005), 107-137). Collective, with the
@@ -25,8 +25,11 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     let mesh = &body.mesh;
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
-        let law = table.adhesion.as_ref();
-        let Some((law, strength)) = law.and_then(|law| Some((law, law.strength?))) else { continue };
+        let Some(law) = table.adhesion.as_ref().filter(|law| law.length.is_none()) else { continue };
+        let (strength, key) = match law.strength {
+            Some(strength) => (strength, "strength"),
+            None => ((law.stiffness * law.energy).sqrt(), "stiffness"),
+        };
         let thickness = thickness(session, mesh, contact.facets());
         let (mut longest, mut shortest) = (0.0, f64::INFINITY);
         for &facet in contact.facets() {
@@ -42,7 +45,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             out.push(format!(
                 "contact.{number}: nodes on the boundary {on} are up to {longest:.1e} m apart, but the zone in which its bonds give way is \
                  only {:.1e} m long: they break one node at a time, with jumps of the force; use cells of at most {wanted:.1e} m, or \
-                 lower `strength`, which changes little while that zone is short compared with the crack",
+                 lower `{key}`, which changes little while that zone is short compared with the crack",
                 CELLS * wanted
             ));
         }

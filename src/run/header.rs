@@ -1,6 +1,6 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{Summary, setup::Setup, steps};
+use super::{Summary, setup::Setup, sides, steps};
 use crate::{
     error::Result,
     io::output::{field_list::FIELDS, log::Log, output_field::Figures},
@@ -43,6 +43,7 @@ pub(super) fn lines<const D: usize, const S: usize>(
         lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
     }
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
+    lines.extend(sides::lines(job, &body.pairs));
     let lengths = match &job.time.adaptive {
         Some(a) => format!("{} s to {} s, {} s first,", a.smallest_step, a.largest_step, job.time.step),
         None => format!("{} s", job.time.step),

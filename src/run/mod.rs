@@ -21,6 +21,7 @@ mod reactions;
 mod restored;
 mod scene;
 mod setup;
+mod sides;
 mod simulation;
 mod start;
 mod step_line;

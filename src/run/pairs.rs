@@ -1,29 +1,31 @@
 //! Contact between bodies: finds what boundaries face, before the body is built, and refuses what cannot be solved.
 
-use super::parts::part_of;
+use super::{
+    parts::part_of,
+    sides::{Circumstances, conflict, rubs},
+};
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        coupling::{Coupling, HELD_TOGETHER, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Pair, shares},
+        coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
+        pairs::{Pair, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
-    job::{self, Job, Scalar, Sliding},
-    linear_algebra::tensor::{Vector, dot, norm},
+    job::{self, Job, Scalar, Side, Sliding},
+    linear_algebra::tensor::{Vector, norm},
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Component of a unit direction along a normal above which it counts as along the normal.
-const ALONG: f64 = 0.5;
-
-/// The contacts of a job between bodies; the mesh gets the ghosts that their equations need. Collective.
+/// The contacts of a job between bodies, with the side of each that carries the law; the mesh gets the ghosts that their equations need.
+/// Collective.
 pub(super) fn find<const D: usize>(
     session: &Session,
     job: &Job,
     mesh: &mut Mesh<D>,
+    circumstances: &Circumstances<D>,
 ) -> Result<Vec<Pair<D>>, Agreed> {
     let mut pairs = Vec::new();
     let is_fault = |contact: &job::Contact| {
@@ -34,8 +36,7 @@ pub(super) fn find<const D: usize>(
             let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
             let other: Vec<String> = contact.on.iter().map(|name| other_side(name)).collect();
             let against = facets(mesh, &other);
-            let mut pair =
-                Pair { contact: number, on, against, slides: false, is_closed: true, nodes: Vec::new() };
+            let mut pair = Pair { is_closed: true, ..Pair::of(number, [on, against]) };
             pair.join(session, mesh)?;
             pairs.push(pair);
         }
@@ -54,9 +55,8 @@ pub(super) fn find<const D: usize>(
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         let against = facets(mesh, &contact.against);
         let slides = contact.sliding == Sliding::Finite;
-        let mut pair =
-            Pair { contact: number, on, against, slides, is_closed: contact.closed, nodes: Vec::new() };
-        pair.form(session, mesh, &mesh.nodes)?;
+        let pair = Pair { slides, is_closed: contact.closed, ..Pair::of(number, [on, against]) };
+        let pair = circumstances.form(session, mesh, job, pair)?;
         let names = [&contact.on, &contact.against].map(|names| names.join(", "));
         let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
         session.agree(if session.total(facing) == 0 && !slides {
@@ -73,6 +73,7 @@ pub(super) fn find<const D: usize>(
     if pairs.is_empty() {
         return Ok(pairs);
     }
+    leave_shared_nodes(session, job, mesh, &mut pairs)?;
     let shares = shares(mesh, &pairs);
     let global =
         |facet: &u32| mesh.facet_nodes(*facet).map(|node| mesh.global_node(node)).collect::<Vec<_>>();
@@ -93,6 +94,77 @@ pub(super) fn find<const D: usize>(
     Ok(pairs)
 }
 
+/// Lets nodes of pairs whose law would act there, and that belong to other contacts, too, leave their part of the surface to neighbours,
+/// where the law allows it. Collective.
+fn leave_shared_nodes<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &mut [Pair<D>],
+) -> Result<(), Agreed> {
+    let of_facets = |facets: &[u32]| -> Vec<u32> {
+        facets.iter().flat_map(|facet| mesh.facet_nodes(*facet)).map(|node| mesh.global_node(node)).collect()
+    };
+    let all =
+        |nodes: &[u32]| Ok::<BTreeSet<u32>, Agreed>(gather(session.world(), nodes)?.into_iter().collect());
+    let (mut slaves, mut both) = (Vec::new(), Vec::new());
+    for pair in &*pairs {
+        let own: Vec<u32> = pair.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
+        let faced: Vec<u32> = match pair.slides {
+            true => of_facets(&pair.against),
+            false => pair.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master).collect(),
+        };
+        slaves.push(all(&own)?);
+        both.push(all(&[own, faced].concat())?);
+    }
+    let mut of_obstacles = Vec::new();
+    for (number, contact) in job.contact.iter().enumerate() {
+        if pair_of(pairs, number).is_none() {
+            let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
+            of_obstacles.extend(of_facets(&on));
+        }
+    }
+    let of_obstacles = all(&of_obstacles)?;
+    for (at, pair) in pairs.iter_mut().enumerate() {
+        let contact = &job.contact[pair.contact];
+        if contact.against.is_empty() || !contact.is_without_scale() {
+            continue;
+        }
+        let others = || both.iter().enumerate().filter(|(other, _)| *other != at);
+        let is_shared =
+            |node: &u32| of_obstacles.contains(node) || others().any(|(_, nodes)| nodes.contains(node));
+        pair.lawless = slaves[at].iter().copied().filter(is_shared).collect();
+        if pair.lawless.is_empty() {
+            continue;
+        }
+        pair.form(session, mesh, &mesh.nodes)?;
+        session.agree(if session.total(pair.nodes.len()) > 0 {
+            Ok(())
+        } else {
+            Err(Error::Refused(format!(
+                "contact.{}: all nodes of the boundary {} belong to other contacts, too, so that none is left for the law; refine the mesh \
+                 there, or state the other `side`",
+                pair.contact,
+                side_names(job, pair).join(", ")
+            )))
+        })?;
+    }
+    Ok(())
+}
+
+/// The boundaries at whose nodes the law of a pair acts.
+fn side_names<'a, const D: usize>(job: &'a Job, pair: &Pair<D>) -> &'a [String] {
+    let contact = &job.contact[pair.contact];
+    if pair.exchange.is_some() { &contact.against } else { &contact.on }
+}
+
+/// Why a node of two contacts is refused.
+const ALSO: &str = "it also belongs to contact.";
+const OR_EXCLUDE: &str = "or exclude the facets around it by `where`";
+/// What to do about a node of two contacts.
+const SHARED: &str = "use `unilateral` with the friction `coulomb` or `tresca`, without wear, adhesion and memory, which leave such nodes to \
+                      their neighbours, or exclude the facets around it by the `where` of one of the tables";
+
 /// Refuses nodes that carry the law of one pair and are on the other side of another. Collective.
 fn refuse_chains<const D: usize>(
     session: &Session,
@@ -107,8 +179,7 @@ fn refuse_chains<const D: usize>(
     session.agree(match both {
         None => Ok(()),
         Some(&node) => Err(Error::Refused(format!(
-            "contact: the node at {:?} m is on the side `on` of one pair of boundaries and on the side `against` of another; exchange `on` \
-             and `against` in one of the tables, or exclude the facets around it by `where`",
+            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {SHARED}",
             mesh.nodes[mesh.owned_node(node)]
         ))),
     })
@@ -134,48 +205,47 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
     job: &Job,
     body: &Body<D, S>,
 ) -> Result<(), Agreed> {
-    let Body { mesh, contacts, coupling: Some(coupling), held, .. } = body else { return Ok(()) };
-    let masters_of: BTreeMap<usize, &[(u32, f64)]> =
-        coupling.slaves().map(|(slave, masters)| (slave as usize, masters)).collect();
-    // The share of the masters that is held along a direction as well.
-    let held_share = |node: usize, direction: &Vector<D>| -> f64 {
-        let free = |master: u32| norm(&held.free_part(master as usize, direction)).powi(2);
-        let masters = masters_of.get(&node).copied().unwrap_or(&[]);
-        masters.iter().map(|(master, share)| share * (1.0 - free(*master))).sum()
-    };
+    let Body { mesh, contacts, coupling: Some(coupling), held, pairs, .. } = body else { return Ok(()) };
+    let masters_of: BTreeMap<u32, &[(u32, f64)]> = coupling.slaves().collect();
     let mut paired = BTreeMap::new();
-    let mut conflict: Option<(usize, usize, String)> = None;
-    for (number, contact) in contacts.iter().enumerate().filter(|(_, contact)| contact.is_paired()) {
-        let rubs = job.contact[number].friction.is_some() || job.contact[number].adhesion.is_some();
-        for (node, normal) in contact.normal_directions().filter(|(node, _)| masters_of.contains_key(node)) {
-            paired.insert(node, number);
-            let (frame, free) = held.frame(node);
-            for direction in &frame[free..] {
-                let along = dot(direction, &normal).abs();
-                let (word, matters) = match along > ALONG {
-                    true => ("along the normal", true),
-                    false => ("along the boundary, where friction or adhesion act", rubs),
-                };
-                if matters && held_share(node, direction) < HELD_TOGETHER {
-                    let why = format!("a support holds it {word}, and not what it faces");
-                    conflict.get_or_insert((node, number, why));
-                }
+    let mut found: Option<(usize, usize, String)> = None;
+    for pair in pairs {
+        let rubs = rubs(&job.contact[pair.contact]);
+        for node in pair.nodes.iter().filter(|node| !node.masters.is_empty()) {
+            if let Some(other) = paired.insert(node.node as usize, pair.contact) {
+                found.get_or_insert((node.node as usize, pair.contact, format!("{ALSO}{other}")));
+            }
+            let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
+                let free = |master: u32| norm(&held.free_part(master as usize, direction));
+                let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);
+                masters.iter().map(|(master, share)| (*share, free(*master))).collect()
+            };
+            if let Some(why) = conflict(node, held, rubs, facing) {
+                found.get_or_insert((node.node as usize, pair.contact, why.into()));
             }
         }
     }
     for (number, contact) in contacts.iter().enumerate() {
         let of_others = contact.nodes().filter_map(|node| Some((node, *paired.get(&node)?)));
         for (node, pair) in of_others.filter(|(_, pair)| *pair != number) {
-            conflict.get_or_insert((node, pair, format!("it also belongs to contact.{number}")));
+            found.get_or_insert((node, pair, format!("{ALSO}{number}")));
         }
     }
-    session.agree(match conflict {
+    session.agree(match found {
         None => Ok(()),
-        Some((node, pair, why)) => Err(Error::Refused(format!(
-            "contact.{pair}: the node at {:?} m of the boundary {} faces another body, and {why}; exchange `on` and `against`, or exclude the \
-             facets around it by `where`",
-            mesh.nodes[node],
-            job.contact[pair].on.join(", ")
-        ))),
+        Some((node, pair, why)) => {
+            let contact = &job.contact[pair];
+            let remedy = match (contact.side, is_exchanged(pairs, pair)) {
+                _ if why.starts_with(ALSO) => SHARED.into(),
+                (Side::Auto, _) => format!("hold both bodies there in the same directions, or none of them, {OR_EXCLUDE}"),
+                (_, true) => format!("delete `side`, {OR_EXCLUDE}"),
+                (_, false) => format!("delete `side`, or exchange `on` and `against`, {OR_EXCLUDE}"),
+            };
+            Err(Error::Refused(format!(
+                "contact.{pair}: the node at {:?} m of the boundary {} faces another body, and {why}; {remedy}",
+                mesh.nodes[node],
+                pair_of(pairs, pair).map_or(&contact.on[..], |pair| side_names(job, pair)).join(", ")
+            )))
+        }
     })
 }

@@ -5,9 +5,9 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{ELASTIC, Form, Step, Supports},
+        effect::{Contact, ELASTIC, Form, Step, Supports},
         pairs::PairedNode,
-        space::{Held, SurfacePoint, surface_points},
+        space::{Held, SurfacePoint, facets, surface_points},
         state::State,
     },
     job::Support,
@@ -15,9 +15,10 @@ use crate::{
         petsc::DistributedVector,
         tensor::{Vector, add_scaled, dot, larger, norm},
     },
-    mesh::Mesh,
+    mesh::{Mesh, other_side},
     parallel::session::Session,
 };
+use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Unbalanced or released forces, as a share of all forces or of the loads, above which a warning is given.
@@ -179,7 +180,8 @@ pub(super) fn take_over<const D: usize, const S: usize>(
     let before = Supports::new(session, &body.mesh, &supports, &state.velocity);
     let before = session.agree(before)?.held;
     let springs = session.agree(given_resistances(session, &supports, &body.mesh, &before))?;
-    let lost = lost_contact(session, &contacts, body)?;
+    let against = session.agree(faced_before(earlier))?;
+    let lost = lost_contact(session, (&contacts, &against), body)?;
     let residual = residual(session, body, state)?;
     let mut loads = session.agree(state.velocity.like())?;
     session.agree(body.write_loads(0.0, &mut loads))?;
@@ -303,10 +305,11 @@ fn residual<const D: usize, const S: usize>(
     Ok(forces)
 }
 
-/// The owned nodes of contacts of the stage before where this body has no contact. Collective.
+/// The owned nodes of contacts of the stage before, given with the boundaries that they were against, where this body has no contact.
+/// Collective.
 fn lost_contact<const D: usize, const S: usize>(
     session: &Session,
-    contacts: &[Support],
+    (contacts, against): (&[Support], &[String]),
     body: &Body<D, S>,
 ) -> Result<BTreeSet<u32>> {
     let nodes_of = |facets: &[u32]| -> Result<BTreeSet<u32>> {
@@ -318,12 +321,42 @@ fn lost_contact<const D: usize, const S: usize>(
         let facets = part_of(session, &body.mesh, ("contact", &contact.on), contact.part.as_ref())?;
         nodes.extend(nodes_of(&facets)?);
     }
-    for contact in &body.contacts {
-        for node in nodes_of(contact.facets())? {
+    nodes.extend(nodes_of(&facets(&body.mesh, against))?);
+    let own = body.contacts.iter().map(Contact::facets);
+    for facets in own.chain(body.pairs.iter().map(|pair| &pair.against[..])) {
+        for node in nodes_of(facets)? {
             nodes.remove(&node);
         }
     }
     Ok(nodes)
+}
+
+/// The boundaries that contacts of a job with these keys are against; of a fault its other side.
+fn faced_before(keys: &BTreeMap<String, String>) -> Result<Vec<String>> {
+    #[derive(Deserialize)]
+    struct Names {
+        names: Vec<String>,
+    }
+    let names = |text: &String| -> Result<Vec<String>> {
+        let found: Names = toml::from_str(&format!("names = {text}")).map_err(|error| {
+            Error::Refused(format!(
+                "initial.from: the boundaries of a contact of the job that wrote the state can't be read ({error}); write the state again \
+                 with this version"
+            ))
+        })?;
+        Ok(found.names)
+    };
+    let mut all = Vec::new();
+    for number in (0..).take_while(|number| keys.contains_key(&format!("contact.{number}.on"))) {
+        let of = |key: &str| keys.get(&format!("contact.{number}.{key}")).map_or(Ok(Vec::new()), names);
+        let (on, against) = (of("on")?, of("against")?);
+        all.extend(if against.is_empty() {
+            on.iter().map(|name| other_side(name)).collect()
+        } else {
+            against
+        });
+    }
+    Ok(all)
 }
 
 /// The boundaries of the tables of this name in a job with these keys, with what supports hold and their springs.

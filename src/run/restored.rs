@@ -18,10 +18,13 @@ use crate::{
     },
     job::Loaded,
     linear_algebra::tensor::{Vector, norm},
-    parallel::{agreement::Agreed, session::Session},
+    parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use mpi::traits::{Communicator, Root};
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 /// A unit direction with a smaller free part is held.
 const ROUNDING: f64 = 1e-9;
@@ -89,37 +92,57 @@ pub(super) struct StartState {
     pub warning: Option<String>,
 }
 
-/// Reads the state that a job starts from, if it names one, into body and state. Components that supports
-/// hold keep the displacement and have the velocity of the supports; where supports moved them before, their motion continues: the
-/// velocity of the state is the mean of the last step in some schemes, and that of the support at this time would be a jump.
-/// Collective.
-pub(super) fn transfer<const D: usize, const S: usize>(
-    session: &Session,
-    loaded: &Loaded,
-    body: &mut Body<D, S>,
-    state: &mut State,
-) -> Result<Option<StartState>> {
+/// The file of the state that a job starts from, if it names one. Collective.
+pub(super) fn start_file(session: &Session, loaded: &Loaded) -> Result<Option<PathBuf>> {
     let Some(from) = loaded.job.initial.as_ref().and_then(|initial| initial.from.as_deref()) else {
         return Ok(None);
     };
     let fault = |words: String, help: &str| loaded.fault("initial.from", words, help);
     let is_folder = session.total(usize::from(session.is_first() && from.is_dir())) > 0;
-    let file = if is_folder {
+    if is_folder {
         let help = "add a [checkpoint] table to the job of that folder, so that its last state is saved";
         let none = || fault(format!("{} holds no checkpoint", from.display()), help);
         let newest = newest(session, from)?.into_iter().next();
-        session.agree(newest.ok_or_else(none))?
-    } else {
-        let is_there = session.total(usize::from(session.is_first() && from.is_file())) > 0;
-        let none = || {
-            fault(
-                format!("{} does not exist or is no regular file", from.display()),
-                "name a checkpoint or an output folder",
-            )
-        };
-        session.agree(if is_there { Ok(()) } else { Err(none()) })?;
-        from.to_owned()
+        return Ok(Some(session.agree(newest.ok_or_else(none))?));
+    }
+    let is_there = session.total(usize::from(session.is_first() && from.is_file())) > 0;
+    let none = || {
+        fault(
+            format!("{} does not exist or is no regular file", from.display()),
+            "name a checkpoint or an output folder",
+        )
     };
+    session.agree(if is_there { Ok(()) } else { Err(none()) })?;
+    Ok(Some(from.to_owned()))
+}
+
+/// The contacts between bodies that the run had which wrote the state that a job starts from, by their positions in the job, each with
+/// whether its sides were exchanged. Collective.
+pub(super) fn sides_before(
+    session: &Session,
+    loaded: &Loaded,
+    file: Option<&Path>,
+) -> Result<BTreeMap<usize, bool>, Agreed> {
+    let Some(file) = file else { return Ok(BTreeMap::new()) };
+    let physics = session.agree(loaded.job.physics())?;
+    let found = session.on_first(|| Ok::<_, Error>(checkpoint::sides_of(file, &physics)))?;
+    let own = found.unwrap_or_default().into_iter();
+    let own: Vec<u32> = own.flat_map(|(number, is)| [number as u32, u32::from(is)]).collect();
+    let all = gather(session.world(), &own)?;
+    Ok(all.chunks_exact(2).map(|pair| (pair[0] as usize, pair[1] > 0)).collect())
+}
+
+/// Reads the state that a job starts from, if this file has one, into body and state. Components that supports
+/// hold keep the displacement and have the velocity of the supports; where supports moved them before, their motion continues: the
+/// velocity of the state is the mean of the last step in some schemes, and that of the support at this time would be a jump.
+/// Collective.
+pub(super) fn transfer<const D: usize, const S: usize>(
+    session: &Session,
+    (loaded, file): (&Loaded, Option<PathBuf>),
+    body: &mut Body<D, S>,
+    state: &mut State,
+) -> Result<Option<StartState>> {
+    let Some(file) = file else { return Ok(None) };
     let physics = session.agree(loaded.job.physics())?;
     // Elastic supports keep the reactions that they have taken over before.
     let [can_react] = session.largest([f64::from(u8::from(!body.elastic_support.points.is_empty()))]);

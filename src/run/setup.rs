@@ -5,7 +5,8 @@ use super::{
     estimate::MemoryEstimate,
     memory::require_for_run,
     obstacles, pairs,
-    restored::{StartState, transfer},
+    restored::{StartState, sides_before, start_file, transfer},
+    sides::Circumstances,
     steps,
     validate::refuse_free_bodies,
 };
@@ -47,16 +48,20 @@ pub(super) fn setup<const D: usize, const S: usize>(
     for (name, value) in &job.solver.petsc {
         session.agree(set_option(name, value))?;
     }
-    let paired = pairs::find(session, job, &mut mesh)?;
+    let from = start_file(session, loaded)?;
+    let circumstances =
+        Circumstances::of(session, job, &mesh, sides_before(session, loaded, from.as_deref())?)?;
+    let paired = pairs::find(session, job, &mut mesh, &circumstances)?;
     let probes = session.agree(Probes::locate(session, &mesh, &job.output))?;
     let (mut body, mut state) = build::body::<D, S>(session, job, mesh, paired)?;
     let fault = probed::fault(&job.output.probe_also, &body);
     let fault = fault.map(|[message, help]| loaded.fault("output.probe_also", message, help));
     session.agree(fault.map_or(Ok(()), Err))?;
-    let began_from = transfer(session, loaded, &mut body, &mut state)?;
+    let began_from = transfer(session, (loaded, from), &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;
     warnings.extend(bonds::warnings(session, job, &body));
+    warnings.extend(circumstances.warnings(&body.pairs));
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };

@@ -56,9 +56,9 @@ fn refuse_conflicts<const D: usize>(
     mesh: &Mesh<D>,
     loaded: &Loaded,
 ) -> Result<(), Agreed> {
-    // Parts of boundaries may meet without a conflict, and springs may act beside contact.
+    // Parts of boundaries may meet without a conflict, and springs may act beside contact. Between bodies each node is checked later.
     let whole_supports = loaded.job.support.iter().filter(|s| s.part.is_none() && s.fix.is_some());
-    let whole_contacts = loaded.job.contact.iter().filter(|c| c.part.is_none());
+    let whole_contacts = loaded.job.contact.iter().filter(|c| c.part.is_none() && c.against.is_empty());
     let supports: Vec<&str> = whole_supports.flat_map(|s| &s.on).map(String::as_str).collect();
     let contacts: Vec<&str> = whole_contacts.flat_map(|c| &c.on).map(String::as_str).collect();
     let conflicts = mesh.conflicts(&supports, &contacts);

@@ -2,6 +2,7 @@
 
 use crate::{
     case::Case,
+    launch,
     results::{Results, relative_difference},
 };
 use std::path::Path;
@@ -478,6 +479,389 @@ fn a_stage_keeps_what_nodes_face_in_bodies_that_slide() {
     }
 }
 
+/// A block that a support moves along y, on a plane or on another block, slides as fast along x as its load overcomes friction: with the
+/// share r of the load in the bound, v_x / v_y = r / sqrt(1 - r^2).
+#[test]
+fn friction_has_the_direction_of_sliding_where_a_support_moves_one_tangent() {
+    let upper = "name = 'upper', corner = [0, 0, 0.5], size = [1, 1, 0.5], cells = [2, 1, 1]";
+    let lower = "name = 'lower', size = [1, 1, 0.5], cells = [3, 1, 1]";
+    let moved = "{ on = ['upper.front', 'upper.back'], fix = ['y'], displacement = ['0.1*t'] }";
+    let held = "{ on = ['lower.front', 'lower.back'], fix = ['y'] }, { on = ['lower.bottom'], fix = 'all' }";
+    let friction = "normal = { unilateral = {} }, friction = { coulomb = { coefficient = 0.4 } }";
+    for (blocks, supports, sides) in [
+        (format!("[{{ {upper} }}]"), format!("[{moved}]"), "on = ['upper.bottom']"),
+        (
+            format!("[{{ {lower} }}, {{ {upper} }}]"),
+            format!("[{moved}, {held}]"),
+            "on = ['upper.bottom'], against = ['lower.top']",
+        ),
+    ] {
+        let run = cubes()
+            .without("region")
+            .without("output.profile")
+            .set("material.elasticity", "{ youngs_modulus = 1e4, poisson_ratio = 0.0 }")
+            .set("mesh.box", &blocks)
+            .set("support", &supports)
+            // r = 0.24 * 5 / (0.4 * 5)
+            .set("traction.0.value", "[1.2, 0, -5]")
+            .set("contact", &format!("[{{ {sides}, {friction} }}]"))
+            .set("output.probe", "[{ name = 'top', point = [0.5, 0.5, 1] }]")
+            .run_and_keep(1);
+        let results = run.results();
+        let last = |column: &str| *results.table("probes.csv").numbers(column).last().expect("a row");
+        let [along, across] = ["velocity_x", "velocity_y"].map(last);
+        assert!(
+            (along - 0.075).abs() < 1e-6 && (across - 0.1).abs() < 1e-6,
+            "{sides}: {along}, {across} m/s"
+        );
+        assert!(results.number("max_energy_imbalance") < 1e-9, "{sides}");
+    }
+}
+
+/// The log of a run, with each entry on one line.
+fn log_of(case: &Case) -> String {
+    launch::unwrapped(&case.results().text("run.log"))
+}
+
+/// Two blocks that are sheared, of which the lower one is held at the ends of its upper side, with a contact that has this table.
+fn worn(table: &str) -> Case {
+    sheared(&format!("{table}, wear = {{ coefficient = 1e-3 }}"))
+        .set("support", "[{ on = ['lower.bottom', 'lower.left', 'lower.right'], fix = 'all' }]")
+        .set("traction", "[{ on = ['upper.top'], value = ['2*sin(20*t)', '-3 - x'] }]")
+        .set("output.profile", "[{ on = 'upper.bottom' }, { on = 'lower.top' }]")
+        .set("solver.tolerance", "1e-12")
+}
+
+/// The largest difference of what a contact between these blocks does in two runs, as a share.
+fn difference_of_sides(one: &Results, other: &Results) -> f64 {
+    let mut most = 0.0f64;
+    // The table of a contact and the side that it names differ, what acts on a body does not.
+    let forces = |results: &Results, body: &str| -> Vec<f64> {
+        let table = results.table("resultants.csv");
+        let sources = table.words("source");
+        let source = sources.iter().find(|source| !source.starts_with("support") && source.ends_with(body));
+        let rows = table.only("source", source.expect("it acts"));
+        [rows.numbers("force_x"), rows.numbers("force_y")].concat()
+    };
+    for body in ["upper.bottom", "lower.top"] {
+        most = most.max(relative_difference(&forces(one, body), &forces(other, body)));
+    }
+    for column in ["contact_pressure", "friction_traction_x", "gap", "sliding_velocity_x"] {
+        let [a, b] = [one, other].map(|results| results.table("profiles.csv").numbers(column));
+        most = most.max(relative_difference(&a, &b));
+    }
+    for column in ["contact_dissipation", "elastic_energy"] {
+        let [a, b] = [one, other].map(|results| results.table("history.csv").numbers(column));
+        most = most.max(relative_difference(&a, &b));
+    }
+    most
+}
+
+#[test]
+fn the_side_that_carries_the_law_is_chosen_where_supports_hold_the_other_one() {
+    let of_upper = "on = ['upper.bottom'], against = ['lower.top']";
+    let of_lower = "on = ['lower.top'], against = ['upper.bottom']";
+    for order in ["1", "2"] {
+        let case = |table: &str| worn(table).set("mesh.order", order);
+        let reference = case(of_upper).run_and_keep(1);
+        assert!(!log_of(&reference).contains("carry the law"));
+        for (side, why) in
+            [("auto", "because supports hold nodes of lower.top"), ("against", "as `side` states")]
+        {
+            for ranks in [1, 2, 3] {
+                let other = case(&format!("{of_lower}, side = '{side}'")).run_and_keep(ranks);
+                let log = log_of(&other);
+                assert!(log.contains(&format!("nodes of upper.bottom carry the law, {why}")), "{log}");
+                let difference = difference_of_sides(&reference.results(), &other.results());
+                let limit = if ranks == 1 { 1e-10 } else { 1e-7 };
+                assert!(difference < limit, "order {order}, {side}, {ranks} ranks: {difference:e}");
+            }
+        }
+        let refused = case(&format!("{of_lower}, side = 'on'"));
+        refused
+            .run_with(1, &[])
+            .expect(2)
+            .says("a support holds it along the boundary, where friction or adhesion act, and not what it faces; delete `side`");
+        let whole = case(of_lower).run_and_keep(1);
+        let part = case(of_lower).set("checkpoint.every", "10").set("time.end", "0.2").run_and_keep(1);
+        part.run_with(1, &["--restart", "--set", "time.end=0.5"]).expect(0);
+        assert_eq!(part.results().text("history.csv"), whole.results().text("history.csv"), "order {order}");
+    }
+}
+
+#[test]
+fn the_side_with_the_finer_mesh_carries_the_law_unless_the_job_states_it() {
+    let of = |side: &str, cells: usize| {
+        let blocks = format!(
+            "[{{ name = 'lower', size = [1, 0.5], cells = [{cells}, 2] }}, \
+              {{ name = 'upper', corner = [0, 0.5], size = [1, 0.5], cells = [9, 2] }}]"
+        );
+        worn(&format!("on = ['lower.top'], against = ['upper.bottom']{side}"))
+            .set("support", "[{ on = ['lower.bottom'], fix = 'all' }]")
+            .set("mesh.rectangle", &blocks)
+            .run_and_keep(2)
+    };
+    let finer = "nodes of upper.bottom carry the law, because the mesh of lower.top is coarser";
+    let auto = of("", 3);
+    assert!(log_of(&auto).contains(finer));
+    assert!(difference_of_sides(&auto.results(), &of(", side = 'against'", 3).results()) < 1e-7);
+    for (side, cells) in [(", side = 'on'", 3), ("", 6)] {
+        assert!(!log_of(&of(side, cells)).contains("carry the law"), "{cells}{side}");
+    }
+}
+
+#[test]
+fn a_stage_keeps_the_side_that_carries_the_law() {
+    let from = |case: &Case| format!("'{}'", case.folder().join("out").display());
+    let table = "on = ['lower.top'], against = ['upper.bottom']";
+    let first = worn(table).set("checkpoint.every", "100").run_and_keep(2);
+    let second = |table: &str| {
+        let case = worn(table).set("support", "[{ on = ['lower.bottom'], fix = 'all' }]");
+        case.set("initial.from", &from(&first)).set("time.end", "0.04")
+    };
+    let kept = second(table).run_and_keep(3);
+    let log = log_of(&kept);
+    assert!(
+        log.contains("nodes of upper.bottom carry the law, as in the run from which this one starts"),
+        "{log}"
+    );
+    let outcome = second(&format!("{table}, side = 'on'")).run_with(1, &[]).expect(0);
+    outcome.says("contact.0: the other side carried the law in the run from which this one starts");
+}
+
+/// Three blocks that touch each other and meet at an edge, the lower and the right one on a rigid plane; each contact has the entries `law`.
+fn three_blocks_at_an_edge(dimension: usize, law: &str) -> Case {
+    let contact = |on: &str, against: &str| format!("{{ on = ['{on}'], against = ['{against}'], {law} }}");
+    let floor = |names: &str| format!("{{ on = [{names}], normal = {{ unilateral = {{}} }} }}");
+    let case = Case::of("pressed_blocks").without("region").without("output.profile").set("check", "{}");
+    let case = case.set("output.probe", "[]").set("material.elasticity.poisson_ratio", "0.3");
+    if dimension == 2 {
+        let contacts = [
+            contact("upper.bottom", "lower.top"),
+            contact("upper.right", "right.left"),
+            contact("lower.right", "right.left"),
+            floor("'lower.bottom', 'right.bottom'"),
+        ];
+        return case
+            .set(
+                "mesh.rectangle",
+                "[{ name = 'lower', size = [1, 1], cells = [4, 3] }, \
+                  { name = 'upper', corner = [0, 1], size = [1, 1], cells = [5, 4] }, \
+                  { name = 'right', corner = [1, 0], size = [1, 2], cells = [3, 7] }]",
+            )
+            .set("support", "[{ on = ['lower.left', 'upper.left'], fix = ['x'] }]")
+            .set(
+                "traction",
+                "[{ on = ['upper.top', 'right.top'], value = [0, -5] }, { on = ['right.right'], value = [-3, 0] }]",
+            )
+            .set("output.probe", "[{ name = 'corner', point = [2, 2] }]")
+            .set("contact", &format!("[{}]", contacts.join(", ")));
+    }
+    let contacts = [
+        contact("upper.front", "lower.back"),
+        contact("upper.right", "right.left"),
+        contact("lower.right", "right.left"),
+        floor("'lower.front', 'right.front'"),
+    ];
+    case.without("mesh.rectangle")
+        .without("material.hypothesis")
+        .set(
+            "mesh.box",
+            "[{ name = 'lower', size = [1, 1, 1], cells = [3, 2, 2] }, \
+              { name = 'upper', corner = [0, 1, 0], size = [1, 1, 1], cells = [2, 3, 3] }, \
+              { name = 'right', corner = [1, 0, 0], size = [1, 2, 1], cells = [2, 5, 2] }]",
+        )
+        .set(
+            "support",
+            "[{ on = ['lower.left', 'upper.left'], fix = ['x'] }, \
+              { on = ['lower.bottom', 'upper.bottom', 'right.bottom'], fix = ['z'] }]",
+        )
+        .set(
+            "traction",
+            "[{ on = ['upper.back', 'right.back'], value = [0, -5, 0] }, { on = ['right.right'], value = [-3, 0, 0] }]",
+        )
+        .set("output.probe", "[{ name = 'corner', point = [2, 2, 1] }]")
+        .set("contact", &format!("[{}]", contacts.join(", ")))
+}
+
+/// Nodes of two contacts leave their part of the surface to neighbours, so that a uniform stress passes through.
+#[test]
+fn uniform_stress_passes_through_an_edge_at_which_three_blocks_meet() {
+    let frictionless = "normal = { unilateral = {} }";
+    let rough = "normal = { unilateral = {} }, friction = { coulomb = { coefficient = 0.3 } }";
+    for (dimension, law, order, ranks) in [
+        (2, frictionless, "1", 1),
+        (2, frictionless, "2", 2),
+        (2, rough, "1", 3),
+        (2, rough, "2", 1),
+        (3, frictionless, "1", 1),
+        (3, frictionless, "2", 2),
+        (3, rough, "1", 3),
+    ] {
+        let case = three_blocks_at_an_edge(dimension, law).set("mesh.order", order).run_and_keep(ranks);
+        let results = case.results();
+        let what = format!("{dimension}D, order {order}, {law}");
+        let table = results.table("resultants.csv");
+        let [top, side] = if dimension == 2 { ["bottom", "top"] } else { ["front", "back"] };
+        for (on, against, column, pressure) in [
+            (format!("upper.{top}"), format!("lower.{side}"), "force_y", 5.0),
+            ("upper.right".into(), "right.left".into(), "force_x", -3.0),
+            ("lower.right".into(), "right.left".into(), "force_x", -3.0),
+        ] {
+            let of = |source: String, column: &str| {
+                let table = table.only("source", &source);
+                *table.numbers(column).last().expect("a row")
+            };
+            let force = of(format!("contact {on}"), column);
+            assert!((force - pressure).abs() < 1e-9, "{what}: {on} {force} N");
+            let largest = of(format!("contact {on}"), "largest_pressure");
+            assert!((largest - pressure.abs()).abs() < 1e-9, "{what}: {on} {largest} Pa");
+            let area = of(format!("contact {on}"), "touching_area");
+            assert!((area - 1.0).abs() < 1e-9, "{what}: {on} {area} m2");
+            if against != "right.left" {
+                let opposite = of(format!("against {against}"), column);
+                assert!((opposite + pressure).abs() < 1e-9, "{what}: {against} {opposite} N");
+            }
+        }
+        // (-3 + 0.3 * 5) / 1000 * 2 and (-5 + 0.3 * 3) / 1000 * 2
+        for (column, expected) in [("displacement_x", -0.003), ("displacement_y", -0.0082)] {
+            let found = *results.table("probes.csv").numbers(column).last().expect("a row");
+            assert!((found - expected).abs() < 1e-11, "{what}: {column} {found} m");
+        }
+    }
+}
+
+#[test]
+fn laws_with_a_scale_do_not_act_at_nodes_of_two_contacts() {
+    let law = "normal = { compliance = { stiffness = 1e4 } }";
+    let words = "use `unilateral` with the friction `coulomb` or `tresca`, without wear, adhesion and memory, which leave such nodes to \
+                 their neighbours, or exclude the facets around it by the `where` of one of the tables";
+    three_blocks_at_an_edge(2, law).run_with(2, &[]).expect(2).says(words);
+    // As the message says.
+    three_blocks_at_an_edge(2, law)
+        .set("contact.1.where", "'y > 1.3'")
+        .set("contact.2.where", "'(y > 0.4)*(y < 0.6)'")
+        .run(1);
+}
+
+/// A node between two parts of a boundary that are against other boundaries.
+#[test]
+fn a_side_may_be_in_several_contacts_if_their_laws_have_no_scale() {
+    let parts = |law: &str| {
+        let part = |condition: &str| {
+            format!(
+                "{{ on = ['upper.bottom'], against = ['lower.top'], where = '{condition}', normal = {law} }}"
+            )
+        };
+        Case::of("pressed_blocks").set("contact", &format!("[{}, {}]", part("x < 0.5"), part("x > 0.5")))
+    };
+    for ranks in [1, 3] {
+        let case = parts("{ unilateral = {} }").run_and_keep(ranks);
+        let table = case.results().table("resultants.csv").only("time", "1");
+        for (column, expected) in [("largest_pressure", 5.0), ("touching_area", 0.5), ("force_y", 2.5)] {
+            for source in ["contact upper.bottom", "contact upper.bottom (2)"] {
+                let found = table.only("source", source).numbers(column)[0];
+                assert!((found - expected).abs() < 1e-9, "{source}: {column} {found}");
+            }
+        }
+    }
+    let words = "it also belongs to contact.";
+    parts("{ compliance = { stiffness = 1e4 } }").run_with(1, &[]).expect(2).says(words);
+}
+
+/// A block on another one, of 4 x 2 and 3 x 2 cells divided into triangles, with a common left end; the left side of the lower one is at this
+/// angle in degrees to that of the upper one.
+fn write_blocks_with_an_oblique_side(path: &Path, degrees: f64) {
+    let (mut nodes, mut facets, mut cells) = (Vec::new(), Vec::new(), Vec::new());
+    for (block, columns) in [(0, 3), (1, 4)] {
+        let first = nodes.len() + 1;
+        for j in 0..=2 {
+            let y = 0.5 * block as f64 + 0.25 * j as f64;
+            let left = if block == 0 { -(0.5 - y) * degrees.to_radians().tan() } else { 0.0 };
+            nodes.extend((0..=columns).map(|i| [left + (1.0 - left) * i as f64 / columns as f64, y]));
+        }
+        let at = |i: usize, j: usize| first + j * (columns + 1) + i;
+        for i in 0..columns {
+            facets.push((3 * block + 1, [at(i, 0), at(i + 1, 0)]));
+            facets.push((3 * block + 2, [at(i + 1, 2), at(i, 2)]));
+            for j in 0..2 {
+                cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        facets.extend((0..2).map(|j| (3 * block + 3, [at(0, j + 1), at(0, j)])));
+    }
+    facets.sort_unstable();
+    let names = ["lower.bottom", "lower.top", "lower.left", "upper.bottom", "upper.top", "upper.left"];
+    let mut text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n7\n".to_owned();
+    names.iter().enumerate().for_each(|(at, name)| text += &format!("1 {} \"{name}\"\n", at + 1));
+    text += "2 7 \"body\"\n$EndPhysicalNames\n$Entities\n0 6 1 0\n";
+    (1..=6).for_each(|curve| text += &format!("{curve} -1 0 0 1 1 0 1 {curve} 0\n"));
+    text += "1 -1 0 0 1 1 0 1 7 0\n$EndEntities\n$Nodes\n";
+    let count = nodes.len();
+    text += &format!("1 {count} 1 {count}\n2 1 0 {count}\n");
+    (1..=count).for_each(|tag| text += &format!("{tag}\n"));
+    nodes.iter().for_each(|[x, y]| text += &format!("{x} {y} 0\n"));
+    let total = facets.len() + cells.len();
+    text += &format!("$EndNodes\n$Elements\n7 {total} 1 {total}\n");
+    let mut tag = 0;
+    for of_curve in facets.chunk_by(|a, b| a.0 == b.0) {
+        text += &format!("1 {} 1 {}\n", of_curve[0].0, of_curve.len());
+        for (_, [a, b]) in of_curve {
+            tag += 1;
+            text += &format!("{tag} {a} {b}\n");
+        }
+    }
+    text += &format!("2 1 2 {}\n", cells.len());
+    for [a, b, c] in cells {
+        tag += 1;
+        text += &format!("{tag} {a} {b} {c}\n");
+    }
+    std::fs::write(path, text + "$EndElements\n").expect("written");
+}
+
+/// What is known of a velocity is relative to a known one along the same direction, whatever the angle between what supports hold.
+#[test]
+fn nodes_that_supports_hold_in_directions_that_differ_carry_no_law_that_needs_both() {
+    let differ = "supports hold it and what it faces along directions that differ";
+    for degrees in [0.0, 1.0, 5.0, 20.0] {
+        for friction in ["", ", friction = { coulomb = { coefficient = 0.3 } }"] {
+            for side in ["auto", "on", "against"] {
+                let sides = format!("on = ['lower.top'], against = ['upper.bottom'], side = '{side}'");
+                let case = Case::of("pressed_blocks")
+                    .without("region")
+                    .without("output.profile")
+                    .without("output.probe")
+                    .without("mesh.rectangle")
+                    .set("mesh.file", "'blocks.msh'")
+                    .set(
+                        "support",
+                        "[{ on = ['lower.bottom'], fix = ['y'] }, { on = ['lower.left', 'upper.left'], fix = 'normal' }]",
+                    )
+                    .set("contact", &format!("[{{ {sides}, normal = {{ unilateral = {{}} }}{friction} }}]"));
+                write_blocks_with_an_oblique_side(&case.folder().join("blocks.msh"), degrees);
+                let what = format!("{degrees} degrees, {side}{friction}");
+                // Without friction, the side matters that is held along the boundary: that of the upper block.
+                if degrees != 0.0 && (!friction.is_empty() || side == "on") {
+                    case.run_with(1, &[]).expect(2).says(differ);
+                    continue;
+                }
+                let results = case.run(1);
+                let table = results.table("resultants.csv").only("source", "contact lower.top");
+                let force = *table.numbers("force_y").last().expect("a row");
+                assert!((force + 5.0).abs() < 1e-9, "{what}: {force} N");
+                let force = *table.numbers("force_x").last().expect("a row");
+                assert!(
+                    force.abs() < if degrees == 0.0 { 1.5 } else { 1e-9 },
+                    "{what}: {force} N along the boundary"
+                );
+                let upper = if degrees != 0.0 { "nodes of upper.bottom carry the law" } else { "" };
+                assert!(log_of(&case).contains(upper), "{what}");
+            }
+        }
+    }
+}
+
 #[test]
 fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
     let swapped = |on: &str, against: &str| {
@@ -507,11 +891,22 @@ fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
             "only contact `against` another body",
         ),
         (
-            Case::of("pressed_blocks").set(
+            Case::of("pressed_blocks").set("contact.0.side", "'on'").set(
                 "support",
                 "[{ on = ['lower.bottom'], fix = 'all' }, { on = ['upper.left'], fix = 'all' }]",
             ),
-            "a support holds it along the normal, and not what it faces; exchange `on` and `against`",
+            "a support holds it along the normal, and not what it faces; delete `side`, or exchange `on` and `against`",
+        ),
+        (
+            Case::of("pressed_blocks").set(
+                "support",
+                "[{ on = ['lower.bottom', 'lower.right'], fix = 'all' }, { on = ['upper.left'], fix = 'all' }]",
+            ),
+            "a support holds it along the normal, and not what it faces; hold both bodies there in the same directions",
+        ),
+        (
+            Case::of("indented_block").set("contact.0.side", "'against'"),
+            "only contact `against` another body has two sides",
         ),
     ] {
         case.run_with(2, &[]).expect(2).says(words);

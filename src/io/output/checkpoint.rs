@@ -62,6 +62,9 @@ pub struct Header {
     /// slip along another body as a share of a facet.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub closeness: Vec<Vec<Option<f64>>>,
+    /// The contacts between bodies whose law acts at nodes of `against`, by their positions in the job.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exchanged: Vec<usize>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -111,6 +114,7 @@ impl Header {
                 .iter()
                 .map(|contact| contact.closeness_of_all(session).saved())
                 .collect(),
+            exchanged: exchanged(body),
             mesh: digest(body),
             physics: identity.physics.clone(),
         }
@@ -127,6 +131,29 @@ pub fn state_digest(path: &Path) -> Result<String> {
 pub fn start_state_of(path: &Path) -> Option<String> {
     let header = hdf5::File::open(path).and_then(|file| file.dataset("header")?.read_raw::<u8>()).ok()?;
     serde_json::from_slice::<Header>(&header).ok()?.start_state
+}
+
+/// The contacts of a job with these keys which the run that wrote a checkpoint had between the same surfaces, by their positions, each with
+/// whether the law acted at nodes of `against`. None if the file cannot be read. On one rank.
+pub fn sides_of(path: &Path, physics: &BTreeMap<String, String>) -> BTreeMap<usize, bool> {
+    let header = hdf5::File::open(path).and_then(|file| file.dataset("header")?.read_raw::<u8>());
+    let Some(header) = header.ok().and_then(|bytes| serde_json::from_slice::<Header>(&bytes).ok()) else {
+        return BTreeMap::new();
+    };
+    let surfaces = |keys: &BTreeMap<String, String>, number: usize| {
+        let of = |key: &str| keys.get(&format!("contact.{number}.{key}")).cloned();
+        of("against").map(|against| [Some(against), of("on"), of("where")])
+    };
+    let count = |keys: &BTreeMap<String, String>| {
+        (0..).take_while(|number| keys.contains_key(&format!("contact.{number}.on"))).count()
+    };
+    let there: Vec<_> = (0..count(&header.physics)).map(|number| surfaces(&header.physics, number)).collect();
+    let own = (0..count(physics)).filter_map(|number| {
+        let surfaces = surfaces(physics, number)?;
+        let before = there.iter().position(|other| other.as_ref() == Some(&surfaces))?;
+        Some((number, header.exchanged.contains(&before)))
+    });
+    own.collect()
 }
 
 /// Saves the state with its header. Collective, with the same outcome on all ranks.
@@ -479,7 +506,19 @@ fn check<const D: usize, const S: usize>(
     if header.mesh != digest(body) || header.dimension != D {
         return refuse("the mesh has changed since the checkpoint was written; start the run again".into());
     }
+    if header.exchanged != exchanged(body) {
+        return refuse(format!(
+            "version {} chose other sides of contact between bodies to carry the law; continue with that version, or start the run again \
+             without --restart",
+            header.version
+        ));
+    }
     Ok(header)
+}
+
+/// The contacts whose law acts at nodes of `against`.
+fn exchanged<const D: usize, const S: usize>(body: &Body<D, S>) -> Vec<usize> {
+    body.pairs.iter().filter(|pair| pair.exchange.is_some()).map(|pair| pair.contact).collect()
 }
 
 fn digest<const D: usize, const S: usize>(body: &Body<D, S>) -> String {

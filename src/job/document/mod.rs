@@ -13,7 +13,7 @@ mod parameters;
 mod time;
 
 pub use crate::laws::{
-    contact::{Contact, Quadrature, Sliding},
+    contact::{Contact, Quadrature, Side, Sliding},
     material::Material,
     schemes::Scheme,
 };

@@ -34,5 +34,5 @@ pub use obstacle_motion::{ObstacleMotion, Rate};
 pub use obstacle_sweep::Sweep;
 pub use obstacles::{Gap, Plane, Shape, Sphere};
 pub use polyline::Polyline;
-pub use table::{Contact, Quadrature, Sliding};
+pub use table::{Contact, Quadrature, Side, Sliding};
 pub use wear::Wear;

@@ -43,6 +43,28 @@ impl Sliding {
     }
 }
 
+/// The boundaries of contact between bodies at whose nodes the law acts, the slave side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// Those in `on`, unless supports hold nodes there and not what they face, or their mesh is clearly coarser: they face more than twice
+    /// as many nodes of `against` as they have themselves, in 3D more than four times as many. Then those in `against`, if supports do not
+    /// hold nodes there in the same way and, for a coarser mesh, no other contact has nodes of either side. The log names the choice. A run
+    /// that starts from another one (`[initial] from`) prefers the choice of that run.
+    #[default]
+    Auto,
+    /// Those in `on`.
+    On,
+    /// Those in `against`. Names, signs and the part that `where` selects stay those of `on`.
+    Against,
+}
+
+impl Side {
+    fn is_auto(&self) -> bool {
+        *self == Self::Auto
+    }
+}
+
 /// Boundaries that may touch an obstacle or another body, and their contact laws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -51,14 +73,17 @@ pub struct Contact {
     #[schemars(length(min = 1), example = ["bottom"])]
     pub on: Vec<String>,
     /// The names of the boundaries of other bodies that the boundaries `on` may touch, instead of a rigid obstacle. The law acts at nodes
-    /// of `on`, the slave side, on their velocity and displacement relative to the surface that they face along their normals in the
-    /// undeformed bodies; friction, adhesion, memory and wear as against an obstacle. Choose as `on` the side with the finer mesh, with
-    /// corners and without supports. The distance of the undeformed surfaces is that of the mesh, whose facets are straight; `gap` of the
-    /// normal law adds to it, so that a negative one is an interference, whose work counts as negative contact dissipation. Absent: an
-    /// obstacle or `gap`.
+    /// of one side, which `side` chooses, on their velocity and displacement relative to the surface that they face along their normals in
+    /// the undeformed bodies; friction, adhesion, memory and wear as against an obstacle. The better side is that of the softer body, or with
+    /// the finer mesh, with corners and without supports. The distance of the undeformed surfaces is that of the mesh, whose facets are
+    /// straight; `gap` of the normal law adds to it, so that a negative one is an interference, whose work counts as negative contact
+    /// dissipation. Absent: an obstacle or `gap`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1), example = ["top"])]
     pub against: Vec<String>,
+    /// The boundaries at whose nodes the law acts. All names and signs of outputs are those of `on` and `against`, whatever it is.
+    #[serde(default, skip_serializing_if = "Side::is_auto")]
+    pub side: Side,
     /// Whether the undeformed boundaries count as touching wherever they face each other, whatever their distance in the mesh: for curved
     /// boundaries that fit each other, but whose facets do not, as of a shaft in a bush. `gap` of the normal law is then the whole
     /// distance. Absent: the distance is that of the mesh.
@@ -127,6 +152,16 @@ impl Contact {
         }
     }
 
+    /// Whether its laws are the same for any multiple of displacements, gaps and velocities: constraints, and friction with a bound that
+    /// does not depend on the sliding.
+    pub fn is_without_scale(&self) -> bool {
+        let is_constraint = matches!(self.normal, NormalLaw::Unilateral(_));
+        let has_bound =
+            matches!(self.friction, None | Some(FrictionLaw::Tresca(_) | FrictionLaw::Coulomb(_)));
+        let keeps_more = self.wear.is_some() || self.adhesion.is_some() || self.memory.is_some();
+        is_constraint && has_bound && !keeps_more
+    }
+
     /// The moment that turns the obstacle.
     pub fn moment(&self) -> Option<&Scalar> {
         self.obstacle_load.as_ref().and_then(|load| load.moment.as_ref())
@@ -175,7 +210,10 @@ impl Contact {
             let of_distance = "only between bodies is the distance that of the mesh";
             let sliding = slides.then(|| LawFault::at_value("sliding", of_sliding, small));
             let closed = self.closed.then(|| LawFault::at_value("closed", of_distance, "delete the key"));
-            return sliding.into_iter().chain(closed).collect();
+            let of_side = "only contact `against` another body has two sides";
+            let is_given = self.side != Side::Auto;
+            let side = is_given.then(|| LawFault::at_value("side", of_side, "delete the key"));
+            return sliding.into_iter().chain(closed).chain(side).collect();
         }
         let other = "delete it, or delete `against`";
         let of_histories = "adhesion and memory belong to the surface that nodes faced first";

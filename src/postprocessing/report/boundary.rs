@@ -508,7 +508,7 @@ fn is_quantity(column: &str) -> bool {
 mod tests {
     use super::*;
     use crate::{
-        job::{Contact, Quadrature, Sliding},
+        job::{Contact, Quadrature, Side, Sliding},
         laws::{
             contact::{Compliance, NormalLaw},
             expression::Expression,
@@ -519,6 +519,7 @@ mod tests {
         let contact = Contact {
             on: vec!["bottom".into()],
             against: Vec::new(),
+            side: Side::Auto,
             closed: false,
             sliding: Sliding::Small,
             part: Some(Scalar::Expression(Expression::parse(part).expect("expression"))),

@@ -170,7 +170,7 @@ impl Law {
 mod tests {
     use super::*;
     use crate::{
-        job::{Quadrature, Scalar, Sliding},
+        job::{Quadrature, Scalar, Side, Sliding},
         laws::contact::{Bound, Compliance, DampedResponse, NormalLaw, Symmetry, Unilateral},
     };
 
@@ -180,6 +180,7 @@ mod tests {
         let contact = Contact {
             on,
             against: Vec::new(),
+            side: Side::Auto,
             closed: false,
             sliding: Sliding::Small,
             part: None,

@@ -157,7 +157,9 @@ fn weakest_side<const D: usize, const S: usize>(
         let values = all.local()?;
         let weaker = |(slave, masters): (u32, &[(u32, f64)])| {
             let along = |i: usize| {
-                let facing = masters.iter().map(|(master, share)| share * values[*master as usize * D + i]);
+                // Some shares may be negative.
+                let facing =
+                    masters.iter().map(|(master, share)| share.max(0.0) * values[*master as usize * D + i]);
                 facing.sum::<f64>().min(values[slave as usize * D + i])
             };
             (slave as usize, std::array::from_fn(along))

@@ -249,7 +249,7 @@ impl<const D: usize> Contact<D> {
 
     /// The gap in m of a point whose surface has `moved` along the normal and that an obstacle which forces move sees at `seen`.
     fn gap_of(&self, point: &Point<D>, time: f64, seen: &Vector<D>, moved: f64) -> Result<f64> {
-        Ok(self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
+        Ok(point.stretch * self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
     }
 
     /// Whether it is against another body.
@@ -279,7 +279,7 @@ impl<const D: usize> Contact<D> {
 
     /// Size of the boundary on this rank, in m^(D-1).
     pub fn area(&self) -> f64 {
-        self.points.iter().map(|point| point.weight).sum()
+        self.points.iter().map(Point::area).sum()
     }
 
     /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`

@@ -84,6 +84,8 @@ pub(super) struct Point<const D: usize> {
     pub distance: f64,
     /// Mean size in m of the facets around it, where it faces another body.
     pub facet_size: f64,
+    /// The ratio of its velocity relative to that body to the mean over the part of the surface for which it stands.
+    pub stretch: f64,
     /// Displacement in m relative to the body that it faces when it began to face it.
     pub faced_at: Vector<D>,
     /// The gap in m at the end of the step of the undeformed surface without wear.
@@ -136,6 +138,7 @@ impl<const D: usize> Point<D> {
             place: [0.0; D],
             distance: 0.0,
             facet_size: f64::INFINITY,
+            stretch: 1.0,
             faced_at: [0.0; D],
             reach: 0.0,
             moved: 0.0,
@@ -196,7 +199,12 @@ impl<const D: usize> Point<D> {
 
     /// A point at a node that faces another body, whose values are relative to that body.
     pub(super) fn paired(node: &PairedNode<D>, held: &Held<D>) -> Self {
-        Self { distance: node.distance, ..Self::nodal(held.whole(node.point()), held) }
+        Self { distance: node.distance, stretch: node.stretch, ..Self::nodal(held.whole(node.point()), held) }
+    }
+
+    /// The part of the surface for which it stands in m^(D-1).
+    pub(super) fn area(&self) -> f64 {
+        self.stretch * self.weight
     }
 
     /// The local number of its first node; a nodal point has no other.

@@ -60,18 +60,21 @@ impl<const D: usize> Contact<D> {
         for point in self.points.iter().filter(|point| point.carries(&self.law)) {
             let pressure = point.pressure_at(&self.law, Body, velocity);
             if pressure == 0.0 {
-                areas.open += point.weight;
+                areas.open += point.area();
             } else {
-                areas.touching += point.weight;
-                areas.pressure += point.weight * pressure;
+                areas.touching += point.area();
+                areas.pressure += point.area() * pressure;
                 areas.largest_pressure = larger(areas.largest_pressure, pressure);
             }
         }
-        for (motion, weight) in self.friction.iter().flat_map(|friction| friction.motions(Body, velocity)) {
-            match motion {
-                FrictionStatus::Sticks => areas.sticking += weight,
-                FrictionStatus::Slides => areas.slipping += weight,
-                FrictionStatus::Separated => {}
+        if let Some(friction) = &self.friction {
+            for ((motion, weight), tangential) in friction.motions(Body, velocity).zip(&friction.points) {
+                let area = self.points[tangential.at].stretch * weight;
+                match motion {
+                    FrictionStatus::Sticks => areas.sticking += area,
+                    FrictionStatus::Slides => areas.slipping += area,
+                    FrictionStatus::Separated => {}
+                }
             }
         }
         areas
@@ -96,7 +99,7 @@ impl<const D: usize> Contact<D> {
             let mut state =
                 PointState { normal: point.normal, direction: point.direction, ..PointState::default() };
             while let Some((tangential, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
-                state.sliding = sliding;
+                state.sliding = sliding.map(|speed| speed / point.stretch);
                 let (free, held) = tangential.parts_of(traction);
                 state.friction = add_scaled(&free, 1.0, &held);
                 state.sticks = motions.next().map(|(motion, _)| motion == FrictionStatus::Sticks);
@@ -114,7 +117,7 @@ impl<const D: usize> Contact<D> {
             }
             if self.law.depends_on_displacement() {
                 let [along, gap] = self.position_at(time, displacement, point)?;
-                state.gap = gap - along;
+                state.gap = (gap - along) / point.stretch;
             }
             visit(point.node(), state);
         }

@@ -25,7 +25,7 @@ pub const OVERRUN: f64 = 1e-6;
 fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
     let moved: Vector<D> = std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i]);
     let along = norm(&add_scaled(&moved, -dot(&moved, &point.normal), &point.normal));
-    along / point.facet_size
+    along / point.stretch / point.facet_size
 }
 
 impl<const D: usize> Contact<D> {
@@ -90,7 +90,7 @@ impl<const D: usize> Contact<D> {
         }
         let mut closeness = self.closeness;
         for point in &self.points {
-            let after = point.context.penetration + self.advance(point, Body, velocity);
+            let after = (point.context.penetration + self.advance(point, Body, velocity)) / point.stretch;
             if point.carries(&self.law) {
                 let presses = point.pressure_at(&self.law, Body, velocity) != 0.0;
                 closeness.penetration =
@@ -127,6 +127,7 @@ impl<const D: usize> Contact<D> {
         for (at, node) in nodes.iter().enumerate() {
             let point = &mut self.points[at];
             point.set_weight(node.weight);
+            point.stretch = node.stretch;
             let moved = std::array::from_fn(|i| displacement[point.node() * D + i]);
             (point.distance, point.faced_at) = (node.distance + dot(&moved, &point.normal), moved);
         }
@@ -166,8 +167,9 @@ impl<const D: usize> Contact<D> {
             if gap == f64::INFINITY {
                 gaps.without += 1;
             } else {
-                gaps.smallest = gaps.smallest.min(gap - along);
-                gaps.largest = gaps.largest.max(gap - along);
+                let open = (gap - along) / point.stretch;
+                gaps.smallest = gaps.smallest.min(open);
+                gaps.largest = gaps.largest.max(open);
             }
         }
         gaps

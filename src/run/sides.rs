@@ -1,0 +1,281 @@
+//! Which side of contact between bodies carries the law, and where supports prevent that.
+
+use crate::{
+    error::Result,
+    fem::{
+        coupling::{HELD_TOGETHER, held_share},
+        effect::Supports,
+        pairs::{Exchange, Pair, PairedNode},
+        space::{Held, facets},
+    },
+    job::{self, Job, Side},
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{Vector, add_scaled, dot, norm},
+    },
+    mesh::{Mesh, other_side},
+    parallel::{agreement::Agreed, exchange::gather, session::Session},
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Component of a unit direction along the normal of the law above which it counts as along the normal.
+const ALONG: f64 = 0.1;
+/// The same for the normal of the facets, which turns into a plane of symmetry.
+const ROUNDING: f64 = 1e-6;
+/// Length of the free part of a unit direction below which a node is held nearly along it.
+const NEARLY_HELD: f64 = 0.5;
+
+/// What the choice of a side depends on besides the meshes of both.
+#[derive(Debug)]
+pub(super) struct Circumstances<const D: usize> {
+    /// What supports hold on this rank.
+    held: Held<D>,
+    /// The directions in which they hold nodes of pairs on all ranks, orthonormal, by global numbers.
+    directions: BTreeMap<u32, Vec<Vector<D>>>,
+    /// The contacts that another run had from whose state this one starts, each with whether its sides were exchanged.
+    earlier: BTreeMap<usize, bool>,
+}
+
+impl<const D: usize> Circumstances<D> {
+    /// Those of the contacts of a job between bodies. Collective.
+    pub(super) fn of(
+        session: &Session,
+        job: &Job,
+        mesh: &Mesh<D>,
+        earlier: BTreeMap<usize, bool>,
+    ) -> Result<Self, Agreed> {
+        if job.contact.iter().all(|contact| contact.against.is_empty() || contact.side != Side::Auto) {
+            return Ok(Self { held: Held::default(), directions: BTreeMap::new(), earlier });
+        }
+        let layout = session.agree(DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts))?;
+        let held = session.agree(Supports::of_body(session, mesh, &job.support, &layout))?.held;
+        let names = job.contact.iter().flat_map(|contact| contact.on.iter().chain(&contact.against));
+        let nodes: BTreeSet<u32> =
+            facets(mesh, names).into_iter().flat_map(|facet| mesh.facet_nodes(facet)).collect();
+        let mut records = Vec::new();
+        for node in nodes {
+            let (frame, free) = held.frame(node as usize);
+            for direction in &frame[free..] {
+                records.push(f64::from(mesh.global_node(node)));
+                records.extend(direction);
+            }
+        }
+        let mut directions: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
+        for record in gather(session.world(), &records)?.chunks_exact(1 + D) {
+            let of_node = directions.entry(record[0] as u32).or_default();
+            let direction = std::array::from_fn(|i| record[1 + i]);
+            // Each rank that has the node tells the same.
+            if !of_node.contains(&direction) {
+                of_node.push(direction);
+            }
+        }
+        Ok(Self { held, directions, earlier })
+    }
+
+    /// Finds what the nodes of a pair face, on the side of the job's choice. Collective.
+    pub(super) fn form(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        job: &Job,
+        pair: Pair<D>,
+    ) -> Result<Pair<D>, Agreed> {
+        let contact = &job.contact[pair.contact];
+        let formed = |mut pair: Pair<D>| -> Result<Pair<D>, Agreed> {
+            pair.form(session, mesh, &mesh.nodes)?;
+            Ok(pair)
+        };
+        match contact.side {
+            Side::On => return formed(pair),
+            Side::Against => return formed(pair.exchanged(Exchange::Requested)),
+            Side::Auto => {}
+        }
+        let earlier = self.earlier.get(&pair.contact).copied();
+        let first = formed(match earlier {
+            Some(true) => pair.exchanged(Exchange::Continued),
+            _ => pair,
+        })?;
+        let is_held = |pair: &Pair<D>| session.total(self.conflicts(contact, pair)) > 0;
+        if is_held(&first) {
+            let other = formed(first.clone().exchanged(Exchange::Held))?;
+            return Ok(if is_held(&other) { first } else { other });
+        }
+        if earlier.is_none() && is_coarser(session, &first)? && !meets_another(session, mesh, job, &first)? {
+            let other = formed(first.clone().exchanged(Exchange::Coarser))?;
+            return Ok(if is_held(&other) { first } else { other });
+        }
+        Ok(first)
+    }
+
+    /// The number of nodes owned here whose law supports prevent.
+    fn conflicts(&self, contact: &job::Contact, pair: &Pair<D>) -> usize {
+        let free = |master: &u32, direction: &Vector<D>| -> f64 {
+            let held = self.directions.get(master).into_iter().flatten();
+            norm(&held.fold(*direction, |left, held| add_scaled(&left, -dot(held, direction), held)))
+        };
+        let nodes = pair.nodes.iter().filter(|node| {
+            let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
+                node.masters.iter().map(|(master, share)| (*share, free(master, direction))).collect()
+            };
+            conflict(node, &self.held, rubs(contact), facing).is_some()
+        });
+        nodes.count()
+    }
+
+    /// What the user should know about a choice that differs from that of the run from whose state this one starts.
+    pub(super) fn warnings(&self, pairs: &[Pair<D>]) -> Vec<String> {
+        let changed = pairs.iter().filter(|pair| {
+            self.earlier.get(&pair.contact).is_some_and(|earlier| *earlier != pair.exchange.is_some())
+        });
+        let words = |pair: &Pair<D>| {
+            format!(
+                "contact.{}: the other side carried the law in the run from which this one starts, because supports or `side` were \
+                 different: pressures, friction and histories of the contact start anew; give both jobs the same `side` to keep them",
+                pair.contact
+            )
+        };
+        changed.map(words).collect()
+    }
+}
+
+/// Whether the law of a contact depends on velocities or displacements along the boundary.
+pub(super) fn rubs(contact: &job::Contact) -> bool {
+    contact.friction.is_some() || contact.adhesion.is_some()
+}
+
+/// Why supports prevent the law at a node that faces another body, given for a direction the shares of what it faces with the lengths of
+/// the free parts of the direction there. A known velocity must be relative to known ones.
+pub(super) fn conflict<const D: usize>(
+    node: &PairedNode<D>,
+    held: &Held<D>,
+    rubs: bool,
+    facing: impl Fn(&Vector<D>) -> Vec<(f64, f64)>,
+) -> Option<&'static str> {
+    if node.masters.is_empty() {
+        return None;
+    }
+    let normal = held.whole(node.point()).normal;
+    let (frame, free) = held.frame(node.node as usize);
+    frame[free..].iter().find_map(|direction| {
+        let facing = facing(direction);
+        if held_share(facing.iter().copied()) >= HELD_TOGETHER {
+            return None;
+        }
+        let nearly: f64 = facing.iter().filter(|(_, free)| *free < NEARLY_HELD).map(|(share, _)| share).sum();
+        let is_oblique = nearly >= HELD_TOGETHER;
+        let is_along = dot(direction, &normal).abs() > ALONG;
+        let is_turned = is_oblique && dot(direction, &node.normal).abs() > ROUNDING;
+        (is_along || rubs || is_turned).then_some(match (is_oblique, is_along) {
+            (true, _) => "supports hold it and what it faces along directions that differ",
+            (_, true) => "a support holds it along the normal, and not what it faces",
+            _ => {
+                "a support holds it along the boundary, where friction or adhesion act, and not what it faces"
+            }
+        })
+    })
+}
+
+/// Whether the nodes of a pair face more than twice as many nodes as they are, in space more than four times as many. Collective.
+fn is_coarser<const D: usize>(session: &Session, pair: &Pair<D>) -> Result<bool, Agreed> {
+    let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty());
+    let slaves = session.total(facing.count());
+    let own: BTreeSet<u32> =
+        pair.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master).collect();
+    let own: Vec<u32> = own.into_iter().collect();
+    let masters: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
+    Ok(masters.len() > (1 << (D - 1)) * slaves)
+}
+
+/// Whether another contact has nodes of either side of a pair. Collective.
+fn meets_another<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    job: &Job,
+    pair: &Pair<D>,
+) -> Result<bool, Agreed> {
+    let nodes_of = |facets: &[u32]| -> Vec<u32> {
+        let nodes = facets.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+        nodes.map(|node| mesh.global_node(node)).collect()
+    };
+    let own = [nodes_of(&pair.on), nodes_of(&pair.against)].concat();
+    let own: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
+    let others = job.contact.iter().enumerate().filter(|(number, _)| *number != pair.contact);
+    let names: Vec<String> = others
+        .flat_map(|(_, other)| {
+            let faults = other.on.iter().map(|name| other_side(name));
+            other.on.iter().chain(&other.against).cloned().chain(faults)
+        })
+        .collect();
+    let others = nodes_of(&facets(mesh, &names));
+    Ok(session.total(others.iter().filter(|node| own.contains(node)).count()) > 0)
+}
+
+/// The lines of the log about exchanged sides.
+pub(super) fn lines<const D: usize>(job: &Job, pairs: &[Pair<D>]) -> Vec<String> {
+    let line = |pair: &Pair<D>| {
+        let job::Contact { on, against, .. } = &job.contact[pair.contact];
+        let [on, against] = [on, against].map(|names| names.join(", "));
+        let why = match pair.exchange? {
+            Exchange::Requested => "as `side` states".into(),
+            Exchange::Continued => "as in the run from which this one starts".into(),
+            Exchange::Held => format!("because supports hold nodes of {on}"),
+            Exchange::Coarser => format!("because the mesh of {on} is coarser"),
+        };
+        Some(format!("contact    contact.{}: nodes of {against} carry the law, {why}", pair.contact))
+    };
+    pairs.iter().filter_map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::coupling::is_held;
+
+    const ANGLES: [f64; 4] = [0.0, 1.0, 5.0, 20.0];
+
+    fn at(degrees: f64) -> Vector<2> {
+        [degrees.to_radians().cos(), degrees.to_radians().sin()]
+    }
+
+    /// A node with this normal that is held at the first angle to x and faces one that is held at the second one.
+    fn found(normal: Vector<2>, [own, other]: [f64; 2], rubs: bool) -> Option<&'static str> {
+        let mut held = Held::from(vec![false; 4]);
+        held.hold(0, [at(own)].into_iter());
+        held.hold(1, [at(other)].into_iter());
+        let masters = vec![(1, 1.0)];
+        let node = PairedNode { node: 0, normal, weight: 1.0, distance: 0.0, masters, stretch: 1.0 };
+        conflict(&node, &held, rubs, |direction| vec![(1.0, norm(&held.free_part(1, direction)))])
+    }
+
+    #[test]
+    fn a_known_velocity_is_relative_to_one_along_the_same_direction_or_does_not_matter() {
+        let differ = Some("supports hold it and what it faces along directions that differ");
+        for degrees in ANGLES {
+            let expected = if degrees == 0.0 { None } else { differ };
+            // With friction it matters whichever of both is oblique.
+            assert_eq!(found([0.0, -1.0], [degrees, 0.0], true), expected, "{degrees}");
+            assert_eq!(found([0.0, -1.0], [0.0, degrees], true), expected, "{degrees}");
+            assert_eq!(found([0.0, -1.0], [degrees; 2], true), None, "{degrees}");
+            // Without it, what is held along the boundary does not matter, and what has a part along the normal does.
+            assert_eq!(found([0.0, -1.0], [0.0, degrees], false), None, "{degrees}");
+            assert_eq!(found([0.0, -1.0], [degrees, 0.0], false), expected, "{degrees}");
+            assert_eq!(found([-1.0, 0.0], [degrees, 0.0], false), expected, "{degrees}");
+        }
+        let alone = "a support holds it along the normal, and not what it faces";
+        assert_eq!(found([-1.0, 0.0], [0.0, 90.0], false), Some(alone));
+        let along =
+            "a support holds it along the boundary, where friction or adhesion act, and not what it faces";
+        assert_eq!(found([0.0, -1.0], [0.0, 90.0], true), Some(along));
+        assert_eq!(found([0.0, -1.0], [0.0, 90.0], false), None);
+    }
+
+    #[test]
+    fn velocities_are_relative_where_supports_are_not_refused() {
+        for degrees in ANGLES {
+            let mut held = Held::<2>::from(vec![false; 4]);
+            held.hold(1, [at(degrees)].into_iter());
+            let free = norm(&held.free_part(1, &at(0.0)));
+            assert_eq!(is_held(free), found([0.0, -1.0], [0.0, degrees], true).is_none(), "{degrees}");
+        }
+    }
+}
