@@ -46,6 +46,8 @@ pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>,
     if material.is_damped_by_mass() && material.density.is_none() {
         table.fault("damping.mass", Damping::WITHOUT_DENSITY, format!("add {}", table.path("density")));
     }
+    let choice = material.viscosity.iter().flat_map(|law| law.faults_of_choice());
+    choice.for_each(|fault| table.refuse(Some(fault.within("viscosity"))));
     table.refuse(material.constant().fault_of_flow());
 }
 

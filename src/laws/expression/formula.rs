@@ -41,6 +41,8 @@ scopes! {
     OfSliding: V L P T X Y Z;
     /// Formulas of the von Mises stress and the accumulated viscoplastic strain.
     OfCreep: Q E;
+    /// Formulas of the equivalent strain rate.
+    OfRate: G;
 }
 
 /// A formula of a law, in the variables of its scope.
@@ -63,6 +65,11 @@ impl<S: Scope> Formula<S> {
             ));
         }
         Ok(Self { expression, scope: PhantomData })
+    }
+
+    /// This formula times a variable of its scope.
+    pub fn times(&self, variable: Variable) -> Result<Self, Fault> {
+        Self::parse(&format!("({})*{}", self.text(), variable.name()))
     }
 
     /// The formula as written.

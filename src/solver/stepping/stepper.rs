@@ -4,7 +4,6 @@ use super::{
     StepOutcome,
     contacts::{commit_tractions, keep_closeness, prepare_contacts, refuse_passage},
     factor_cache::nearest_cached_length,
-    flow::FlowStart,
     force_scale::ForceScale,
     integrator::Integrator,
     lagged_euler::refuse_fast_flow,
@@ -332,7 +331,7 @@ impl Stepper {
             forces: &self.right_hand_side,
             scale,
             rounding: self.integrator.rounding(session),
-            flow_start: self.integrator.flow_start(),
+            flow_start: self.integrator.flow_start(state, step.length),
         };
         if self.other_starts == 0 || problem.body.contacts.is_empty() {
             self.solver.solve(&mut problem, &mut self.trial)
@@ -366,8 +365,12 @@ impl Stepper {
         self.finish(body, state, step)?;
         self.trial.update_ghosts()?;
         let blend = self.integrator.blend(step.length);
-        let solved =
-            SolvedStep { step, velocity: &self.trial, flow_start: self.integrator.flow_start(), blend };
+        let solved = SolvedStep {
+            step,
+            velocity: &self.trial,
+            flow_start: self.integrator.flow_start(state, step.length),
+            blend,
+        };
         self.workspace.error(session, body, state, solved)
     }
 
@@ -403,7 +406,11 @@ impl Stepper {
         self.finish(body, state, step)?;
         let mut work = 0.0;
         if let Some(supports) = &mut self.moving_supports {
-            work = supports.work(session, body, step, &self.trial, self.integrator.flow_start())?;
+            if body.flows() {
+                self.trial.update_ghosts()?;
+            }
+            let start = self.integrator.flow_start(state, step.length);
+            work = supports.work(session, body, step, &self.trial, start)?;
         }
         let mut of_obstacles = Energy::default();
         for motion in driven(body) {
@@ -529,8 +536,7 @@ impl Stepper {
         }
         let forces = &mut self.right_hand_side;
         if let Some(supports) = &mut self.moving_supports {
-            let start = self.integrator.flow_start();
-            let start = start.unwrap_or(FlowStart { displacement: &state.displacement, length: step.length });
+            let start = self.integrator.flow_start(state, step.length);
             supports.impose(session, body, step, start, forces)?;
         }
         body.held.clear(&mut forces.owned_mut()?);
@@ -567,7 +573,7 @@ impl Stepper {
                 }
             }
         }
-        let start = self.integrator.flow_start().map_or(&state.displacement, |start| start.displacement);
+        let start = self.integrator.flow_start(state, step.length).displacement;
         Ok(session.agree(prepare_contacts(body, state, step, (blend, start)))?)
     }
 
