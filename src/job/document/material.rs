@@ -74,6 +74,9 @@ pub(in crate::job) fn check_in_body(
     table.refuse(material.constant().fault_of_viscosity(normal_strains));
     let orthotropic = material.orthotropic.iter().flat_map(|law| law.faults(dimension));
     orthotropic.for_each(|fault| table.refuse(Some(fault.within("orthotropic"))));
+    if hypothesis == Some(Hypothesis::PlaneStress) {
+        table.refuse(material.constant().fault_in_plane_stress());
+    }
     if hypothesis == Some(Hypothesis::PlaneStress) || mesh.order == 2 {
         return;
     }

@@ -39,8 +39,8 @@ scopes! {
     OfMotion: V D;
     /// Formulas of a sliding velocity, a slip distance, a pressure, time and place.
     OfSliding: V L P T X Y Z;
-    /// Formulas of the von Mises stress and the accumulated viscoplastic strain.
-    OfCreep: Q E;
+    /// Formulas of the von Mises stress, the mean stress and the accumulated viscoplastic strain.
+    OfCreep: Q P E;
     /// Formulas of the equivalent strain rate.
     OfRate: G;
 }

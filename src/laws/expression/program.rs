@@ -25,7 +25,7 @@ pub enum Variable {
     D,
     /// Slip distance in metres.
     L,
-    /// Contact pressure in Pa.
+    /// Contact pressure, or mean stress, in Pa.
     P,
     /// Von Mises norm of the stress in Pa.
     Q,

@@ -121,6 +121,12 @@ impl Material<f64> {
         Some(law.fault()?.within(law.name()).within("viscoplasticity"))
     }
 
+    /// The fault of the viscoplastic law in plane stress; its key is that of the table of the material.
+    pub fn fault_in_plane_stress(&self) -> Option<LawFault> {
+        let law = self.viscoplasticity.as_ref()?;
+        Some(law.fault_in_plane_stress()?.within(law.name()).within("viscoplasticity"))
+    }
+
     /// The numbers of its properties.
     pub fn numbers(&self) -> Numbers {
         [
