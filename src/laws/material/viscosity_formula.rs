@@ -241,6 +241,8 @@ mod tests {
                 3.0 + 7.0 * (401.0_f64.powf(-0.35) - 0.7 * 400.0 * 401.0_f64.powf(-1.35)),
             ),
             ("max(3, 5 - g)", 1.0),
+            ("if(g < 2, 5 - g, 3)", 1.0),
+            ("if(g < 0.3, 5, 4.7 + g)", 5.0),
         ] {
             let law = written(text, 10.0);
             assert_eq!(law.fault(), None, "{text}");
@@ -261,6 +263,7 @@ mod tests {
             ("min(5, 5/max(g, 1e-3))", "fall with the strain rate near g = ", "add a small constant"),
             ("g^(-0.4)", "no value near g = 0", "1e-3 + g"),
             ("if(g < 1, 2, 3)", "may jump with g", "interpolate"),
+            ("if(g < 1, 2, 2 + 1e-9*g)", "may jump with g", "interpolate"),
             ("ln(g)", "no value near g = 0", "every g"),
         ] {
             let fault = written(text, 10.0).fault().expect(text);

@@ -476,6 +476,8 @@ mod tests {
             "1e-3*sinh(q/2)",
             "8.5e-4*(q/1e-3)^2/(1 + e/0.1)",
             "q^1.5",
+            "if(q < 0.3, 0, (q - 0.1*3)^2)",
+            "if(q <= 20, 0, 1e-3*(q/20 - 1))",
         ] {
             assert_eq!(written(text).fault(), None, "{text}");
         }
