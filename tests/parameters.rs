@@ -333,6 +333,7 @@ translate = [1, 2, 3]
 density = 1
 elasticity = { youngs_modulus = 2, poisson_ratio = 0.25 }
 viscoplasticity.expression = { rate = 0, reference_stress = 5 }
+viscosity.expression = { shear = 3, bulk = 2, reference_rate = 6 }
 [time]
 end = 1
 step = 0.25

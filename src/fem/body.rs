@@ -477,6 +477,23 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
     }
 
+    /// The largest strain rate on this rank after a committed step as a share of that up to which certificates hold for viscosities that
+    /// are formulas; `None` if there are none, on all ranks alike.
+    pub fn rate_share(&self, state: &State) -> Result<Option<f64>> {
+        let called = self.called(|p| p.is_monotone);
+        if called.is_empty() {
+            return Ok(None);
+        }
+        let needs = Needs { strain_rate: true, ..Needs::default() };
+        let mut most = 0.0;
+        with_nodal(state, |nodal| {
+            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+                most = called.select(&self.effects).map(|effect| effect.rate_share(batch)).fold(most, larger);
+            });
+        })?;
+        Ok(Some(most))
+    }
+
     /// Keeps the histories before the last step from now on, as far as [`Body::stress_error`] or laws at the end of steps need them.
     pub fn keep_earlier(&mut self) {
         let evaluation = self.evaluation;

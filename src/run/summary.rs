@@ -92,6 +92,10 @@ pub struct Summary {
     /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds; to be compared with
     /// `certificates.slip_pressure_bound`.
     pub max_slip_pressure: Option<f64>,
+    /// Largest equivalent strain rate after any step over the reference rate, beyond which certificates do not hold; present if the
+    /// viscosity is a formula.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_rate_share: Option<f64>,
     /// Solutions found from other start values; present if any were tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guesses: Option<Guesses>,
@@ -156,6 +160,13 @@ impl Summary {
                 Digits(bound)
             )
         });
+        let rate = self.max_rate_share.filter(|share| *share > 1.0).map(|share| {
+            format!(
+                "strain rates reached {} times reference_rate of [material.viscosity.expression], beyond which the certificates do not \
+                 hold: raise reference_rate",
+                Digits(share)
+            )
+        });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {
             format!(
                 "the strain reached {:.3}, beyond {LARGEST_STRAIN}: the equations assume small strains and neglect the change of shape",
@@ -180,7 +191,7 @@ impl Summary {
                 100.0 * self.energy_of_scheme
             )
         });
-        slip.into_iter().chain(strain).chain(unresolved).chain(generated)
+        slip.into_iter().chain(rate).chain(strain).chain(unresolved).chain(generated)
     }
 }
 

@@ -430,6 +430,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             max_energy_imbalance: totals.max_energy_imbalance,
             energy_of_scheme: totals.energy_of_scheme(),
             max_slip_pressure: totals.max_slip_pressure,
+            max_rate_share: totals.max_rate_share,
             guesses: (totals.guessed_steps > 0).then_some(Guesses {
                 steps: totals.guessed_steps,
                 steps_with_several: totals.steps_with_several,

@@ -34,4 +34,5 @@ mod schemes;
 mod signals;
 mod stages;
 mod surfaces;
+mod viscosity;
 mod wear;

@@ -98,7 +98,7 @@ pub fn tangent(session: &Session, run: &mut Simulation<2, 4>, law: &str) -> bool
     let mut forces = |by: f64, tangents: Option<&mut Tangents>| {
         let at: Vec<f64> = point.iter().zip(direction.iter()).map(|(u, d)| u + by * d).collect();
         let mut forces = vec![0.0; at.len()];
-        cells.add_flow(&at, tangents, &mut forces);
+        cells.add_flow([&at, &[]], tangents, &mut forces);
         forces
     };
     let h = 1e-9;

@@ -5,8 +5,8 @@ use crate::{
     fem::{
         coupling::{Coupling, add_between, seen_by_contacts},
         effect::{
-            Contact, ContactNode, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents,
-            Term, contact_nodes,
+            Contact, ContactNode, Effect, Energy, Evaluation, Outcome, Step, SurfaceEffect, Tangents, Term,
+            contact_nodes,
         },
         space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, nodal_forces, offsets},
     },
@@ -43,19 +43,30 @@ impl<const D: usize, const S: usize> Body<D, S> {
         (cells, contacts)
     }
 
-    /// Whether implicit steps are nonlinear without contact: cells flow or are damaged, or there are effects at the surface.
+    /// Whether steps are nonlinear without contact: cells flow, are damaged or have a nonlinear viscosity, or there are effects at the
+    /// surface.
     pub fn flows(&self) -> bool {
-        !self.is_explicit() && (!self.surface_effects.is_empty() || !self.called(|p| p.end).is_empty())
+        self.surface_acts() || !self.called(|p| p.end.is_some()).is_empty()
     }
 
-    /// Whether implicit steps are nonlinear without contact by flow alone, without damage and effects at the surface.
+    /// Whether the same holds without what is monotone: steps may then be softer than their matrix.
+    pub fn flows_beside_viscosity(&self) -> bool {
+        self.surface_acts() || !self.called(|p| p.end.is_some() && !p.is_monotone).is_empty()
+    }
+
+    /// Whether steps are nonlinear without contact by cells alone, without damage and effects at the surface.
     pub fn only_cells_flow(&self) -> bool {
-        self.flows() && self.surface_effects.is_empty() && self.called(|p| p.end && p.weakens).is_empty()
+        self.flows() && !self.surface_acts() && self.called(|p| p.end.is_some() && p.weakens).is_empty()
     }
 
-    /// Whether implicit steps are nonlinear without contact by effects at the surface alone.
+    /// Whether steps are nonlinear without contact by effects at the surface alone.
     pub fn only_surface_acts(&self) -> bool {
-        self.flows() && self.called(|p| p.end).is_empty()
+        self.flows() && self.called(|p| p.end.is_some()).is_empty()
+    }
+
+    /// Whether effects at the surface beside contact are evaluated at the end of steps.
+    fn surface_acts(&self) -> bool {
+        !self.is_explicit() && !self.surface_effects.is_empty()
     }
 
     /// The nodes of this rank at which contact laws and effects at the surface act in a step, with the directions in which they do.
@@ -66,7 +77,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Names of the effects, without contact, whose forces at the end of an implicit step may fall with the displacement.
     pub fn softening(&self) -> impl Iterator<Item = &'static str> {
-        let cells = self.called(|p| p.end && p.weakens).select(&self.effects).map(|e| e.name());
+        let cells = self.called(|p| p.end.is_some() && p.weakens).select(&self.effects).map(|e| e.name());
         let surface = self.surface_effects.iter().filter(|e| !self.is_explicit() && e.softens());
         cells.chain(surface.map(|e| e.name()))
     }
@@ -89,7 +100,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let (called, needs) = cells.flowing();
         // Energies of damage need the stresses of the evaluation as well.
         let is_evaluated = !needs.elastic_stress && cells.evaluated[..] == *nodal.displacement;
-        let needs = Needs { strain_before: true, strain_rate: true, ..needs };
+        let needs = Needs { strain: true, strain_before: true, strain_rate: true, ..needs };
         let mut outcome = Outcome::default();
         Batch::for_all(cells.mesh, cells.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             if needs.elastic_stress {
@@ -113,6 +124,11 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
         (self.held, self.coupling)
     }
 
+    /// Whether the velocity at the end of a step decides stresses, beside the displacement.
+    pub fn need_rates(&self) -> bool {
+        self.flowing().1.strain_rate
+    }
+
     /// Whether the derivative of the flow is symmetric in all cells.
     pub fn has_symmetric_tangent(&self) -> bool {
         let is_skew = |term| matches!(term, Term::Flow(flow) if !flow.has_symmetric_tangent);
@@ -121,9 +137,9 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
 
     /// The effects that are evaluated at the end of a step, and their needs.
     fn flowing(&self) -> (Called, Needs) {
-        let called = |holds: fn(Phases) -> bool| Called::of(&*self.effects, self.evaluation, holds);
-        let elastic_stress = !called(|p| p.end && p.weakens).is_empty();
-        (called(|p| p.end), Needs { strain: true, elastic_stress, ..Needs::default() })
+        let needs = self.effects.iter().filter_map(|effect| effect.phases(self.evaluation).end);
+        let called = Called::of(&*self.effects, self.evaluation, |p| p.end.is_some());
+        (called, needs.reduce(Needs::or).unwrap_or_default())
     }
 
     /// Lets the cells of a batch flow and be damaged at the end of a step.
@@ -143,11 +159,12 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
         }
     }
 
-    /// Adds the forces of what flow and damage take from the stress at this displacement, and minus the forces at the surface, to
-    /// `forces` (both with ghosts); writes trial histories and, where they are wanted, the derivatives in place of those before.
+    /// Adds the forces of what flow and damage take from the stress at this displacement, and of what a nonlinear viscosity adds to it at
+    /// this velocity, which is read if stresses [need it](Self::need_rates), and minus the forces at the surface, to `forces` (all with
+    /// ghosts); writes trial histories and, where they are wanted, the derivatives in place of those before.
     pub fn add_flow(
         &mut self,
-        displacement: &[f64],
+        [displacement, velocity]: [&[f64]; 2],
         mut tangents: Option<&mut Tangents>,
         forces: &mut [f64],
     ) {
@@ -155,17 +172,19 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
             tangents.restart::<S>(self.geometry.point_count());
         }
         let mut outcome = Outcome { tangents, ..Outcome::default() };
-        let seen = seen_by_contacts(self.coupling, self.held, displacement);
-        add_between(self.coupling, self.held, forces, |forces| {
-            for effect in self.surface_effects.iter_mut() {
-                effect.evaluate(self.evaluation, self.step, &seen, forces, &mut outcome);
-            }
-        });
+        if self.evaluation != Evaluation::Converged {
+            let seen = seen_by_contacts(self.coupling, self.held, displacement);
+            add_between(self.coupling, self.held, forces, |forces| {
+                for effect in self.surface_effects.iter_mut() {
+                    effect.evaluate(self.evaluation, self.step, &seen, forces, &mut outcome);
+                }
+            });
+        }
         let (called, needs) = self.flowing();
         if called.is_empty() {
             return;
         }
-        let (mesh, nodal) = (self.mesh, Nodal::all(displacement));
+        let (mesh, nodal) = (self.mesh, Nodal { velocity, ..Nodal::all(displacement) });
         Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             self.evaluate(called, needs, batch, &mut outcome);
             if outcome.has_flowed || batch.holds_forces() {
@@ -265,7 +284,7 @@ mod tests {
         let mut forces = |factor: f64, tangents: Option<&mut Tangents>| {
             let moved: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u + factor * length * v).collect();
             let mut forces = vec![0.0; count];
-            cells.add_flow(&moved, tangents, &mut forces);
+            cells.add_flow([&moved, &[]], tangents, &mut forces);
             forces
         };
         let small = 1e-6;

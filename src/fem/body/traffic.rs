@@ -38,7 +38,7 @@ impl PassBytes {
         let explicit = body.needs(|p| p.start).map_or(0, |needs| {
             let histories = histories(|p| match p {
                 Phases { start: None, .. } => Moved::Nothing,
-                Phases { end: true, .. } => Moved::Converged,
+                Phases { end: Some(_), .. } => Moved::Converged,
                 _ => Moved::All,
             });
             cells + (fields(needs) + 2) * field + histories
@@ -50,7 +50,8 @@ impl PassBytes {
             });
             cells + fields(needs) * field + histories
         });
-        let finish = cells + 3 * field + histories(|p| if p.end { Moved::All } else { Moved::Nothing });
+        let finish =
+            cells + 3 * field + histories(|p| if p.end.is_some() { Moved::All } else { Moved::Nothing });
         Self { explicit: explicit as u64, finish: finish as u64, energy: energy as u64 }
     }
 }

@@ -143,7 +143,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         let is_explicit = at == Evaluation::Converged;
         Phases {
             start: is_explicit.then_some(stress),
-            end: !is_explicit,
+            end: (!is_explicit).then_some(stress),
             error: Some(stress),
             weakens: true,
             ..Phases::default()

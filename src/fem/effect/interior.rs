@@ -6,8 +6,9 @@ use crate::fem::space::{Batch, Needs};
 pub struct Phases {
     /// Is evaluated at the start of a step; what that needs.
     pub start: Option<Needs>,
-    /// Is evaluated at the end of an implicit step, for each iterate.
-    pub end: bool,
+    /// Is evaluated at the end of a step, for each iterate: what that needs. Only what is implicit under each scheme is evaluated there
+    /// if laws are evaluated at the converged state.
+    pub end: Option<Needs>,
     /// Adds to the energy balance after the commit; what that needs.
     pub energy: Option<Needs>,
     /// Adds to the total stress that is written to files; what that needs.
@@ -16,6 +17,8 @@ pub struct Phases {
     pub error: Option<Needs>,
     /// Weakens the elastic stress of other effects.
     pub weakens: bool,
+    /// Adds a monotone function of the strain rate at the end of a step, and nothing else there: steps are not softer than their matrix.
+    pub is_monotone: bool,
 }
 
 /// An effect of the body's interior. Calls are made for each batch of cells, and only in the phases that the effect names.
@@ -33,13 +36,13 @@ pub trait Effect<const D: usize, const S: usize> {
 
     /// Evaluates its law and writes its trial history.
     ///
-    /// At the start of a step it adds stress or force to the batch, given the converged or the blended state. At the end of an implicit
-    /// step it adds minus the stress that flow or damage takes from that of the constant matrix, given the strain there, and its
-    /// derivatives by the velocity, where the outcome takes them; flow also takes what it releases from the elastic stress of the batch,
+    /// At the start of a step it adds stress or force to the batch, given the converged or the blended state. At the end of a step it
+    /// adds minus the stress that flow or damage takes from that of the constant matrix, given the strain there, or minus the stress that
+    /// a nonlinear viscosity adds to it, given the strain rate, and derivatives by the velocity, where the outcome takes them; flow also takes what it releases from the elastic stress of the batch,
     /// where that is present.
     ///
     /// Effects that weaken also weaken the batch as their trial history has it: at the start they are evaluated before the others, at
-    /// the end they come last in the body's list.
+    /// the end they come after those that they weaken in the body's list.
     fn evaluate(&mut self, _at: Evaluation, _step: Step, _batch: &mut Batch<D, S>, _outcome: &mut Outcome) {}
 
     /// Adds its part of the elastic stress of the converged displacement and history, to `elastic_stress` of the batch;
@@ -54,6 +57,12 @@ pub trait Effect<const D: usize, const S: usize> {
 
     /// Adds its energies after the commit.
     fn add_energy(&self, _at: Evaluation, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
+
+    /// The largest strain rate after the commit as a share of that up to which the constant matrix is not stiffer than what is monotone;
+    /// called if it is.
+    fn rate_share(&self, _batch: &Batch<D, S>) -> f64 {
+        0.0
+    }
 
     /// Adds the energies of an implicit step that was solved, evaluated at its end and not yet committed: what flow and damage take up,
     /// and the scheme's own terms of the elastic energy. The batch has the strains and elastic stresses before the step and after it,

@@ -24,6 +24,7 @@ mod load;
 mod mass;
 mod mass_damping;
 mod node_history;
+mod nonlinear_viscosity;
 mod outcome;
 mod peaks;
 mod redistributed_mass;
@@ -65,6 +66,7 @@ pub use initial_stress::InitialStress;
 pub use interior::{Effect, Phases};
 pub use load::{Gravity, Load, Traction, WORK};
 pub use mass_damping::MassDamping;
+pub use nonlinear_viscosity::NonlinearViscosity;
 pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use redistributed_mass::RedistributedMass;
@@ -144,6 +146,10 @@ pub fn effects<const D: usize, const S: usize>(
     let damage = |m: &Material<f64>| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
     if let Some(laws) = by_material(materials, damage) {
         effects.push(Box::new(Damage::new(laws, geometry)));
+    }
+    // After those that damage weakens.
+    if let Some(laws) = by_material(materials, Material::rate_viscosity) {
+        effects.push(Box::new(NonlinearViscosity { laws }));
     }
     Ok(effects)
 }

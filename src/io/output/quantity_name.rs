@@ -41,7 +41,7 @@ impl<'a> TableQuantity<'a> {
 }
 
 /// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 23] = [
+const OF_SUMMARY: [&str; 24] = [
     "ranks",
     "dimension",
     "cells",
@@ -64,6 +64,7 @@ const OF_SUMMARY: [&str; 23] = [
     "max_residual",
     "max_energy_imbalance",
     "max_slip_pressure",
+    "max_rate_share",
     "peak_memory_bytes",
 ];
 

@@ -46,6 +46,8 @@ pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>,
     if material.is_damped_by_mass() && material.density.is_none() {
         table.fault("damping.mass", Damping::WITHOUT_DENSITY, format!("add {}", table.path("density")));
     }
+    let choice = material.viscosity.iter().flat_map(|law| law.faults_of_choice());
+    choice.for_each(|fault| table.refuse(Some(fault.within("viscosity"))));
     table.refuse(material.constant().fault_of_flow());
 }
 
@@ -72,6 +74,9 @@ pub(in crate::job) fn check_in_body(
     table.refuse(material.constant().fault_of_viscosity(normal_strains));
     let orthotropic = material.orthotropic.iter().flat_map(|law| law.faults(dimension));
     orthotropic.for_each(|fault| table.refuse(Some(fault.within("orthotropic"))));
+    if hypothesis == Some(Hypothesis::PlaneStress) {
+        table.refuse(material.constant().fault_in_plane_stress());
+    }
     if hypothesis == Some(Hypothesis::PlaneStress) || mesh.order == 2 {
         return;
     }

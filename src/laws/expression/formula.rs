@@ -1,6 +1,6 @@
 //! Laws written in the job: formulas in variables of their own, with derivatives and proven bounds.
 
-use super::analysis::{Border, Place, Supremum, Unproven};
+use super::analysis::{Border, Place, REACH, Supremum, Unproven};
 use super::enclosure::{Enclosure, Ranges};
 use super::evaluate::{Arguments, COUNT};
 use super::interval::Interval;
@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize, Serializer};
 use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
+
+/// Share of a value that is rounding where two pieces of a formula meet.
+const ROUNDING: f64 = 1e-12;
 
 /// The variables of a family of formulas.
 pub trait Scope: fmt::Debug + Copy + PartialEq {
@@ -39,8 +42,10 @@ scopes! {
     OfMotion: V D;
     /// Formulas of a sliding velocity, a slip distance, a pressure, time and place.
     OfSliding: V L P T X Y Z;
-    /// Formulas of the von Mises stress and the accumulated viscoplastic strain.
-    OfCreep: Q E;
+    /// Formulas of the von Mises stress, the mean stress and the accumulated viscoplastic strain.
+    OfCreep: Q P E;
+    /// Formulas of the equivalent strain rate.
+    OfRate: G;
 }
 
 /// A formula of a law, in the variables of its scope.
@@ -63,6 +68,11 @@ impl<S: Scope> Formula<S> {
             ));
         }
         Ok(Self { expression, scope: PhantomData })
+    }
+
+    /// This formula times a variable of its scope.
+    pub fn times(&self, variable: Variable) -> Result<Self, Fault> {
+        Self::parse(&format!("({})*{}", self.text(), variable.name()))
     }
 
     /// The formula as written.
@@ -100,10 +110,25 @@ impl<S: Scope> Formula<S> {
         self.expression.program.borders(&whole(ranges), along)
     }
 
-    /// Whether a function that jumps depends on this variable: it may or may not jump with it.
+    /// Whether it may jump with this variable: a function that jumps depends on it, unless this is the only variable and the formula has
+    /// the same value on both sides of each border.
     pub fn jumps_along(&self, variable: Variable) -> bool {
         let all = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
-        self.expression.program.enclose(&[all; COUNT], variable).may_jump
+        let may_jump = self.expression.program.enclose(&[all; COUNT], variable).may_jump;
+        let others = || S::VARIABLES.iter().any(|other| *other != variable && self.uses(*other));
+        may_jump && (others() || !self.meets_at_borders(variable))
+    }
+
+    /// Whether its values on both sides of each border along this variable are equal but for rounding, where all others are 0.
+    fn meets_at_borders(&self, variable: Variable) -> bool {
+        let meets = |ends: Border| {
+            let [[below, rise], [above, slope]] =
+                ends.map(|end| self.differentiate(&[(variable, end)], variable));
+            let size = below.abs() + above.abs() + ends[1].abs() * (rise.abs() + slope.abs());
+            (above - below).abs() <= ROUNDING * size
+        };
+        let borders = self.borders(&[(variable, Interval::new(-REACH, REACH))], variable);
+        borders.is_ok_and(|borders| borders.into_iter().all(meets))
     }
 
     /// The largest value of a part of its enclosures, such as its values or its derivatives by one variable, in any of these ranges, from

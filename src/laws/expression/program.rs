@@ -25,12 +25,14 @@ pub enum Variable {
     D,
     /// Slip distance in metres.
     L,
-    /// Contact pressure in Pa.
+    /// Contact pressure, or mean stress, in Pa.
     P,
     /// Von Mises norm of the stress in Pa.
     Q,
     /// Accumulated viscoplastic strain.
     E,
+    /// Equivalent strain rate in 1/s.
+    G,
 }
 
 impl Variable {
@@ -38,11 +40,11 @@ impl Variable {
     pub const OF_TIME_AND_PLACE: &[Self] = &[Self::T, Self::X, Self::Y, Self::Z];
     /// All, in their order.
     pub const ALL: &[Self] =
-        &[Self::T, Self::X, Self::Y, Self::Z, Self::V, Self::D, Self::L, Self::P, Self::Q, Self::E];
+        &[Self::T, Self::X, Self::Y, Self::Z, Self::V, Self::D, Self::L, Self::P, Self::Q, Self::E, Self::G];
 
     /// Its name in expressions.
     pub fn name(self) -> &'static str {
-        ["t", "x", "y", "z", "v", "d", "l", "p", "q", "e"][self as usize]
+        ["t", "x", "y", "z", "v", "d", "l", "p", "q", "e", "g"][self as usize]
     }
 }
 

@@ -1,6 +1,6 @@
 //! Materials whose properties vary with place.
 
-use super::{Elasticity, Material, Viscoplasticity, Viscosity};
+use super::{Elasticity, Material, Viscoplasticity};
 use crate::laws::{expression::Scalar, law::LawFault};
 
 /// The number of properties that may be expressions.
@@ -37,8 +37,8 @@ impl Material {
         [
             self.density.as_ref(),
             self.elasticity.as_ref().map(|law| &law.youngs_modulus),
-            self.viscosity.as_ref().map(|law| &law.volumetric),
-            self.viscosity.as_ref().map(|law| &law.shear),
+            self.viscosity.as_ref().and_then(|law| law.volumetric.as_ref()),
+            self.viscosity.as_ref().and_then(|law| law.shear.as_ref()),
             self.viscoplasticity.as_ref().and_then(Viscoplasticity::yield_stress),
         ]
     }
@@ -94,14 +94,13 @@ impl Material {
     /// The material with these numbers; properties that are absent stay absent.
     pub fn with(&self, [density, modulus, volumetric, shear, yield_stress]: Numbers) -> Material<f64> {
         let elasticity = self.elasticity.as_ref().zip(modulus);
-        let viscosity = self.viscosity.as_ref().and(volumetric.zip(shear));
         let flow = self.viscoplasticity.as_ref();
         Material {
             hypothesis: self.hypothesis,
             density: self.density.as_ref().and(density),
             elasticity: elasticity
                 .map(|(law, youngs_modulus)| Elasticity { youngs_modulus, poisson_ratio: law.poisson_ratio }),
-            viscosity: viscosity.map(|(volumetric, shear)| Viscosity { volumetric, shear }),
+            viscosity: self.viscosity.as_ref().and_then(|law| law.with(volumetric, shear)),
             viscoplasticity: flow.map(|law| law.with_yield_stress(yield_stress.unwrap_or(0.0))),
             damping: self.damping,
             orthotropic: self.orthotropic,
@@ -113,7 +112,7 @@ impl Material {
 impl Material<f64> {
     /// The fault of the viscosity in a body with as many normal strains: two in the plane; its key is that of the table of the material.
     pub fn fault_of_viscosity(&self, normal_strains: usize) -> Option<LawFault> {
-        Some(self.viscosity?.fault(normal_strains)?.within("viscosity"))
+        Some(self.viscosity.as_ref()?.fault(normal_strains)?.within("viscosity"))
     }
 
     /// The fault of the viscoplastic law; its key is that of the table of the material.
@@ -122,13 +121,19 @@ impl Material<f64> {
         Some(law.fault()?.within(law.name()).within("viscoplasticity"))
     }
 
+    /// The fault of the viscoplastic law in plane stress; its key is that of the table of the material.
+    pub fn fault_in_plane_stress(&self) -> Option<LawFault> {
+        let law = self.viscoplasticity.as_ref()?;
+        Some(law.fault_in_plane_stress()?.within(law.name()).within("viscoplasticity"))
+    }
+
     /// The numbers of its properties.
     pub fn numbers(&self) -> Numbers {
         [
             self.density,
             self.elasticity.map(|law| law.youngs_modulus),
-            self.viscosity.map(|law| law.volumetric),
-            self.viscosity.map(|law| law.shear),
+            self.viscosity.as_ref().and_then(|law| law.volumetric),
+            self.viscosity.as_ref().and_then(|law| law.shear),
             self.viscoplasticity.as_ref().and_then(|law| law.yield_stress().copied()),
         ]
     }
@@ -139,7 +144,7 @@ mod tests {
     use super::*;
     use crate::laws::{
         expression::Expression,
-        material::{DruckerPrager, Metric, Perzyna},
+        material::{DruckerPrager, Metric, Perzyna, Viscosity},
     };
 
     fn of(text: &str) -> Scalar {
@@ -151,7 +156,7 @@ mod tests {
             hypothesis: None,
             density: Some(Scalar::Number(3.0)),
             elasticity: Some(Elasticity { youngs_modulus: of("10 - y"), poisson_ratio: 0.25 }),
-            viscosity: Some(Viscosity { volumetric: of("-x"), shear: of("4") }),
+            viscosity: Some(Viscosity::linear(of("-x"), of("4"))),
             orthotropic: None,
             damping: None,
             viscoplasticity: None,

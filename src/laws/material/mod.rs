@@ -14,6 +14,7 @@ mod local;
 mod orthotropic;
 mod viscoplasticity;
 mod viscosity;
+mod viscosity_formula;
 
 use crate::laws::expression::Scalar;
 use schemars::JsonSchema;
@@ -29,6 +30,7 @@ pub use local::Numbers;
 pub use orthotropic::Orthotropic;
 pub use viscoplasticity::*;
 pub use viscosity::Viscosity;
+pub use viscosity_formula::{RateViscosity, ViscosityFormula};
 
 /// A material: as in the job, where some properties may vary with place, or with the numbers of a point (`Material<f64>`). An effect is
 /// simulated only if its table or key is present.
@@ -54,7 +56,7 @@ pub struct Material<N = Scalar> {
     /// Absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orthotropic: Option<Orthotropic>,
-    /// Linear viscosity. Absent: no viscous stress.
+    /// Viscosity. Absent: no viscous stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscosity: Option<Viscosity<N>>,
     /// Rayleigh damping. Absent: none.
@@ -114,9 +116,9 @@ impl<N> Material<N> {
 }
 
 impl Material<f64> {
-    /// The viscosity tensor `A` in Pa s, with the part of the damping.
+    /// The viscosity tensor `A` in Pa s, with the part of the damping; of a formula its linear part.
     pub fn viscosity_tensor(&self, hypothesis: Hypothesis) -> Option<Isotropic> {
-        let own = self.viscosity.map(|viscosity| viscosity.tensor());
+        let own = self.viscosity.as_ref().map(|viscosity| viscosity.tensor(hypothesis));
         let factor = self.stiffness_damping();
         let Some(elasticity) = self.elasticity.filter(|_| factor > 0.0) else { return own };
         let (own, elastic) = (own.unwrap_or_default(), elasticity.tensor(hypothesis));
@@ -124,6 +126,11 @@ impl Material<f64> {
             volumetric: own.volumetric + factor * elastic.volumetric,
             shear: own.shear + factor * elastic.shear,
         })
+    }
+
+    /// What the viscous stress adds to that of [`viscosity_tensor`](Self::viscosity_tensor), if it is not linear.
+    pub fn rate_viscosity(&self) -> Option<RateViscosity> {
+        self.viscosity.as_ref()?.expression.as_ref()?.rest()
     }
 
     /// The force per volume and velocity in kg/(m^d s).
@@ -160,7 +167,7 @@ mod tests {
         };
         close(damped.viscosity_tensor(Hypothesis::Space), [20.0, 40.0]);
         close(damped.viscosity_tensor(Hypothesis::PlaneStress), [40.0 / 3.0, 40.0]);
-        let viscosity = Some(Viscosity { volumetric: -1.0, shear: 5.0 });
+        let viscosity = Some(Viscosity::linear(-1.0, 5.0));
         close(Material { viscosity, ..damped }.viscosity_tensor(Hypothesis::PlaneStrain), [19.0, 45.0]);
     }
 

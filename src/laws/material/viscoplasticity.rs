@@ -96,6 +96,13 @@ macro_rules! laws {
                 }
             }
 
+            /// See [`Parameters::fault_in_plane_stress`].
+            pub fn fault_in_plane_stress(&self) -> Option<LawFault> {
+                match self {
+                    $(Self::$law(law) => law.fault_in_plane_stress(),)*
+                }
+            }
+
             /// See [`Parameters::has_back_stress`].
             pub fn has_back_stress(&self) -> bool {
                 match self {
@@ -136,7 +143,7 @@ laws! {
     DruckerPrager<N> = "drucker_prager",
     /// Norton's creep: the creep rate is a power of the stress, without a yield stress, with optional strain hardening.
     Norton = "norton",
-    /// Creep at a rate that is a formula of von Mises stress and accumulated creep strain.
+    /// Creep at a rate that is a formula of von Mises stress, mean stress and accumulated creep strain.
     CreepFormula = "expression",
 }
 

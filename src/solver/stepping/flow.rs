@@ -11,6 +11,8 @@ use crate::{
 /// Work vectors and tangents.
 pub(super) struct Flow {
     values: DistributedVector,
+    /// Velocities with ghosts, where stresses need them.
+    velocities: Vec<f64>,
     forces: DistributedVector,
     /// The nodes that vectors of Newton's method contain; all if absent.
     part: Option<Part>,
@@ -65,6 +67,7 @@ impl Flow {
     fn with(like: &DistributedVector, motions: &DistributedVector, part: Option<Part>) -> Result<Self> {
         Ok(Self {
             values: like.like()?,
+            velocities: Vec::new(),
             forces: like.like()?,
             part,
             tangents: Tangents::default(),
@@ -169,10 +172,15 @@ impl Flow {
 }
 
 impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
-    /// The displacement at the end of the step, with ghosts.
+    /// Writes displacement and, where it is needed, velocity at the end of the step, with ghosts.
     fn displace(&mut self, velocity: &DistributedVector) -> Result<()> {
         self.flow.write_velocity(self.cells.basis(), velocity)?;
-        let (start, mut values) = (self.start.displacement.local()?, self.flow.values.local_mut()?);
+        let Flow { values, velocities, .. } = &mut *self.flow;
+        let (start, mut values) = (self.start.displacement.local()?, values.local_mut()?);
+        if self.cells.need_rates() {
+            velocities.clear();
+            velocities.extend_from_slice(&values);
+        }
         values.iter_mut().zip(start.iter()).for_each(|(v, u)| *v = u + self.start.length * *v);
         Ok(())
     }
@@ -187,7 +195,7 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
         {
             let (values, mut forces) = (self.flow.values.local()?, self.flow.forces.local_mut()?);
             forces.fill(0.0);
-            self.cells.add_flow(&values, None, &mut forces);
+            self.cells.add_flow([&values, &self.flow.velocities], None, &mut forces);
         }
         out.fill(0.0)?;
         self.flow.add_to_free_components(self.cells.basis(), out)
@@ -196,12 +204,13 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
     /// Evaluates the forces at a velocity with their derivatives.
     fn evaluate(&mut self, velocity: &DistributedVector) -> Result<()> {
         self.displace(velocity)?;
-        let Flow { values, forces, evaluated, evaluated_tangents, is_fresh, .. } = &mut *self.flow;
+        let Flow { values, velocities, forces, evaluated, evaluated_tangents, is_fresh, .. } =
+            &mut *self.flow;
         evaluated.copy_from(velocity)?;
         *is_fresh = true;
         let (values, mut forces) = (values.local()?, forces.local_mut()?);
         forces.fill(0.0);
-        self.cells.add_flow(&values, Some(evaluated_tangents), &mut forces);
+        self.cells.add_flow([&values, velocities], Some(evaluated_tangents), &mut forces);
         Ok(())
     }
 }

@@ -22,7 +22,7 @@ use super::{
     solver::{LinearSolver, Reduced},
 };
 use crate::{
-    error::{Error, Result},
+    error::Result,
     fem::effect::Contact,
     linear_algebra::petsc::{DistributedVector, ProjectedKsp},
 };
@@ -160,8 +160,7 @@ impl FlowCorrections {
         problem: &mut StepProblem<'_, D, S>,
         velocity: &DistributedVector,
     ) -> Result<()> {
-        let missing = || Error::Internal("cells flow in a step without an end".into());
-        let start = problem.flow_start.ok_or_else(missing)?;
+        let start = problem.flow_start;
         let (cells, _) = problem.body.cells_and_contacts();
         self.flow.of(cells, start).write_forces(velocity, &mut self.found)
     }

@@ -73,11 +73,11 @@ impl Integrator {
         }
     }
 
-    /// The displacement from which the step starts, for cells that flow at the end of the step.
-    pub(super) fn flow_start(&self) -> Option<FlowStart<'_>> {
+    /// The displacement from which a started step of this length in s starts, given the converged state.
+    pub(super) fn flow_start<'a>(&'a self, state: &'a State, length: f64) -> FlowStart<'a> {
         match self {
-            Self::LaggedEuler(_) => None,
-            Self::Implicit(scheme) => Some(scheme.flow_start()),
+            Self::LaggedEuler(_) => FlowStart { displacement: &state.displacement, length },
+            Self::Implicit(scheme) => scheme.flow_start(),
         }
     }
 

@@ -447,10 +447,7 @@ impl Newton {
         };
         self.counts.sets.clear();
         let (cells, contacts) = problem.body.cells_and_contacts();
-        let mut cells = match (&mut self.flow, problem.flow_start) {
-            (Some(flow), Some(start)) => Some(flow.of(cells, start)),
-            _ => None,
-        };
+        let mut cells = self.flow.as_mut().map(|flow| flow.of(cells, problem.flow_start));
         let is_equilibrated = search == Search::Equilibrated;
         let mut equations = ContactEquations {
             matrix: system.matrix,

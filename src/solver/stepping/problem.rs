@@ -35,8 +35,8 @@ pub(super) struct StepProblem<'a, const D: usize, const S: usize> {
     pub norm: f64,
     /// The residual norm in N due to rounding errors of the forces.
     pub rounding: f64,
-    /// The displacement from which the step starts, if stresses are those at the end of the step.
-    pub flow_start: Option<FlowStart<'a>>,
+    /// The displacement from which the step starts.
+    pub flow_start: FlowStart<'a>,
 }
 
 /// The equations `K v + C(v) = b` of Newton's method: for the whole body, or for its contact nodes alone.

@@ -54,8 +54,8 @@ pub(super) struct SolvedStep<'a> {
     pub step: Step,
     /// The velocity at its end, with ghosts.
     pub velocity: &'a DistributedVector,
-    /// The displacement from which the step starts, if stresses are those at the end of the step.
-    pub flow_start: Option<FlowStart<'a>>,
+    /// The displacement from which the step starts.
+    pub flow_start: FlowStart<'a>,
     /// The states from which the step starts.
     pub blend: Blend,
 }
@@ -83,7 +83,7 @@ impl ErrorWorkspace {
             strained.clone_from(curved);
         }
         let [histories, surface] = {
-            let start = flow_start.map_or(&state.displacement, |start| start.displacement).local()?;
+            let start = flow_start.displacement.local()?;
             write(end, start.iter().zip(trial.iter()).map(|(u, v)| u + blend.length * v));
             let surface = body.surface_error(curvature, end);
             [body.stress_error(curvature, end, surface), surface]

@@ -480,8 +480,8 @@ fn nonlinear<const D: usize, const S: usize>(
         session.agree(bounded::refuse_other_contacts(body))?;
         if body.flows() {
             return Err(Error::Refused(
-                "[solver] method = \"vinewtonrsls\" does not support viscoplastic flow, damage, adhesion or contact memory at the end of a step; use method = \"newton\" or \
-                 [time] scheme = \"lagged_euler\""
+                "[solver] method = \"vinewtonrsls\" does not support viscoplastic flow, damage, adhesion or contact memory at the end of a step, nor a viscosity \
+                 that is a formula; use method = \"newton\" or, without such a viscosity, [time] scheme = \"lagged_euler\""
                     .into(),
             ));
         }

@@ -4,7 +4,6 @@ use super::{
     StepOutcome,
     contacts::{commit_tractions, keep_closeness, prepare_contacts, refuse_passage},
     factor_cache::nearest_cached_length,
-    flow::FlowStart,
     force_scale::ForceScale,
     integrator::Integrator,
     lagged_euler::refuse_fast_flow,
@@ -347,7 +346,7 @@ impl Stepper {
             norm,
             scale,
             rounding: self.integrator.rounding(session),
-            flow_start: self.integrator.flow_start(),
+            flow_start: self.integrator.flow_start(state, step.length),
         };
         if self.other_starts == 0 || problem.body.contacts.is_empty() {
             self.solver.solve(&mut problem, &mut self.trial)
@@ -381,8 +380,12 @@ impl Stepper {
         self.finish(body, state, step)?;
         self.trial.update_ghosts()?;
         let blend = self.integrator.blend(step.length);
-        let solved =
-            SolvedStep { step, velocity: &self.trial, flow_start: self.integrator.flow_start(), blend };
+        let solved = SolvedStep {
+            step,
+            velocity: &self.trial,
+            flow_start: self.integrator.flow_start(state, step.length),
+            blend,
+        };
         self.workspace.error(session, body, state, solved)
     }
 
@@ -418,7 +421,11 @@ impl Stepper {
         self.finish(body, state, step)?;
         let mut work = 0.0;
         if let Some(supports) = &mut self.moving_supports {
-            work = supports.work(session, body, step, &self.trial, self.integrator.flow_start())?;
+            if body.flows() {
+                self.trial.update_ghosts()?;
+            }
+            let start = self.integrator.flow_start(state, step.length);
+            work = supports.work(session, body, step, &self.trial, start)?;
         }
         let mut of_obstacles = Energy::default();
         for motion in driven(body) {
@@ -544,8 +551,7 @@ impl Stepper {
         }
         let forces = &mut self.right_hand_side;
         if let Some(supports) = &mut self.moving_supports {
-            let start = self.integrator.flow_start();
-            let start = start.unwrap_or(FlowStart { displacement: &state.displacement, length: step.length });
+            let start = self.integrator.flow_start(state, step.length);
             supports.impose(session, body, step, start, forces)?;
         }
         body.held.clear(&mut forces.owned_mut()?);
@@ -582,7 +588,7 @@ impl Stepper {
                 }
             }
         }
-        let start = self.integrator.flow_start().map_or(&state.displacement, |start| start.displacement);
+        let start = self.integrator.flow_start(state, step.length).displacement;
         Ok(session.agree(prepare_contacts(body, state, step, (blend, start)))?)
     }
 

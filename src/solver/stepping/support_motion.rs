@@ -154,17 +154,17 @@ impl MovingSupports {
         body: &mut Body<D, S>,
         step: Step,
         velocity: &DistributedVector,
-        start: Option<FlowStart<'_>>,
+        FlowStart { displacement, length }: FlowStart<'_>,
     ) -> Result<f64> {
         let mut flow = 0.0;
-        if let Some(FlowStart { displacement, length }) = start.filter(|_| body.flows()) {
+        if body.flows() {
             let (start, velocity) = (displacement.local()?, velocity.local()?);
             let Self { carried: motion, values: end, forces, .. } = &mut *self;
             end.clear();
             end.extend(start.iter().zip(velocity.iter()).map(|(u, v)| u + length * v));
             forces.clear();
             forces.resize(end.len(), 0.0);
-            body.cells_and_contacts().0.add_flow(end, None, forces);
+            body.cells_and_contacts().0.add_flow([end, &velocity], None, forces);
             flow = forces.iter().zip(motion.local()?.iter()).map(|(f, g)| f * g).sum();
         }
         let [flow] = session.sum([flow]);

@@ -395,9 +395,18 @@ fn material<const D: usize>(draw: &mut Draw<D>, content: &Content, table: &str) 
     let is_viscous = content.is_viscous || needs_viscosity;
     if is_viscous {
         let (volumetric, shear) = (draw.between(-0.1, 2.0), draw.between(1.0, 5.0));
-        draw.line(format!("[{table}.viscosity]"));
-        draw.key("volumetric", volumetric, viscosity);
-        draw.key("shear", shear, viscosity);
+        if is_written(shear) {
+            let (least, rate) = (draw.number(shear, viscosity), draw.number(5.0, TIME.map(|x| -x)));
+            let power = if is_written(2.0 * shear) { "0.5" } else { "-0.4" };
+            draw.line(format!("[{table}.viscosity.expression]"));
+            draw.line(format!("shear = \"{least:e}*(0.01 + g/{rate:e})^({power})\""));
+            draw.key("bulk", shear, viscosity);
+            draw.key("reference_rate", 10.0, TIME.map(|x| -x));
+        } else {
+            draw.line(format!("[{table}.viscosity]"));
+            draw.key("volumetric", volumetric, viscosity);
+            draw.key("shear", shear, viscosity);
+        }
         if content.is_elastic && content.is_dynamic {
             draw.line(format!("[{table}.damping]"));
             draw.key("mass", 2.0, TIME.map(|x| -x));

@@ -65,11 +65,12 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         let is_explicit = at == Evaluation::Converged;
         Phases {
             start: Some(if is_explicit { both } else { Needs::default() }),
-            end: !is_explicit,
+            end: (!is_explicit).then_some(strain),
             energy: Some(strain),
             stress: Some(Needs::default()),
             error: Some(strain),
             weakens: false,
+            is_monotone: false,
         }
     }
 

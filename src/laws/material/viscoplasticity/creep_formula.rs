@@ -1,13 +1,15 @@
-//! Creep whose rate is written in the job as a formula of the von Mises norm of the stress and the accumulated creep strain.
+//! Creep whose rate is written in the job as a formula of the von Mises norm of the stress, the mean stress and the accumulated creep
+//! strain.
 //!
 //! ```text
-//! X(s) = 3/2 p' dev s / q,   p' = f(q, p)
+//! X(s) = 3/2 p' dev s / q,   p' = f(q, m, p)
 //! ```
 //!
 //! with an `f` that is zero without stress, does not decrease with `q` and does not increase with `p`: dissipative, and with a unique end of
 //! every step. A step of length `k` ends in `s = s* / (1 + x E W)` with `x = dp / q` and `W` as in [`norton`](super::norton); `x` is the
-//! root of `x q(x) - k f(q(x), p + x q(x))`, which increases. In plane stress `X` is the in-plane part of that of the plane's stress in
-//! space. All conditions on `f`, and the fastest rate, which bounds explicit steps, follow from enclosures of the formula.
+//! root of `x q(x) - k f(q(x), m, p + x q(x))`, which increases: creep keeps the volume, and with it the mean stress `m`. In plane stress
+//! `X` is the in-plane part of that of the plane's stress in space; it changes `m`, and an `f` of it is refused.
+//! All conditions on `f`, and the fastest rate, which bounds explicit steps, follow from enclosures of the formula.
 
 use super::{
     flow::{Flow, InPlaces, Parameters},
@@ -20,7 +22,7 @@ use crate::{
         law::{Derived, LawFault, increasing_root},
         material::{Elastic, Elasticity, Hypothesis, Isotropic},
     },
-    linear_algebra::tensor::{Mandel, von_mises},
+    linear_algebra::tensor::{Mandel, larger, normal_components, trace, von_mises},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,15 +31,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CreepFormula {
-    /// Rate of the equivalent creep strain as a formula of the von Mises norm q of the stress in Pa and the equivalent creep strain e.
-    /// It is zero at q = 0, must not decrease with q nor increase with e, and must not jump.
+    /// Rate of the equivalent creep strain as a formula of the von Mises norm q of the stress in Pa, the mean stress p in Pa, positive in
+    /// tension, and the equivalent creep strain e. It is zero at q = 0, must not decrease with q nor increase with e, and must not jump.
+    /// In plane stress it must not depend on p.
     #[schemars(extend("unit" = "1/s"), example = &"1e-3*sinh(q/20e6)^4")]
     pub rate: Formula<OfCreep>,
-    /// Von Mises norm of the stress up to which explicit_step_bound holds with scheme lagged_euler; implicit schemes do not use it.
+    /// Von Mises norm of the stress, and size of a mean stress that the rate contains, up to which explicit_step_bound holds with scheme
+    /// lagged_euler; implicit schemes do not use it.
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 5e7)]
     pub reference_stress: f64,
     #[serde(skip)]
-    bounds: Derived<Vec<[f64; 2]>>,
+    bounds: Derived<Vec<[f64; 3]>>,
 }
 
 impl<N> InPlaces<N> for CreepFormula {
@@ -60,26 +64,39 @@ impl Parameters for CreepFormula {
         Some(LawFault::at_value("rate", message, help))
     }
 
+    fn fault_in_plane_stress(&self) -> Option<LawFault> {
+        self.rate.uses(Variable::P).then(|| {
+            let message = "the rate contains the mean stress p, which creep changes in plane stress: a step might have several ends";
+            LawFault::at_value("rate", message, "use plane strain or 3D, or delete p")
+        })
+    }
+
     fn keeps_volume(&self) -> bool {
         true
     }
 }
 
 impl CreepFormula {
-    /// For each level the largest derivative of the rate by the stress, and that of its decrease by the strain, up to this stress.
-    fn bounds(&self) -> &[[f64; 2]] {
+    /// For each level the largest derivatives of the rate by the stress, of its decrease by the strain, and by the mean stress in either
+    /// direction, up to this stress.
+    fn bounds(&self) -> &[[f64; 3]] {
         self.bounds.get(|| {
             let strains = (Variable::E, Interval::new(0.0, REACH));
-            let (mut low, mut most) = (0.0, [0.0_f64; 2]);
+            let with_mean = self.rate.uses(Variable::P);
+            let (mut low, mut most) = (0.0, [0.0_f64; 3]);
             let level = |level: i32| {
                 let high = self.reference_stress * (f64::from(level) / PARTS).exp2();
-                let part = [(Variable::Q, Interval::new(low, high)), strains];
+                // Wherever the mean stress is this large, the von Mises norm may be less.
+                let least = if with_mean { 0.0 } else { low };
+                let means = (Variable::P, Interval::new(-high, high));
+                let part = [(Variable::Q, Interval::new(least, high)), means, strains];
                 let sup = |by, sign: f64| {
                     let of = move |known: &Enclosure| if sign > 0.0 { known.slope } else { -known.slope };
                     self.rate.supremum([&part[..]], by, of).map_or(f64::INFINITY, |found| found.bound)
                 };
                 let by_strain = if self.rate.uses(Variable::E) { sup(Variable::E, -1.0) } else { 0.0 };
-                most = [most[0].max(sup(Variable::Q, 1.0)), most[1].max(by_strain)];
+                let by_mean = if with_mean { sup(Variable::P, 1.0).max(sup(Variable::P, -1.0)) } else { 0.0 };
+                most = [most[0].max(sup(Variable::Q, 1.0)), most[1].max(by_strain), most[2].max(by_mean)];
                 low = high;
                 most
             };
@@ -89,9 +106,10 @@ impl CreepFormula {
 
     fn first_fault(&self) -> Option<[String; 2]> {
         let from_zero = Interval::new(0.0, REACH);
+        let mean = (Variable::P, Interval::new(-REACH, REACH));
         let (all, unloaded) =
-            ([(Variable::Q, from_zero), (Variable::E, from_zero)], [(Variable::E, from_zero)]);
-        for variable in [Variable::Q, Variable::E] {
+            ([(Variable::Q, from_zero), mean, (Variable::E, from_zero)], [mean, (Variable::E, from_zero)]);
+        for variable in [Variable::Q, Variable::P, Variable::E] {
             let name = variable.name();
             if self.rate.jumps_along(variable) {
                 return Some([
@@ -123,7 +141,7 @@ impl CreepFormula {
             ),
         ];
         // Beyond the rounding of a rate, and of its derivatives by stress and strain, of the size at the reference stress.
-        let rate = self.at(self.reference_stress, 0.0)[0].abs();
+        let rate = self.at(self.reference_stress, [0.0; 2])[0].abs();
         let scales = [rate, rate / self.reference_stress, rate];
         for ((found, wrong, help), scale) in conditions.into_iter().zip(scales) {
             match found {
@@ -134,7 +152,7 @@ impl CreepFormula {
                 }
                 Ok(_) => {}
                 Err(Unproven::Undefined(place) | Unproven::Pieces(place)) => {
-                    let help = "it must have one for every q and e from 0 on; e is the creep strain, Euler's number is exp(1)";
+                    let help = "it must have one for every p, and every q and e from 0 on; e is the creep strain, Euler's number is exp(1)";
                     return Some([
                         format!("the rate has no value near {}", self.rate.at(&place)),
                         help.into(),
@@ -145,14 +163,25 @@ impl CreepFormula {
         None
     }
 
-    /// Rate in 1/s, and its derivatives by the von Mises norm and by the accumulated strain.
-    fn at(&self, norm: f64, accumulated: f64) -> [f64; 3] {
-        let at = [(Variable::Q, norm), (Variable::E, accumulated)];
+    /// Rate in 1/s, and its derivatives by the von Mises norm, the mean stress and the accumulated strain.
+    fn at(&self, norm: f64, [mean, accumulated]: [f64; 2]) -> [f64; 4] {
+        let at = arguments(norm, [mean, accumulated]);
         let [rate, by_norm] = self.rate.differentiate(&at, Variable::Q);
-        let by_strain =
-            if self.rate.uses(Variable::E) { self.rate.differentiate(&at, Variable::E)[1] } else { 0.0 };
-        [rate, by_norm, by_strain]
+        let by = |variable| {
+            if self.rate.uses(variable) { self.rate.differentiate(&at, variable)[1] } else { 0.0 }
+        };
+        [rate, by_norm, by(Variable::P), by(Variable::E)]
     }
+}
+
+/// The arguments of a rate: von Mises norm, mean stress and accumulated strain.
+fn arguments(norm: f64, [mean, accumulated]: [f64; 2]) -> [(Variable, f64); 3] {
+    [(Variable::Q, norm), (Variable::P, mean), (Variable::E, accumulated)]
+}
+
+/// The mean of the three normal stresses.
+fn mean_of<const S: usize>(s: &Mandel<S>) -> f64 {
+    trace(s) / 3.0
 }
 
 /// Share of a rate that is rounding.
@@ -161,20 +190,21 @@ const ROUNDING: f64 = 1e-12;
 const LARGEST: f64 = 690.0;
 
 impl Elastic<CreepFormula> {
-    /// The root `x`, whose logarithm is that of an increasing equation, `ln(x q(x)) - ln(k f(q(x), p + x q(x)))`.
-    fn solve(&self, release: &Release, length: f64, accumulated: f64) -> f64 {
+    /// The root `x`, whose logarithm is that of an increasing equation, `ln(x q(x)) - ln(k f(q(x), m, p + x q(x)))`, given `m` and `p`.
+    fn solve(&self, release: &Release, length: f64, [mean, accumulated]: [f64; 2]) -> f64 {
         let equation = |logarithm: f64| {
             let x = logarithm.exp();
             let (norm, fall) = release.at(x);
-            let [rate, by_norm, by_strain] = self.parameters.at(norm, accumulated + x * norm);
+            let [rate, by_norm, _, by_strain] = self.parameters.at(norm, [mean, accumulated + x * norm]);
             // Where nothing is left of the stress, all of it has flowed.
             let open = if norm > 0.0 { logarithm + norm.ln() - (length * rate).ln() } else { f64::INFINITY };
             let relaxed = (by_norm * norm * fall - by_strain * x * norm * (1.0 - fall)) / rate;
             [open, 1.0 - fall + if relaxed.is_finite() { relaxed } else { 0.0 }]
         };
         let (start, _) = release.at(0.0);
-        let first =
-            (length * self.parameters.at(start, accumulated)[0] / start).ln().clamp(-LARGEST, LARGEST);
+        let first = (length * self.parameters.at(start, [mean, accumulated])[0] / start)
+            .ln()
+            .clamp(-LARGEST, LARGEST);
         let (mut low, mut high, mut step) = (first, first, 1.0);
         while equation(low)[0] >= 0.0 && low > -LARGEST {
             (low, step) = (low - step, 2.0 * step);
@@ -198,7 +228,8 @@ impl Flow for Elastic<CreepFormula> {
     }
 
     fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
-        let rate = |norm| self.parameters.rate.value(&[(Variable::Q, norm), (Variable::E, accumulated)]);
+        let mean = mean_of(s);
+        let rate = |norm| self.parameters.rate.value(&arguments(norm, [mean, accumulated]));
         rate_along_deviator(s, rate)
     }
 
@@ -210,12 +241,13 @@ impl Flow for Elastic<CreepFormula> {
         tangent: Option<&mut Tangent<S>>,
     ) -> Option<(Mandel<S>, f64)> {
         let norm = von_mises(trial);
-        let fastest = self.parameters.at(norm, accumulated)[0];
+        let mean = mean_of(trial);
+        let fastest = self.parameters.at(norm, [mean, accumulated])[0];
         if norm == 0.0 || fastest == 0.0 {
             return None;
         }
         let release = Release::new(trial, norm, &self.elasticity);
-        let x = self.solve(&release, length, accumulated);
+        let x = self.solve(&release, length, [mean, accumulated]);
         let (left_norm, _) = release.at(x);
         let growth = x * left_norm;
         let (left, [a, b]) = release.map::<S>(x);
@@ -224,22 +256,35 @@ impl Flow for Elastic<CreepFormula> {
             // The derivative of q(x) by s* at this x is R W s / q, that of R s* by x is -E W R s.
             let gradient = left.apply(&weighted);
             let (_, fall) = release.at(x);
-            let [_, by_norm, by_strain] = self.parameters.at(left_norm, accumulated + growth);
+            let [_, by_norm, by_mean, by_strain] =
+                self.parameters.at(left_norm, [mean, accumulated + growth]);
             let by_q = x - length * (by_norm + x * by_strain);
             let by_x = left_norm * (1.0 - length * by_strain) - by_q * left_norm * fall / x;
             write_isotropic(tangent, a, b);
-            add_product(tangent, by_q / (by_x * left_norm), &self.elasticity.apply(&gradient), &gradient);
+            let release = self.elasticity.apply(&gradient);
+            add_product(tangent, by_q / (by_x * left_norm), &release, &gradient);
+            if by_mean != 0.0 {
+                let identity = std::array::from_fn(|c| f64::from(u8::from(c < normal_components::<S>())));
+                add_product(tangent, -length * by_mean / (3.0 * by_x), &release, &identity);
+            }
         }
         Some((weighted.map(|w| x * w), growth))
     }
 
     /// Along the deviator, stress relaxes at the rate `3 G df/dq`, also the largest rate in plane stress, and hardening at `-df/dp`; they
-    /// add up. The derivatives are enclosed.
+    /// add up. The derivatives are enclosed. A change of the mean stress changes the flow, in the norm of the elastic energy by
+    /// `sqrt(G 3 K) df/dm`.
     fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64 {
         let level = (overstress.log2() * PARTS).ceil().max(f64::from(LEVELS.start)) as i32 - LEVELS.start;
-        let [by_stress, by_strain] =
-            self.parameters.bounds().get(level as usize).copied().unwrap_or([f64::INFINITY, 0.0]);
-        1.5 * self.elasticity.shear * by_stress + by_strain
+        let [by_stress, by_strain, by_mean] =
+            self.parameters.bounds().get(level as usize).copied().unwrap_or([f64::INFINITY, 0.0, 0.0]);
+        let Isotropic { volumetric, shear } = self.elasticity;
+        let coupled = if by_mean == 0.0 { 0.0 } else { (0.5 * shear * (shear + 3.0 * volumetric)).sqrt() };
+        1.5 * shear * by_stress + by_strain + coupled * by_mean
+    }
+
+    fn has_symmetric_tangent<const S: usize>(&self) -> bool {
+        !self.parameters.rate.uses(Variable::P)
     }
 
     fn is_power_law(&self) -> bool {
@@ -247,7 +292,8 @@ impl Flow for Elastic<CreepFormula> {
     }
 
     fn overstress<const S: usize>(&self, s: &Mandel<S>, _accumulated: f64) -> f64 {
-        von_mises(s) / self.parameters.reference_stress
+        let mean = if self.parameters.rate.uses(Variable::P) { mean_of(s).abs() } else { 0.0 };
+        larger(von_mises(s), mean) / self.parameters.reference_stress
     }
 
     fn hardens(&self) -> bool {
@@ -333,11 +379,71 @@ mod tests {
                 let stress: Mandel<3> = std::array::from_fn(|i| trial[i] - release[i]);
                 let q = von_mises(&stress);
                 // The stress whose rate is this growth, by the slope of the law.
-                let [rate, slope, _] = law.parameters.at(q, 0.0);
+                let [rate, slope, ..] = law.parameters.at(q, [0.0; 2]);
                 let off = (growth / length - rate).abs() / slope.max(f64::MIN_POSITIVE);
                 assert!(growth > 0.0 && q > 0.0 && off < 1e-6 * q, "{text} {length}: {growth} {q} {rate}");
             }
         }
+    }
+
+    #[test]
+    fn creep_that_depends_on_the_mean_stress_by_hand() {
+        // Uniaxial stress 60 has the mean 20, which creep keeps: 60 - q = 3 G growth = 1200 growth.
+        let law = written("1e-3*(q/20)^2*exp(p/20)");
+        assert_eq!(law.fault(), None);
+        let body = law.prepare(&BODY, Hypothesis::Space);
+        for (sign, factor) in [(1.0, 1.0_f64.exp()), (-1.0, (-1.0_f64).exp())] {
+            let trial = [sign * 60.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+            let (flow, growth) = body.flow_to_end(&trial, 2.0, 0.0, None).expect("flow");
+            let q = 60.0 - 1200.0 * growth;
+            assert!((growth - 2e-3 * factor * (q / 20.0).powi(2)).abs() < 1e-13, "{growth}");
+            assert!((flow[0] - sign * growth).abs() < 1e-15 && trace(&flow).abs() < 1e-15);
+            let (_, rate) = body.rate(&trial, 0.0);
+            assert!((rate - 9e-3 * factor).abs() < 1e-15, "{rate}");
+        }
+        let refused = law.fault_in_plane_stress().expect("refused");
+        assert!(refused.message.contains("mean stress p") && refused.key == "rate");
+        assert_eq!(written("1e-3*q").fault_in_plane_stress(), None);
+        let up_to = |text: &str| written(text).prepare(&BODY, Hypothesis::Space).fastest_rate::<6>(1.0);
+        // At most 3 G 2 q/400 e^(p/20) 1e-3, and sqrt(G 3 K) (q/20)^2/20 e^(p/20) 1e-3, with q and p of 10.
+        let most = 0.5_f64.exp() * (1200.0 * 0.05 + (400.0_f64 * 2000.0).sqrt() * 0.25 / 20.0) * 1e-3;
+        let found = up_to("1e-3*(q/20)^2*exp(p/20)");
+        assert!(found >= most && found < 1.2 * most, "{found} {most}");
+    }
+
+    #[test]
+    fn tangents_with_the_mean_stress_are_derivatives() {
+        fn check<const S: usize>(hypothesis: Hypothesis, trial: Mandel<S>) {
+            for text in ["1e-3*(q/20)^2*exp(p/20)", "2e-3*q*max(1 + 0.02*p, 0)/(1 + e/0.01)"] {
+                let law = written(text).prepare(&BODY, hypothesis);
+                assert!(!law.has_symmetric_tangent::<S>());
+                let end = |trial: &Mandel<S>| {
+                    let flow = law.flow_to_end(trial, 0.7, 0.002, None).map_or([0.0; S], |(flow, _)| flow);
+                    let release = law.elasticity.apply(&flow);
+                    std::array::from_fn::<f64, S, _>(|c| trial[c] - release[c])
+                };
+                let mut tangent = [[0.0; S]; S];
+                law.flow_to_end(&trial, 0.7, 0.002, Some(&mut tangent)).expect("flow");
+                for j in 0..S {
+                    let moved = |step: f64| {
+                        let mut moved = trial;
+                        moved[j] += step;
+                        end(&moved)
+                    };
+                    let [above, below] = [moved(1e-5), moved(-1e-5)];
+                    for i in 0..S {
+                        let slope = (above[i] - below[i]) / 2e-5;
+                        assert!(
+                            (tangent[i][j] - slope).abs() < 1e-6,
+                            "{text} {i} {j}: {} {slope}",
+                            tangent[i][j]
+                        );
+                    }
+                }
+            }
+        }
+        check::<4>(Hypothesis::PlaneStrain, [30.0, -12.0, 9.0, 21.0]);
+        check::<6>(Hypothesis::Space, [30.0, -12.0, 9.0, 21.0, -6.0, 15.0]);
     }
 
     #[test]
@@ -357,6 +463,9 @@ mod tests {
             ("1e-3*q*(1 + e)", "may increase with the creep strain", "[material.damage]"),
             ("1e-3*if(q < 10, 0, q)", "may jump with q", "interpolate"),
             ("1e-3*q*sqrt(1 - e)", "no value near", "from 0 on"),
+            ("1e-3*q*if(p < 0, 1, 2)", "may jump with p", "interpolate"),
+            ("1e-3*q*(1 + p/10)", "may decrease with the stress near q = ", "grow"),
+            ("1e-3*max(q + 2*p, 0)", "not zero without stress", "q = 0"),
         ] {
             let fault = written(text).fault().expect(text);
             assert!(fault.message.contains(message) && fault.help.contains(help), "{text}: {fault:?}");
@@ -367,6 +476,8 @@ mod tests {
             "1e-3*sinh(q/2)",
             "8.5e-4*(q/1e-3)^2/(1 + e/0.1)",
             "q^1.5",
+            "if(q < 0.3, 0, (q - 0.1*3)^2)",
+            "if(q <= 20, 0, 1e-3*(q/20 - 1))",
         ] {
             assert_eq!(written(text).fault(), None, "{text}");
         }

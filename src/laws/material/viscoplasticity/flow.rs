@@ -25,6 +25,11 @@ pub trait Parameters {
         None
     }
 
+    /// The fault of parameters that are not allowed in plane stress, if there is one.
+    fn fault_in_plane_stress(&self) -> Option<LawFault> {
+        None
+    }
+
     /// Whether the flow preserves volume.
     fn keeps_volume(&self) -> bool;
 

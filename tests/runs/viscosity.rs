@@ -1,0 +1,54 @@
+//! Viscosities that are formulas of the strain rate.
+
+use crate::{case::Case, results::assert_same_answer};
+
+const SCHEMES: [&str; 4] = ["lagged_euler", "implicit_euler", "bdf2", "midpoint"];
+/// The viscosity of the paper, in plane stress.
+const CONSTANT: &str = "{ expression = { shear = '50', bulk = 50, reference_rate = 1 } }";
+const THINNING: &str = "{ expression = { shear = '20*(1e-3 + g)^(-0.4)', bulk = 50, reference_rate = 5 } }";
+const THICKENING: &str = "{ expression = { shear = '30 + 200*min(g, 20)', bulk = 50, reference_rate = 5 } }";
+
+/// The paper's square with this viscosity.
+fn square(scheme: &str, viscosity: &str) -> Case {
+    let case = Case::square(8)
+        .set("time.scheme", &format!("'{scheme}'"))
+        .set("time.end", "0.125")
+        .set("time.step", "0.015625");
+    let case = case.set("contact.0.redistribute_mass", &(scheme == "midpoint").to_string());
+    case.set("solver.tolerance", "1e-11").set("material.viscosity", viscosity)
+}
+
+#[test]
+fn a_constant_formula_gives_the_answer_of_the_linear_viscosity_under_every_scheme() {
+    for scheme in SCHEMES {
+        let linear = "{ volumetric = 25, shear = 50 }";
+        let [wanted, found] = [linear, CONSTANT].map(|law| square(scheme, law).run_and_keep(1));
+        assert_same_answer(&wanted.results(), &found.results(), 1e-10, scheme);
+    }
+}
+
+#[test]
+fn ranks_agree_and_energy_balances_under_every_scheme() {
+    for scheme in SCHEMES {
+        for law in [THINNING, THICKENING] {
+            let runs = [1, 2, 3].map(|ranks| square(scheme, law).run_and_keep(ranks));
+            let [one, two, three] = runs.each_ref().map(|run| run.results());
+            let what = format!("{law} under {scheme}");
+            assert_same_answer(&one, &two, 1e-8, &what);
+            assert_same_answer(&one, &three, 1e-8, &what);
+            assert!(one.number("max_energy_imbalance") < 1e-8, "{what}");
+            assert!(one.number("newton_iterations") > one.number("steps"), "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_restarted_run_has_the_same_answer() {
+    let whole = square("bdf2", THINNING).set("checkpoint.every", "4").run_and_keep(2);
+    let case = square("bdf2", THINNING).set("checkpoint.every", "4");
+    case.run_with(2, &["--set", "time.end=0.0625"]).expect(0);
+    case.run_with(2, &["--restart"]).expect(0).says("continuing from");
+    for name in ["probes.csv", "history.csv"] {
+        assert_eq!(whole.results().text(name), case.results().text(name), "{name}");
+    }
+}
