@@ -237,11 +237,11 @@ pub(super) fn landings(job: &Job) -> Landings {
 /// After what the steps of a job forget the step before.
 fn forgets(job: &Job) -> Forgets {
     let has_mass = job.materials().all(|(_, material)| material.density.is_some());
+    let has_friction = job.contact.iter().any(|contact| contact.friction.is_some());
     match job.time.scheme.states() {
         0 | 1 => Forgets::Nothing,
-        _ if has_mass => Forgets::Jumps,
-        _ if job.contact.iter().all(|contact| contact.friction.is_none()) => Forgets::StepsOverJumps,
-        _ => Forgets::Kinks,
+        _ if !has_mass && has_friction => Forgets::Kinks,
+        _ => Forgets::Jumps,
     }
 }
 

@@ -27,9 +27,8 @@ pub enum Forgets {
     Nothing,
     /// Jumps of loads.
     Jumps,
-    /// Steps over jumps, in which a body without mass jumps, too, and the first step, over the jump of loads that are there at its start.
-    StepsOverJumps,
-    /// Kinks of loads: a point that sticks from then on would slide on with a share of its last velocity.
+    /// Kinks of loads, steps over jumps, in which a body without mass jumps, too, and the first step, over the jump of loads that are there
+    /// at its start: a point with friction that sticks from then on would slide on with a share of its last velocity.
     Kinks,
 }
 
@@ -134,8 +133,7 @@ impl Landings {
         let start = time - last;
         let jumped = || (last > 0.0 && start <= near) || self.breaks_at(start, true);
         (self.forgets >= Forgets::Jumps && self.breaks_at(time, true))
-            || (self.forgets >= Forgets::StepsOverJumps && jumped())
-            || (self.forgets >= Forgets::Kinks && self.breaks_at(time, false))
+            || (self.forgets >= Forgets::Kinks && (jumped() || self.breaks_at(time, false)))
     }
 
     /// Whether a load or an obstacle motion jumps, or has a kink, at this time, the end of a step.
@@ -282,8 +280,7 @@ mod tests {
         };
         assert_eq!(anew(Forgets::Nothing), [0]);
         assert_eq!(anew(Forgets::Jumps), [0, 3]);
-        assert_eq!(anew(Forgets::StepsOverJumps), [0, 1, 3, 4], "the first step, and that over the jump");
-        assert_eq!(anew(Forgets::Kinks), [0, 1, 3, 4, 6]);
+        assert_eq!(anew(Forgets::Kinks), [0, 1, 3, 4, 6], "after the first step and that over the jump, too");
     }
 
     #[test]
