@@ -398,6 +398,12 @@ fn cells_that_are_too_large_for_the_bonds_are_warned_of_on_any_number_of_ranks()
         };
         // E G / strength^2 = 11.66 mm; with the thickness 1.5 mm the zone is 11.66^(1/4) 1.5^(3/4) = 2.50 mm long, a third of it 0.83 mm.
         check("[100, 2]", "1", "57e6").says(warning).says("only 2.5e-3 m long").says("at most 8.3e-4 m");
+        // The strength that follows from an energy of 0.28 J/m^2 and this stiffness is as large.
+        let case = Case::of("verification/double_cantilever")
+            .set("mesh.rectangle.cells", "[100, 2]")
+            .set("contact.0.adhesion", "{stiffness = 1.16e16, energy = 280.0}");
+        let checked = launch::run(ranks, &["check", case.written().to_str().expect("a path")]).expect(0);
+        checked.says(warning).says("lower `stiffness`");
         for (cells, order, strength) in
             [("[100, 2]", "2", "57e6"), ("[200, 2]", "1", "57e6"), ("[100, 2]", "1", "20e6")]
         {
@@ -581,5 +587,24 @@ fn the_contact_traction_at_bonds_is_the_stress_on_either_side() {
         let probes = case.results().table("probes.csv");
         let [traction, stress] = ["contact_traction_y", "stress_yy"].map(|column| probes.last(column));
         assert!(stress > 1e5 && (traction.abs() / stress - 1.0).abs() < 1e-9, "{traction} of {stress} Pa");
+    }
+}
+
+#[test]
+fn a_stiff_block_that_a_support_moves_rubs_with_its_own_friction() {
+    // 1 Pa on 1 m with a coefficient of 0.3. The forces of the motion of the supported nodes alone are 1e13 N.
+    let block = "
+        mesh.rectangle = {size = [1.0, 0.2], cells = [10, 2]}
+        time = {end = 1.0, step = 0.1, scheme = 'implicit_euler'}
+        support = [{on = ['left'], fix = ['x'], displacement = ['0.01*t']}]
+        traction = [{on = ['top'], value = [0.0, -1.0]}]
+        contact = [{on = ['bottom'], normal.unilateral = {}, friction.coulomb.coefficient = 0.3}]
+        [material]
+        hypothesis = 'plane_strain'
+        elasticity = {youngs_modulus = 1e15, poisson_ratio = 0.3}";
+    for ranks in [1, 2] {
+        let resultants = Case::written_as(block).run(ranks).table("resultants.csv");
+        let force = resultants.only("source", "contact bottom").last("force_x");
+        assert!((force + 0.3).abs() < 1e-3, "{force} N on {ranks} ranks");
     }
 }

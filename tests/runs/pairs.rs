@@ -912,3 +912,34 @@ fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
         case.run_with(2, &[]).expect(2).says(words);
     }
 }
+
+/// Two rings of large radius, the inner one of which is pressed on the outer one and slides five facets along it.
+const SLEEVE: &str = "
+    time = {end = 1.0, step = 0.02, scheme = 'implicit_euler'}
+    output.profile = [{on = 'out.left'}]
+    mesh.rectangle = [{name = 'out', corner = [20.0, 0.0], size = [0.2, 2.0], cells = [2, 20]},
+                      {name = 'in', corner = [19.8, 0.2], size = [0.2, 0.6], cells = [2, 10]}]
+    support = [{on = ['out.right'], fix = 'all'},
+               {on = ['in.left'], fix = 'all', displacement = ['1e-5', '0.5*t']}]
+    contact = [{on = ['in.right'], against = ['out.left'], normal.unilateral = {}, friction.coulomb.coefficient = 0.1}]
+    [material]
+    hypothesis = 'axisymmetric'
+    elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.0}";
+
+#[test]
+fn rings_slide_along_each_other_by_the_size_of_their_facets() {
+    let small = Case::written_as(SLEEVE);
+    small
+        .run_with(1, &["--force"])
+        .expect(0)
+        .says("slid up to 8.33 times the size of a facet along out.left");
+    let finite = Case::written_as(SLEEVE).set("contact.0.sliding", "'finite'");
+    let profile = finite.run(2).table("profiles.csv");
+    let places = profile.numbers("y").into_iter().zip(profile.numbers("contact_pressure"));
+    let pressed: Vec<f64> = places.filter(|(_, pressure)| *pressure > 1e3).map(|(y, _)| y).collect();
+    let ends = [pressed[0], pressed[pressed.len() - 1]];
+    assert!(
+        (ends[0] - 0.65).abs() < 0.06 && (ends[1] - 1.3).abs() < 0.06,
+        "the ring is at 0.7 to 1.3 m: {ends:?}"
+    );
+}
