@@ -401,6 +401,7 @@ fn cells_that_are_too_large_for_the_bonds_are_warned_of_on_any_number_of_ranks()
         // The strength that follows from this energy and stiffness is as large.
         let case = Case::of("verification/double_cantilever")
             .set("mesh.rectangle.cells", "[100, 2]")
+            .set("mesh.order", "1")
             .set("contact.0.adhesion", "{stiffness = 2.32e13, energy = 140.0}");
         let checked = launch::run(ranks, &["check", case.written().to_str().expect("a path")]).expect(0);
         checked.says(warning).says("lower `stiffness`");
