@@ -7,6 +7,8 @@ from itertools import permutations
 from math import pi, tan
 from pathlib import Path
 
+import gmsh
+
 BALL, SHELL = 0.014, 0.021
 
 
@@ -134,15 +136,7 @@ def write(mesh, path):
     lines += [" ".join(f"{x:.15g}" for x in point) for point in mesh.nodes] + ["$EndNodes"]
     blocks = [(2, tag, 2, cells) for tag, cells in enumerate(mesh.facets.values(), 1)]
     blocks += [(3, tag, 4, cells) for tag, cells in enumerate(mesh.cells.values(), 1)]
-    total = sum(len(cells) for *_, cells in blocks)
-    lines += ["$Elements", f"{len(blocks)} {total} 1 {total}"]
-    number = 0
-    for dimension, tag, kind, cells in blocks:
-        lines.append(f"{dimension} {tag} {kind} {len(cells)}")
-        for cell in cells:
-            number += 1
-            lines.append(" ".join(map(str, (number, *cell))))
-    path.write_text("\n".join(lines + ["$EndElements"]) + "\n")
+    gmsh.write_with_elements(path, lines, blocks)
 
 
 mesh = Mesh()

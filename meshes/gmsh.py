@@ -1,4 +1,4 @@
-"""Files of Gmsh's format 4.1 with plane meshes of one region, `body`."""
+"""Files of Gmsh's format 4.1: plane meshes of one region, `body`, and the elements of any mesh."""
 
 
 def write(path, nodes, box, edges, triangles):
@@ -16,6 +16,12 @@ def write(path, nodes, box, edges, triangles):
     lines += [f"{node} 0" for node in nodes] + ["$EndNodes"]
     kinds = (8, 9) if len(triangles[0]) == 6 else (1, 2)
     blocks = [(1, tag, kinds[0], cells) for tag, cells in enumerate(edges.values(), 1)] + [(2, 1, kinds[1], triangles)]
+    write_with_elements(path, lines, blocks)
+
+
+def write_with_elements(path, lines, blocks):
+    """Writes these lines and blocks of elements, each with its dimension, the tag of its entity, Gmsh's number of its type, and lists of
+    the numbers of nodes."""
     total = sum(len(cells) for *_, cells in blocks)
     lines += ["$Elements", f"{len(blocks)} {total} 1 {total}"]
     number = 0
