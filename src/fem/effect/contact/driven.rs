@@ -357,10 +357,11 @@ impl<const D: usize> Contact<D> {
         let now = point.normal_component(Newton, velocity);
         let presses = |change: f64| self.law.pressure(now + change, point.context) > 0.0;
         let size = now.abs() + depth(point, velocity) / point.context.step_length;
-        if self.law.has_vertical_parts() || presses(0.0) || size == 0.0 {
+        let mut bracket = [0.0, NEAR * size];
+        // Bisection of numbers without full precision would not end.
+        if self.law.has_vertical_parts() || presses(0.0) || bracket[1] < f64::MIN_POSITIVE / NEAR {
             return 0.0;
         }
-        let mut bracket = [0.0, NEAR * size];
         while !presses(bracket[1]) {
             bracket = [bracket[1], 2.0 * bracket[1]];
             if !bracket[1].is_finite() {
