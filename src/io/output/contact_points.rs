@@ -160,10 +160,13 @@ pub(super) fn fill_faced<const D: usize, const S: usize>(
 }
 
 /// The tractions of effects at the surface, such as bonds, on what the body touches, `D` values for each owned node, with means at
-/// corners and on the other side of contact between bodies as in [`contact_points`]; empty without such effects. Collective.
-pub(super) fn further_tractions<const D: usize, const S: usize>(at: Converged<'_, D, S>) -> Result<Vec<f64>> {
+/// corners and on the other side of contact between bodies as in [`contact_points`]; `None` without such effects, on all ranks alike.
+/// Collective.
+pub(super) fn further_tractions<const D: usize, const S: usize>(
+    at: Converged<'_, D, S>,
+) -> Result<Option<Vec<f64>>> {
     if at.body.surface_effects.is_empty() {
-        return Ok(Vec::new());
+        return Ok(None);
     }
     let (mesh, mut forces) = (&at.body.mesh, Vec::new());
     at.session.agree(at.body.write_surface_forces(at.state, &mut forces))?;
@@ -189,7 +192,7 @@ pub(super) fn further_tractions<const D: usize, const S: usize>(at: Converged<'_
     for (point, mean) in corners {
         values[point.node as usize * D..][..D].copy_from_slice(&mean);
     }
-    Ok(values)
+    Ok(Some(values))
 }
 
 fn in_order<const D: usize>(a: &(usize, PointState<D>), b: &(usize, PointState<D>)) -> Ordering {

@@ -85,11 +85,10 @@ pub(super) fn contact_traction<'a, const D: usize, const S: usize>(
 ) -> Result<Option<Computed<'a>>> {
     let Some(traction) = &at.state.contact_traction else { return Ok(None) };
     let further = further_tractions(at)?;
-    if !omits_corners(&at.body.mesh) && at.body.pairs.is_empty() && further.is_empty() {
+    if !omits_corners(&at.body.mesh) && at.body.pairs.is_empty() && further.is_none() {
         return Ok(Some(Computed::of(traction.owned()?)));
     }
-    let mut values = vec![0.0; at.body.mesh.owned * D];
-    values.iter_mut().zip(&further).for_each(|(value, further)| *value = *further);
+    let mut values = further.unwrap_or_else(|| vec![0.0; at.body.mesh.owned * D]);
     for (node, state) in contact_points(at)? {
         let target = &mut values[node * D..][..D];
         (0..D).for_each(|i| target[i] += state.pressure * state.direction[i] + state.friction[i]);
