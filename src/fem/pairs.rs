@@ -15,7 +15,10 @@ use crate::{
         session::Session,
     },
 };
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+};
 
 /// A node of the slave side that faces the other side.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +33,8 @@ pub struct PairedNode<const D: usize> {
     pub distance: f64,
     /// Master nodes, by global numbers, with their shares.
     pub masters: Vec<(u32, f64)>,
+    /// Those of them that are neighbours without a law on its own side.
+    pub neighbours: Vec<u32>,
     /// The ratio of its velocity relative to the surface that it faces to the mean over the part of the surface for which it stands, with
     /// that of neighbours without a law; 1 without such neighbours.
     pub stretch: f64,
@@ -40,6 +45,16 @@ impl<const D: usize> PairedNode<D> {
     pub fn point(&self) -> SurfacePoint<D> {
         let Self { node, normal, weight, .. } = *self;
         SurfacePoint { node, normal, weight }
+    }
+
+    /// The masters on the other side, with their shares.
+    pub fn faced(&self) -> impl Iterator<Item = &(u32, f64)> {
+        self.masters.iter().filter(|(master, _)| !self.is_beside(*master))
+    }
+
+    /// Whether a master, given by its global number, is a neighbour on the same side.
+    pub fn is_beside(&self, master: u32) -> bool {
+        !self.neighbours.is_empty() && self.neighbours.binary_search(&master).is_ok()
     }
 }
 
@@ -118,6 +133,7 @@ impl<const D: usize> Pair<D> {
                 weight,
                 distance,
                 masters,
+                neighbours: Vec::new(),
                 stretch,
             })
         });
@@ -151,8 +167,8 @@ impl<const D: usize> Pair<D> {
         let node_at = |SurfacePoint { node, normal, weight }: SurfacePoint<D>| match facing.remove(&node) {
             Some(found) => PairedNode { normal, ..found },
             None => {
-                let (distance, masters, stretch) = (f64::INFINITY, Vec::new(), 1.0);
-                PairedNode { node, normal, weight, distance, masters, stretch }
+                let (distance, masters, neighbours, stretch) = (f64::INFINITY, Vec::new(), Vec::new(), 1.0);
+                PairedNode { node, normal, weight, distance, masters, neighbours, stretch }
             }
         };
         self.nodes = all.into_values().map(node_at).collect();
@@ -169,24 +185,21 @@ impl<const D: usize> Pair<D> {
     ) -> Result<Vec<PairedNode<D>>, Agreed> {
         let slaves: Vec<Facet<D>> = self.on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
         let masters = gather_facets(session, mesh, places, &self.against)?;
-        let mut outgoing = vec![Vec::new(); session.ranks()];
         let depth = DEEPEST * longest_side(session, places);
-        let mut all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
-        // Of linear segments both corners carry a law, of all other facets three nodes.
-        let per_facet = if D == 2 && mesh.order() == 1 { 2 } else { 3 };
-        for of_facet in all.chunks_exact_mut(per_facet) {
-            let passed = pass_on(of_facet, &self.lawless);
-            for contribution in of_facet.iter().filter(|one| !self.lawless.contains(&one.node)) {
-                let Contribution { node, normal, weight, whole, gap, masters } = contribution;
-                let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*node)];
-                list.extend([f64::from(*node), *weight, *whole, *gap, passed]);
-                list.extend(normal.map(|n| weight * n));
-                list.push(masters.len() as f64);
-                list.extend(masters.iter().flat_map(|(master, value)| [f64::from(*master), *value]));
+        let all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
+        let own: BTreeSet<u32> = slaves.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
+        let mut lawless = self.lawless.clone();
+        loop {
+            let sums = sum_of_contributions(session, mesh, (&all, &own), &lawless)?;
+            let covered = sums.iter().filter(|(_, sum)| sum.whole > 0.0 && !sum.masters.is_empty());
+            let bearing: Vec<u32> =
+                covered.filter(|(_, sum)| !sum.carries_a_law()).map(|(node, _)| *node).collect();
+            let further = gather(session.world(), &bearing)?;
+            if further.is_empty() {
+                return Ok(paired(mesh, sums));
             }
+            lawless.extend(further);
         }
-        let records = exchange_lists(session.world(), &outgoing)?;
-        Ok(sum_of_contributions(mesh, &records))
     }
 }
 
@@ -194,25 +207,29 @@ impl<const D: usize> Pair<D> {
 /// `psi_a` grows by the same share of `psi_c`, so that the sum of all remains 1 and the products with the shape functions of nodes with a
 /// law are as before. The velocity of `c` counts as that of a master node with the opposite sign. Gives what is added to the part of the
 /// surface for which each of the latter stands, in m^(D-1).
-fn pass_on<const D: usize>(of_facet: &mut [Contribution<D>], lawless: &BTreeSet<u32>) -> f64 {
+fn pass_on<'a, const D: usize>(
+    of_facet: &'a [Contribution<D>],
+    lawless: &BTreeSet<u32>,
+) -> (Cow<'a, [Contribution<D>]>, f64) {
     let carries = |one: &Contribution<D>| !lawless.contains(&one.node);
     let carriers = of_facet.iter().filter(|one| carries(one)).count();
     if carriers == of_facet.len() || carriers == 0 {
-        return 0.0;
+        return (Cow::Borrowed(of_facet), 0.0);
     }
     let share = 1.0 / carriers as f64;
-    let (mut weight, mut gap, mut masters) = (0.0, 0.0, Vec::new());
+    let (mut part, mut gap, mut masters) = (0.0, 0.0, Vec::new());
     for given in of_facet.iter().filter(|one| !carries(one) && !one.masters.is_empty()) {
-        weight += share * given.weight;
+        part += share * (given.weight + given.corners);
         gap += share * given.gap;
         masters.extend(given.masters.iter().map(|(master, value)| (*master, share * value)));
         masters.push((given.node, -share * given.weight));
     }
-    for carrier in of_facet.iter_mut().filter(|one| carries(one)) {
+    let mut changed = of_facet.to_vec();
+    for carrier in changed.iter_mut().filter(|one| carries(one)) {
         carrier.gap += gap;
         carrier.masters.extend(&masters);
     }
-    weight
+    (Cow::Owned(changed), part)
 }
 
 /// The pair of a contact, if it is one.
@@ -244,6 +261,8 @@ pub fn shares<const D: usize>(mesh: &Mesh<D>, pairs: &[Pair<D>]) -> Vec<MasterSh
 
 /// The least part of the surface around a node that must face the other side; nodes with less carry no law.
 const LEAST_SHARE: f64 = 1e-3;
+/// The same as a share of the integral of its shape function.
+const LEAST_STRETCH: f64 = 0.05;
 /// The deepest penetration of undeformed bodies at which they face each other, as a share of the longest side of the box around them; it
 /// is larger where facets are.
 const DEEPEST: f64 = 0.05;
@@ -273,19 +292,54 @@ fn gather_facets<const D: usize>(
     Ok(nodes.chunks_exact(per_facet).zip(corners).map(|(nodes, at)| Facet::new(nodes.to_vec(), at)).collect())
 }
 
-/// The nodes of this rank, from the contributions of the facets around them.
-fn sum_of_contributions<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<PairedNode<D>> {
-    #[derive(Default)]
-    struct Sum {
-        weight: f64,
-        whole: f64,
-        gap: f64,
-        passed: f64,
-        normal: [f64; 3],
-        masters: BTreeMap<u32, f64>,
+/// What the facets around a node contribute to it.
+#[derive(Default)]
+struct Sum {
+    weight: f64,
+    whole: f64,
+    gap: f64,
+    passed: f64,
+    normal: [f64; 3],
+    masters: BTreeMap<u32, f64>,
+    neighbours: BTreeSet<u32>,
+}
+
+impl Sum {
+    /// Whether the part of the surface for which the node stands suffices for a law. Of a negative part the law would push where it pulls.
+    fn carries_a_law(&self) -> bool {
+        let Self { weight, whole, passed, .. } = *self;
+        weight > LEAST_SHARE * whole && weight + passed > LEAST_STRETCH * weight
     }
+}
+
+/// The sums of the contributions to the nodes of this rank, by global numbers, those of `lawless` left out, from those of the facets of each
+/// rank with the nodes of these facets. Collective.
+fn sum_of_contributions<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    (all, own): (&[Contribution<D>], &BTreeSet<u32>),
+    lawless: &BTreeSet<u32>,
+) -> Result<BTreeMap<u32, Sum>, Agreed> {
+    let mut outgoing = vec![Vec::new(); session.ranks()];
+    // Of linear segments both corners carry a law, of all other facets three nodes.
+    let per_facet = if D == 2 && mesh.order() == 1 { 2 } else { 3 };
+    for of_facet in all.chunks_exact(per_facet) {
+        let (of_facet, passed) = pass_on(of_facet, lawless);
+        for contribution in of_facet.iter().filter(|one| !lawless.contains(&one.node)) {
+            let Contribution { node, normal, weight, whole, gap, corners, masters } = contribution;
+            let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*node)];
+            list.extend([f64::from(*node), *weight, *whole, *gap, passed + corners]);
+            list.extend(normal.map(|n| weight * n));
+            list.push(masters.len() as f64);
+            let is_own = |master: &u32| f64::from(u8::from(own.contains(master)));
+            list.extend(
+                masters.iter().flat_map(|(master, value)| [f64::from(*master), *value, is_own(master)]),
+            );
+        }
+    }
+    let records = exchange_lists(session.world(), &outgoing)?;
     let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
-    let mut rest = records;
+    let mut rest = &records[..];
     while let [node, weight, whole, gap, passed, after @ ..] = rest {
         let sum = sums.entry(*node as u32).or_default();
         sum.weight += weight;
@@ -294,28 +348,32 @@ fn sum_of_contributions<const D: usize>(mesh: &Mesh<D>, records: &[f64]) -> Vec<
         sum.passed += passed;
         (0..D).for_each(|i| sum.normal[i] += after[i]);
         let count = after[D] as usize;
-        let (masters, next) = after[D + 1..].split_at(2 * count);
-        for pair in masters.chunks_exact(2) {
-            *sum.masters.entry(pair[0] as u32).or_default() += pair[1];
+        let (masters, next) = after[D + 1..].split_at(3 * count);
+        for &[master, value, is_own] in masters.as_chunks().0 {
+            *sum.masters.entry(master as u32).or_default() += value;
+            sum.neighbours.extend((is_own != 0.0).then_some(master as u32));
         }
         rest = next;
     }
+    Ok(sums)
+}
+
+/// The nodes of this rank with these sums that carry a law.
+fn paired<const D: usize>(mesh: &Mesh<D>, sums: BTreeMap<u32, Sum>) -> Vec<PairedNode<D>> {
     sums.into_iter()
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
-        .filter(|(_, sum)| sum.whole > 0.0 && sum.weight > LEAST_SHARE * sum.whole)
+        .filter(|(_, sum)| sum.whole > 0.0 && sum.carries_a_law())
         .map(|(node, sum)| {
             let normal: Vector<D> = std::array::from_fn(|i| sum.normal[i]);
             let length = norm(&normal);
+            let shares = sum.masters.into_iter().map(|(master, value)| (master, value / sum.weight));
             PairedNode {
                 node: mesh.owned_node(node) as u32,
                 normal: normal.map(|n| n / length),
                 weight: sum.weight,
                 distance: sum.gap / sum.weight,
-                masters: sum
-                    .masters
-                    .into_iter()
-                    .map(|(master, value)| (master, value / sum.weight))
-                    .collect(),
+                masters: shares.collect(),
+                neighbours: sum.neighbours.into_iter().collect(),
                 stretch: 1.0 + sum.passed / sum.weight,
             }
         })
@@ -334,6 +392,7 @@ mod tests {
             weight: 0.5,
             whole: 0.5,
             gap: 1.5,
+            corners: 0.0,
             masters: vec![(master, 0.5)],
         };
         [of(0, 10), of(1, 11)]
@@ -341,8 +400,9 @@ mod tests {
 
     #[test]
     fn a_node_without_a_law_leaves_its_part_of_a_facet_to_the_other_one() {
-        let mut both = segment();
-        assert_eq!(pass_on(&mut both, &BTreeSet::from([0])), 0.5);
+        let facet = segment();
+        let (both, passed) = pass_on(&facet, &BTreeSet::from([0]));
+        assert_eq!(passed, 0.5);
         // int psi_1 phi is that of a constant multiplier: 1/2 on either node of both sides.
         assert_eq!(both[1].masters, [(11, 0.5), (10, 0.5), (0, -0.5)]);
         assert_eq!((both[1].weight, both[1].gap), (0.5, 3.0));
@@ -353,9 +413,9 @@ mod tests {
     #[test]
     fn facets_of_which_all_or_no_nodes_carry_a_law_remain_as_they_are() {
         for lawless in [BTreeSet::new(), BTreeSet::from([0, 1]), BTreeSet::from([10])] {
-            let mut both = segment();
-            assert_eq!(pass_on(&mut both, &lawless), 0.0);
-            assert_eq!(both, segment());
+            let facet = segment();
+            let (both, passed) = pass_on(&facet, &lawless);
+            assert_eq!((&both[..], passed), (&facet[..], 0.0));
         }
     }
 }

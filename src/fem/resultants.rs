@@ -3,7 +3,7 @@
 use super::{
     body::Body,
     effect::{ContactAreas, Form, Supports, SurfaceForce},
-    pairs::{is_exchanged, pair_of},
+    pairs::{is_exchanged, nodes_of},
     space::Held,
     state::State,
 };
@@ -361,12 +361,10 @@ impl<const D: usize> Sums<'_, D> {
         }
         self.add_and_react(own, node, force);
         if let Some(coupling) = body.coupling.as_ref().filter(|_| body.contacts[contact].is_paired()) {
-            let lawless = pair_of(&body.pairs, contact).map(|pair| &pair.lawless);
-            // Neighbours without a law of their own are on the same side.
-            let is_own = |master: u32| {
-                lawless
-                    .is_some_and(|nodes| !nodes.is_empty() && nodes.contains(&self.mesh.global_node(master)))
-            };
+            let paired = nodes_of(&body.pairs, contact).unwrap_or_default();
+            let paired = paired.binary_search_by_key(&node, |paired| paired.node).map(|at| &paired[at]);
+            let is_own =
+                |master: u32| paired.is_ok_and(|paired| paired.is_beside(self.mesh.global_node(master)));
             coupling.opposites(&body.held, node, force, |master, force| {
                 self.add_and_react(if is_own(master) { own } else { other }, master, &force);
             });

@@ -180,7 +180,7 @@ fn is_coarser<const D: usize>(session: &Session, pair: &Pair<D>) -> Result<bool,
     let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty());
     let slaves = session.total(facing.count());
     let own: BTreeSet<u32> =
-        pair.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master).collect();
+        pair.nodes.iter().flat_map(PairedNode::faced).map(|(master, _)| *master).collect();
     let own: Vec<u32> = own.into_iter().collect();
     let masters: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
     Ok(masters.len() > (1 << (D - 1)) * slaves)
@@ -243,7 +243,15 @@ mod tests {
         held.hold(0, [at(own)].into_iter());
         held.hold(1, [at(other)].into_iter());
         let masters = vec![(1, 1.0)];
-        let node = PairedNode { node: 0, normal, weight: 1.0, distance: 0.0, masters, stretch: 1.0 };
+        let node = PairedNode {
+            node: 0,
+            normal,
+            weight: 1.0,
+            distance: 0.0,
+            masters,
+            neighbours: Vec::new(),
+            stretch: 1.0,
+        };
         conflict(&node, &held, rubs, |direction| vec![(1.0, norm(&held.free_part(1, direction)))])
     }
 

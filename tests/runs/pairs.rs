@@ -943,3 +943,37 @@ fn rings_slide_along_each_other_by_the_size_of_their_facets() {
         "the ring is at 0.7 to 1.3 m: {ends:?}"
     );
 }
+
+/// A brick on the left half of another one, whose edge meets the sides of facets between their ends.
+#[test]
+fn quadratic_facets_that_are_covered_in_part_carry_the_weight_and_the_friction_of_the_whole() {
+    for (on, against, side) in
+        [("u.bottom", "l.top", "on"), ("l.top", "u.bottom", "on"), ("u.bottom", "l.top", "auto")]
+    {
+        for (ranks, cells) in [(1, "[3, 1, 1]"), (2, "[7, 3, 1]")] {
+            let case = Case::written_as(
+                "
+                mesh = {order = 2, box = [{name = 'l', size = [2.0, 1.0, 0.5], cells = [1, 1, 1]},
+                    {name = 'u', corner = [0.0, 0.0, 0.5], size = [1.0, 1.0, 0.5], cells = [1, 1, 1]}]}
+                material.elasticity = {youngs_modulus = 1e8, poisson_ratio = 0.0}
+                support = [{on = ['l.bottom'], fix = 'all'}, {on = ['u.top'], fix = ['x', 'y'], displacement = ['0.02*t', 0.0]}]
+                traction = [{on = ['u.top'], value = [0.0, 0.0, -1e5]}]
+                time = {end = 1.0, step = 0.25, scheme = 'implicit_euler'}
+                contact = [{normal.unilateral = {}, friction.coulomb.coefficient = 0.3}]",
+            )
+            .set("mesh.box.0.cells", cells)
+            .set("contact.0.on", &format!("['{on}']"))
+            .set("contact.0.against", &format!("['{against}']"))
+            .set("contact.0.side", &format!("'{side}'"));
+            let resultants = case.run(ranks).table("resultants.csv");
+            let of = |source: &str, column: &str| resultants.only("source", source).last(column).abs();
+            let what = format!("{on}, {side}, {cells}");
+            assert!((of("support u.top", "force_x") / 3e4 - 1.0).abs() < 1e-6, "{what}");
+            for source in [format!("contact {on}"), format!("against {against}")] {
+                let [normal, rubbing] = ["force_z", "force_x"].map(|column| of(&source, column));
+                assert!((normal / 1e5 - 1.0).abs() < 1e-9, "{what}: {source} {normal} N");
+                assert!((rubbing / 3e4 - 1.0).abs() < 1e-6, "{what}: {source} {rubbing} N");
+            }
+        }
+    }
+}

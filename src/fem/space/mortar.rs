@@ -82,6 +82,9 @@ pub struct Contribution<const D: usize> {
     /// surface, positive where open. With the outward unit normal n of the facet it is the sum over `masters`
     /// of the entry times n.x_b, less the weight times n.x_a, at the places x of the nodes.
     pub gap: f64,
+    /// The sum over the corners c of quadratic triangles, which carry no law, of int psi_a phi_c in m^2; otherwise 0. With `weight` it is
+    /// int psi_a: the part of the surface for which the node stands, which may be negative where the facet is covered in part.
+    pub corners: f64,
     /// For each master node b, in ascending order, int psi_a phi_b in m^(D-1), with phi_b at the place on the
     /// master facet that is projected. The corners c of quadratic triangles, which carry no law, are included
     /// with -int psi_a phi_c. All sum to `weight`.
@@ -368,6 +371,7 @@ impl<'a, const D: usize> Slave<'a, D> {
             weight: 0.0,
             whole: self.measure * facet.share(i),
             gap: 0.0,
+            corners: 0.0,
             masters: Vec::new(),
         }));
         let mut covered: f64 = parts.iter().map(|part| part.measure).sum();
@@ -390,7 +394,9 @@ impl<'a, const D: usize> Slave<'a, D> {
         let result = &mut result[first..];
         for (contribution, (dual, m)) in result.iter_mut().zip(duals.iter().zip(law.clone())) {
             contribution.weight = own[0][m] * covered.sqrt();
-            contribution.masters.extend((0..law.start).map(|c| (facet.nodes[c], -integral(dual, &own, c))));
+            let corners = (0..law.start).map(|c| (facet.nodes[c], -integral(dual, &own, c)));
+            contribution.masters.extend(corners);
+            contribution.corners = -contribution.masters.iter().map(|(_, value)| value).sum::<f64>();
         }
         let totals = totals(parts, &samples, covered);
         let by_part = samples.chunk_by(|one, next| one.part == next.part);

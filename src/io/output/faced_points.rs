@@ -61,10 +61,10 @@ pub(super) fn faced_points<const D: usize, const S: usize, const W: usize>(
     let points = surface_points(at.session, mesh, &facets)?;
     let mut outgoing = vec![Vec::new(); at.session.ranks()];
     for Given { contact, node, values } in given {
-        let Some(Pair { nodes, lawless, .. }) = pair_of(pairs, *contact) else { continue };
+        let Some(Pair { nodes, .. }) = pair_of(pairs, *contact) else { continue };
         let Ok(found) = nodes.binary_search_by_key(&(*node as u32), |paired| paired.node) else { continue };
         let paired = &nodes[found];
-        for (master, share) in paired.masters.iter().filter(|(master, _)| !lawless.contains(master)) {
+        for (master, share) in paired.faced() {
             let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*master)];
             list.extend([
                 f64::from(*master),
