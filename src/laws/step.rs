@@ -11,6 +11,20 @@ pub struct Step {
     pub previous_length: f64,
 }
 
+impl Step {
+    /// The time at its start in s.
+    pub fn start(self) -> f64 {
+        start_of(self.time, self.length)
+    }
+}
+
+/// The start in s of a step that ends at this time in s and has this length in s. A step may end at the last number before a jump of a load:
+/// rounding errors of the difference must not take the start of the next one beyond it.
+pub fn start_of(time: f64, length: f64) -> f64 {
+    let rounding = 2.0 * f64::EPSILON * time.abs();
+    if (time - length).abs() <= rounding { 0.0 } else { time - length - rounding }
+}
+
 /// A quantity that is kept from one step to the next, by its names in files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quantity([&'static str; 2]);
@@ -127,6 +141,18 @@ pub enum Evaluation {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_starts_before_the_jump_at_which_the_last_one_ended() {
+        for jump in [0.45f64, 0.1, 3.7, 1e6 + 0.3] {
+            let last = jump.next_down();
+            for time in [jump + 0.05, jump + 0.1, jump + 1.0 / 3.0] {
+                let start = start_of(time, time - last);
+                assert!(start <= last && last - start < 1e-15 * time, "{start} {last}");
+            }
+        }
+        assert_eq!([start_of(0.3, 0.3), start_of(0.0, 0.0), start_of(0.0, 0.5)], [0.0, 0.0, -0.5]);
+    }
 
     #[test]
     fn a_step_is_solved_where_its_equations_hold_and_continued_to_its_end() {

@@ -55,6 +55,16 @@ fn a_disc_that_jumps_over_the_boundary_fails_the_step_on_any_number_of_ranks() {
 }
 
 #[test]
+fn an_obstacle_that_jumps_through_the_body_at_a_known_time_fails_the_step() {
+    let adaptive = "{end = 1.0, step = 0.1, scheme = 'implicit_euler', adaptive = {smallest_step = 1e-5, largest_step = 0.1}}";
+    let plane = "{plane = {point = [0.0, '0.6 - 10*step(t - 0.45)'], normal = [0.0, -1.0]}}";
+    for obstacle in [&disc("0.9 - 10*step(t - 0.45)", 0.3), plane] {
+        let case = under(obstacle).set("time", adaptive);
+        case.run_with(1, &[]).expect(1).says("its obstacle passes through the boundary at [");
+    }
+}
+
+#[test]
 fn a_ball_that_jumps_over_the_boundary_fails_the_step() {
     let case = Case::cube(2)
         .set("material", "{elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}}")

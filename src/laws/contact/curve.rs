@@ -86,6 +86,12 @@ impl Curve {
         self.formula.differentiate(&[(self.variable, at.clamp(first, last))], self.variable)
     }
 
+    /// The pressure on a branch.
+    fn pressure_on_branch(&self, branch: usize, at: f64) -> f64 {
+        let [first, last] = self.branches[branch];
+        self.formula.value(&[(self.variable, at.clamp(first, last))])
+    }
+
     fn is_vertical(&self, branch: usize) -> bool {
         let inner = branch.checked_sub(1).and_then(|before| self.corners.get(before..=branch));
         inner.is_some_and(|pair| pair[0][0] == pair[1][0])

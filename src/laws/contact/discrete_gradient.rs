@@ -13,6 +13,9 @@
 use super::normal_law::{NodeContext, Resolved};
 use crate::laws::law::increasing_root;
 
+/// A difference of two pressures below this share of them is rounding errors of their means.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// A law whose pressure follows from the penetration.
 pub(super) trait Potential {
     /// The mean pressure in Pa between two different or equal penetrations in m, and its derivative in Pa/m with respect to the second.
@@ -71,7 +74,9 @@ pub(super) fn resolve(law: &impl Potential, s: f64, c: f64, node: NodeContext, b
         if reach > 0.0 { [low.max(start - reach), start] } else { [start, high.min(start - reach)] };
     let after = increasing_root(low, high, start, |after| {
         let [pressure, slope] = law.mean(before, after);
-        [open(after, pressure), parameter + slope]
+        let value = open(after, pressure);
+        let is_rounding = value.abs() <= ROUNDING * (parameter * (after - free)).abs().max(pressure.abs());
+        [if is_rounding { 0.0 } else { value }, parameter + slope]
     });
     let [pressure, slope] = law.mean(before, after);
     Resolved { derivative: 1.0 / (c + k * slope), ..closed(pressure) }
@@ -174,6 +179,16 @@ mod tests {
         assert_eq!(held.derivative, 0.0);
         assert_eq!(law.distance(0.0, 4.5, at, [1.0, 1.0]), 0.0);
         assert!(law.resolve(1.9, 10.0, at).velocity < 0.0 && law.resolve(6.1, 10.0, at).velocity > 0.0);
+        for rounding in [-1e-12, -2e-17, 2e-17, 1e-12] {
+            let beside = node(-0.1 + rounding, 0.0);
+            let held = law.resolve(4.5, 10.0, beside);
+            assert!((held.pressure - 4.5).abs() < 1e-13 && held.derivative == 0.0, "{rounding}: {held:?}");
+            assert!(law.distance(held.velocity, held.pressure, beside, [1.0, 1.0]) < 1e-15, "{rounding}");
+            for s in [1.0, 1.9, 6.1, 8.0] {
+                let [exact, near] = [at, beside].map(|node| law.resolve(s, 10.0, node).pressure);
+                assert!((exact - near).abs() < 1e-6, "{rounding}, {s}: {near} for {exact}");
+            }
+        }
     }
 
     proptest! {

@@ -13,7 +13,10 @@
 //! velocities from displacements: in a step of implicit Euler, `x' = (x_n - x_{n-1}) / k`, so that a sticking point moves exactly
 //! as far as the obstacle. All other quantities are those at the end of the step, as is the gap.
 
-use crate::linear_algebra::tensor::{Vector, add_scaled, cross};
+use crate::{
+    laws::step::start_of,
+    linear_algebra::tensor::{Vector, add_scaled, cross},
+};
 
 /// The formula of a scheme for the rate at the end of a step in terms of values at this time and at earlier times.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +31,7 @@ pub struct Rate {
 impl Rate {
     /// The formula of implicit Euler for a step of this length in s.
     pub fn euler(time: f64, length: f64) -> Self {
-        Self { time, before: [[time - length, 1.0 / length], [0.0; 2]] }
+        Self { time, before: [[start_of(time, length), 1.0 / length], [0.0; 2]] }
     }
 
     pub(super) fn of<const D: usize>(&self, value: impl Fn(f64) -> Vector<D>) -> Vector<D> {
@@ -102,7 +105,8 @@ mod tests {
 
     #[test]
     fn rates_are_those_of_the_schemes() {
-        assert_eq!(Rate::euler(0.5, 0.25), STEP);
+        let [[start, weight], none] = Rate::euler(0.5, 0.25).before;
+        assert!((start - 0.25).abs() < 1e-15 && weight == 4.0 && none[1] == 0.0);
         let parabola = |t: f64| [3.0 * t * t, 7.0];
         // 3 (0.5^2 - 0.25^2) / 0.25 = 2.25
         assert_eq!(STEP.of(parabola), [2.25, 0.0]);

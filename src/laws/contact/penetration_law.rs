@@ -9,6 +9,10 @@ use super::discrete_gradient::{self, Potential, Vertical};
 use super::normal_law::{NodeContext, Resolved, Response};
 use crate::error::Result;
 
+/// A step that starts within this share of the extent of a graph from one of its jumps starts at the jump: the mean pressure since a start
+/// so near passes over the jump within rounding errors of the penetration.
+const ROUNDING: f64 = 1e-9;
+
 /// A graph over the penetration in m, with its potential in J/m², which is zero at the penetration zero.
 pub trait StoringGraph {
     /// The graph.
@@ -42,7 +46,11 @@ impl<G: StoringGraph> Potential for PenetrationLaw<G> {
     }
 
     fn vertical_parts(&self, before: f64) -> Vertical {
-        let jump = self.corners().windows(2).find(|pair| pair[0][0] == before && pair[1][0] == before);
+        let corners = self.corners();
+        let extent = corners.iter().fold(0.0, |extent: f64, corner| extent.max(corner[0].abs()));
+        let is_jump =
+            |pair: &&[[f64; 2]]| pair[0][0] == pair[1][0] && (pair[0][0] - before).abs() <= ROUNDING * extent;
+        let jump = corners.windows(2).find(is_jump);
         Vertical { jump: jump.map(|pair| [pair[0][1], pair[1][1]]), wall: self.0.wall() }
     }
 

@@ -106,7 +106,7 @@ impl<const D: usize> TimeDependentData<D> {
         if self.expressions.is_empty() {
             return 0.0;
         }
-        let start = step.time - step.length;
+        let start = step.start();
         let ends = [start + TIME_TOLERANCE * step.length, step.time];
         let mine = self
             .expressions

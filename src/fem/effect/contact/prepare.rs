@@ -24,7 +24,7 @@ impl<const D: usize> Contact<D> {
         if !self.law.depends_on_displacement() {
             return Ok(());
         }
-        let (time, time_before) = (step.time, step.time - step.length);
+        let (time, time_before) = (step.time, step.start());
         let step_length = blend.way();
         for at in 0..self.points.len() {
             let point = &self.points[at];
@@ -45,7 +45,7 @@ impl<const D: usize> Contact<D> {
             } else {
                 [point.normal_component(Body, start) - along, -blend.earlier * (worn - worn_before)]
             };
-            let means = blend.extrapolates() && point.penetration_before.is_finite();
+            let means = blend.extrapolates() && point.penetration_before.is_finite() && gap.is_finite();
             point.context = NodeContext {
                 penetration: along - gap - worn + (point.blend_offset - point.continued_wear),
                 step_length,

@@ -35,7 +35,7 @@ impl<const D: usize> Contact<D> {
         if !self.law.depends_on_displacement() || matches!(self.gap, Gap::Distance(_)) {
             return Ok(());
         }
-        let times = [step.time - step.length, step.time];
+        let times = [step.start(), step.time];
         let is_loaded = self.obstacle.as_ref().is_some_and(LoadedObstacle::moves);
         for point in &self.points {
             let depth = point.context.penetration + self.advance(point, Body, velocity);

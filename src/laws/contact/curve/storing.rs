@@ -19,6 +19,8 @@ const EXACT: f64 = 1e-13;
 /// Length of the first part in m, and ratio of the lengths of parts.
 const NEAREST: f64 = 1e-12;
 const GROWTH: f64 = 4.0;
+/// Changes of the pressure in a step below this share are rounding errors in its derivative.
+const SMALL: f64 = 1e-6;
 /// Halvings of a part.
 const DEPTH: usize = 10;
 
@@ -109,7 +111,7 @@ impl StoringCurve {
     /// The potential in J/m² at a penetration in m from that at a knot without a corner between.
     fn potential_from(&self, [knot, potential]: [f64; 2], penetration: f64) -> f64 {
         let branch = self.curve.branch(0.5 * (knot + penetration), NodeContext::AT_THE_GAP);
-        let pressure = |at| self.curve.on_branch(branch, at)[0];
+        let pressure = |at| self.curve.pressure_on_branch(branch, at);
         potential + integral(&pressure, [knot, penetration], potential.abs())
     }
 }
@@ -149,10 +151,16 @@ impl StoringGraph for StoringCurve {
             let own = self.curve.pressure(after, NodeContext::AT_THE_GAP);
             return [mean, (own - mean) / advance];
         }
-        // On one branch the derivative is an integral, too, without the rounding of a difference.
-        let at = |share: f64| self.curve.on_branch(branch, before + share * advance);
-        let mean = |function: &dyn Fn(f64) -> f64| integral(function, [0.0, 1.0], 0.0);
-        [mean(&|share| at(share)[0]), mean(&|share| share * at(share)[1])]
+        let at = |share: f64| before + share * advance;
+        let mean = integral(&|share| self.curve.pressure_on_branch(branch, at(share)), [0.0, 1.0], 0.0);
+        let own = self.curve.pressure_on_branch(branch, after);
+        let change = own - mean;
+        if change.abs() > SMALL * own.abs().max(mean.abs()) {
+            return [mean, change / advance];
+        }
+        // An integral, too, has no rounding of a difference; the function is nearly constant.
+        let [slope, _] = gauss(&|share| share * self.curve.on_branch(branch, at(share))[1], 0.0, 1.0);
+        [mean, slope]
     }
 }
 
