@@ -237,8 +237,7 @@ pub(super) fn landings(job: &Job) -> Landings {
 /// After what the steps of a job forget the step before.
 fn forgets(job: &Job) -> Forgets {
     let has_mass = job.materials().all(|(_, material)| material.density.is_some());
-    // Points that wear slide.
-    let may_stick = job.contact.iter().any(|contact| contact.friction.is_some() && contact.wear.is_none());
+    let may_stick = job.contact.iter().any(|contact| contact.friction.is_some());
     match job.time.scheme.states() {
         0 | 1 => Forgets::Nothing,
         _ if !has_mass && may_stick => Forgets::Kinks,

@@ -609,3 +609,102 @@ fn a_stiff_block_that_a_support_moves_rubs_with_its_own_friction() {
         assert!((force + 0.3).abs() < 1e-3, "{force} N on {ranks} ranks");
     }
 }
+
+#[test]
+fn a_block_at_rest_is_pressed_on_a_dashpot_that_gives_way() {
+    let block = |load: &str, scheme: &str| {
+        Case::written_as(
+            "
+            mesh.rectangle = {size = [1.0, 0.5], cells = [4, 1]}
+            support = [{on = ['top'], fix = ['x']}]
+            traction = [{on = ['top'], value = [0.0, 0.0]}]
+            contact = [{on = ['bottom'], normal.exponential_damper = {limit = 6000.0, velocity = 0.05}}]
+            time = {end = 0.2, step = 0.01, scheme = 'implicit_euler'}
+            [material]
+            hypothesis = 'plane_strain'
+            elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.45}",
+        )
+        .set("traction.0.value", &format!("[0.0, '{load}']"))
+        .set("time.scheme", &format!("'{scheme}'"))
+        .run_and_keep(1)
+    };
+    let pressed =
+        |case: Case| case.results().table("resultants.csv").only("source", "contact bottom").last("force_y");
+    let force = pressed(block("-5700", "implicit_euler"));
+    assert!((force - 5700.0).abs() < 1e-5, "{force} N");
+    for scheme in ["implicit_euler", "bdf2"] {
+        let force = pressed(block("-2000*sin(20*t)^2", scheme));
+        assert!((force - 2000.0 * 4f64.sin().powi(2)).abs() < 1e-5, "{scheme}: {force} N");
+    }
+}
+
+#[test]
+fn an_obstacle_that_a_graph_loses_under_midpoint_presses_no_more() {
+    let block = |gap: &str| {
+        Case::written_as(
+            "
+            mesh.rectangle = {size = [1.0, 1.0], cells = [4, 2]}
+            support = [{on = ['bottom'], fix = 'all'}]
+            contact = [{on = ['top'], normal.displacement_graph = {points = [[0.0, 0.0], [0.01, 1e5]], slope_after = 1e8}, redistribute_mass = true}]
+            time = {end = 0.02, step = 0.001, scheme = 'midpoint'}
+            [material]
+            hypothesis = 'plane_strain'
+            density = 1000.0
+            elasticity = {youngs_modulus = 1e7, poisson_ratio = 0.3}",
+        )
+        .set("contact.0.normal.displacement_graph.gap", &format!("'{gap}'"))
+        .run_and_keep(1)
+    };
+    for (gap, pressed, free) in [("if(t < 0.01, -0.001, inf)", 4, 19), ("if(t < 0.01, inf, -0.001)", 19, 4)] {
+        let case = block(gap);
+        let results = case.results();
+        let forces = results.table("resultants.csv").only("source", "contact top").numbers("force_y");
+        assert!(forces[pressed] < -100.0 && forces[free] == 0.0, "{gap}: {forces:?}");
+        assert!(results.number("max_energy_imbalance") < 1e-9, "{gap}");
+    }
+}
+
+#[test]
+fn a_block_lands_on_a_jump_of_its_graph_under_midpoint_and_keeps_its_energy() {
+    // After 62 steps the penetration is that of the jump, up to rounding errors.
+    let case = Case::written_as(
+        "
+        mesh.rectangle = {size = [0.5, 0.5], cells = [2, 2], diagonal = 'crossed'}
+        initial.velocity = [0.0, -0.05]
+        solver.accept = ['uniqueness']
+        time = {end = 0.2, step = 0.001, scheme = 'midpoint'}
+        [material]
+        hypothesis = 'plane_strain'
+        density = 1000.0
+        elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.2}
+        [[contact]]
+        on = ['bottom']
+        normal.displacement_graph = {points = [[0, 0], [1e-4, 0], [1e-4, 2e3], [1e-3, 4e3]], slope_after = 1e7}
+        obstacle.plane = {point = [0.0, -0.003], normal = [0.0, 1.0]}
+        redistribute_mass = true",
+    );
+    let results = case.run(1);
+    assert!(results.table("history.csv").numbers("contact_energy").iter().any(|stored| *stored > 0.01));
+    assert!(results.number("max_energy_imbalance") < 1e-10);
+}
+
+#[test]
+fn a_beam_is_lifted_from_its_plane_in_one_step_node_by_node() {
+    let case = Case::written_as(
+        "
+        mesh = {order = 2, rectangle = {size = [2.0, 0.02], cells = [100, 2]}}
+        body_force = [{value = [0.0, -7700.85]}]
+        contact = [{on = ['bottom'], normal.unilateral = {}}]
+        time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+        support = [{on = ['left'], fix = ['x']}, {on = ['right'], where = 'abs(y - 0.01) < 1e-6', fix = ['y'], displacement = ['0.002*t']}]
+        [material]
+        hypothesis = 'plane_stress'
+        elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.3}",
+    );
+    let results = case.run(1);
+    // P = 1/2 (24 E I h q^3)^(1/4) of a slender beam with the weight q per length that is lifted by h.
+    let (stiffness, weight): (f64, f64) = (1e9 * 0.02f64.powi(3) / 12.0, 7700.85 * 0.02);
+    let exact = 0.5 * (24.0 * stiffness * 0.002 * weight.powi(3)).powf(0.25);
+    let lifting = results.table("resultants.csv").only("source", "support right").last("force_y");
+    assert!((lifting / exact - 1.0).abs() < 1e-3, "{lifting} N for {exact} N");
+}

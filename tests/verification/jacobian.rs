@@ -179,6 +179,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 linear_solver: &mut linear_solver,
                 session,
                 stop_at_cycles: false,
+                patience: usize::MAX,
                 equilibrated: false,
                 counts: SolveCounts::default(),
             };

@@ -177,12 +177,15 @@ fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<Found> {
 /// Barycentric coordinates of a point in the cell with these nodes, if it is inside.
 fn place<const D: usize>(nodes: &[Vector<D>], point: &Vector<D>) -> Option<[f64; 4]> {
     const MOST_STEPS: usize = 30;
+    const SMALL: f64 = 1e-8;
     let is_linear = nodes.len() == D + 1;
     let mut place = [0.0; 4];
     place[0] = 1.0;
     let mut at = nodes[0];
     let mut cell = Simplex::new(&nodes[..=D]);
-    // Newton's method from the linear cell with these corners, whose step is exact for straight cells.
+    let mut last = f64::INFINITY;
+    // Newton's method from the linear cell with these corners, whose step is exact for straight cells. In small cells far from the origin
+    // rounding errors of the coordinates end it.
     for _ in 0..MOST_STEPS {
         let mut longest = 0.0_f64;
         for a in 1..=D {
@@ -191,12 +194,13 @@ fn place<const D: usize>(nodes: &[Vector<D>], point: &Vector<D>) -> Option<[f64;
             longest = longest.max(step.abs());
         }
         place[0] = place[1..=D].iter().fold(1.0, |rest, share| rest - share);
-        if is_linear || longest < 1e-13 {
+        if is_linear || longest < 1e-13 || (longest < SMALL && longest >= 0.5 * last) {
             return place[..=D].iter().all(|share| *share >= INSIDE).then_some(place);
         }
         if longest.is_nan() || longest > 1e3 {
             return None;
         }
+        last = longest;
         let shares = values(D + 1, &place);
         at = std::array::from_fn(|i| nodes.iter().zip(shares).map(|(node, share)| share * node[i]).sum());
         cell = Simplex::new(&linear_at(D + 1, &place, nodes)[..=D]);
@@ -225,6 +229,18 @@ mod tests {
                 assert!((found[i + 1] - inside[i]).abs() < 1e-12, "{found:?}");
             }
             assert_eq!(place(nodes, &[-0.4; D]), None);
+        }
+    }
+
+    #[test]
+    fn points_of_small_quadratic_cells_far_from_the_origin_are_found() {
+        let corners = [[0.0, 2.0 - 0.2 / 3.0], [0.2 / 3.0, 2.0 - 0.2 / 3.0], [0.0, 2.0]]
+            .map(|x: [f64; 2]| [1e3 + x[0], 1e3 + x[1]]);
+        let middles = edges_of_cell::<2>().iter().map(|&[a, b]| midpoint(&corners[a], &corners[b]));
+        let nodes: Vec<[f64; 2]> = corners.iter().copied().chain(middles).collect();
+        for share in [0.0, 0.1, 0.3, 0.7, 1.0] {
+            let point = std::array::from_fn(|i| corners[1][i] + share * (corners[2][i] - corners[1][i]));
+            assert!(place(&nodes, &point).is_some(), "{share} of the way along an edge");
         }
     }
 

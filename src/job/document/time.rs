@@ -77,7 +77,8 @@ pub struct Solver {
     pub factor_precision: FactorPrecision,
     /// Number of Newton iterations after which a solve fails. A step may need several solves: other start values, friction on obstacles
     /// moved by a force; the Newton iterations of a step are the sum over its solves. Where forces fall as the body moves, a descent to another
-    /// equilibrium may take 20 times as many.
+    /// equilibrium may take 20 times as many; from 50 on, so may full steps that keep reducing the residual, as those of a beam that lifts off
+    /// node by node.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
     /// How the dependence of friction bounds on the contact pressure is solved (all laws except tresca).

@@ -89,6 +89,14 @@ const NO_DIRECTION: &str =
 /// The residual decreased to less than this share of the last one unless it stagnates.
 const STAGNATION: f64 = 0.5;
 
+/// Full steps make progress while the residual falls to this share within this number of iterations. Where a boundary lifts off or closes
+/// node by node, as that of a beam, they take as many iterations as there are nodes.
+const PROGRESS: f64 = 0.9;
+pub(super) const PATIENCE: usize = 50;
+
+/// The message of full steps without progress.
+const TOO_MANY: &str = "too many Newton iterations";
+
 /// Forces of the cells in addition to `K v`, at velocities without ghost values.
 pub trait CellForces {
     /// Adds the forces at a velocity.
@@ -129,6 +137,8 @@ pub struct ContactEquations<'a, const D: usize> {
     pub session: &'a Session,
     /// Whether to fail when a set of branches of the contact graphs recurs.
     pub stop_at_cycles: bool,
+    /// The number of iterations without progress after which to fail.
+    pub patience: usize,
     /// Whether the equations are those of the contact points alone, with all other velocities in equilibrium with theirs.
     pub equilibrated: bool,
     /// Counts of the work done so far.
@@ -199,11 +209,20 @@ pub struct SolveCounts {
     pub coupled: usize,
     /// Linearisations that were not positive definite where the energy was minimised.
     pub unstable: usize,
+    /// The least norm in N of a residual since the search began, and the number of linearisations until then; only decreases by
+    /// [`PROGRESS`] count.
+    pub least: (f64, usize),
     /// A hash of the branches of all points for each linearisation; different sets of branches have different hashes.
     pub sets: Vec<f64>,
 }
 
 impl SolveCounts {
+    /// Begins another search.
+    pub fn restart_search(&mut self) {
+        self.sets.clear();
+        self.least = (f64::INFINITY, 0);
+    }
+
     /// Resets all counts; `sets` keeps its memory.
     pub fn restart(&mut self) {
         self.sets.clear();
@@ -338,6 +357,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             if self.counts.residuals == 1 {
                 self.counts.first = last;
             }
+            if last < PROGRESS * self.counts.least.0 {
+                self.counts.least = (last, self.counts.sets.len());
+            }
             let stagnates = last >= STAGNATION * self.scratch.residuals[1];
             self.scratch.residuals[0] = last;
             let speed = self.scratch.velocity.norm()? + self.obstacles.speed(self.contacts);
@@ -395,6 +417,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         self.counts.sets.push(all);
         match self.counts.period() {
             Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle_message(period))),
+            _ if self.counts.sets.len() - self.counts.least.1 > self.patience => {
+                Err(Error::Failed(TOO_MANY.into()))
+            }
             _ => Ok(()),
         }
     }

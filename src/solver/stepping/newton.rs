@@ -5,7 +5,7 @@ use super::{
     bounded::Bounded,
     contacts::restore_pressures,
     descent::{DIRECTIONS_PER_ITERATION, Descent, SHORT_DESCENT},
-    equations::{CellForces, ContactEquations, Floor, Scratch, SolveCounts, cycle_message},
+    equations::{CellForces, ContactEquations, Floor, PATIENCE, Scratch, SolveCounts, cycle_message},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
@@ -438,14 +438,17 @@ impl Newton {
         let absolute = sharpness * system.tolerance.max(self.settings.tolerance * self.counts.first);
         let tolerances = (absolute, self.settings.tolerance);
         let limit = self.settings.max_newton_iterations as usize;
+        let most = DIRECTIONS_PER_ITERATION * limit;
         let directions = match search {
             Search::ShortDescent => SHORT_DESCENT,
-            _ if self.flow.is_some() || problem.body.contacts.iter().any(may_fall) => {
-                DIRECTIONS_PER_ITERATION * limit
-            }
+            _ if self.flow.is_some() || problem.body.contacts.iter().any(may_fall) => most,
             _ => limit,
         };
-        self.counts.sets.clear();
+        let [iterations, patience] = match search {
+            Search::FullSteps if limit >= PATIENCE && sharpness == 1.0 => [most, PATIENCE],
+            _ => [limit, usize::MAX],
+        };
+        self.counts.restart_search();
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = self.flow.as_mut().map(|flow| flow.of(cells, problem.flow_start));
         let is_equilibrated = search == Search::Equilibrated;
@@ -460,6 +463,7 @@ impl Newton {
             linear_solver: krylov,
             session: problem.session,
             stop_at_cycles: search == Search::FullSteps,
+            patience,
             equilibrated: is_equilibrated,
             counts: std::mem::take(&mut self.counts),
         };
@@ -470,7 +474,7 @@ impl Newton {
                 solved.map(|converged| (!converged).then_some(NO_MINIMUM))
             }
             None => {
-                let solved = self.snes.solve(&mut equations, unknowns, tolerances, limit);
+                let solved = self.snes.solve(&mut equations, unknowns, tolerances, iterations);
                 solved.map(|outcome| (!outcome.converged()).then(|| outcome.description()))
             }
         };
@@ -551,9 +555,14 @@ impl Newton {
             let sharpness = SHARPER.powi(times);
             self.set_linear_tolerances(equations, sharpness)?;
             self.scratch.restart();
-            // Its last iterate is no solution, even if it is on the graphs.
+            // Where rounding errors end it, its last iterate is a solution with the residual of a search that is not sharper; otherwise it
+            // is none, even if it is on the graphs.
             if let Some(reason) = self.attempt(problem, equations, search, sharpness)? {
-                return Err(problem.failed(&reason, INCLUSION_REMEDY));
+                let residual = self.last_residual().norm()?;
+                let is_balanced = self.obstacles.failure(residual, self.settings.tolerance).is_none();
+                if !(is_balanced && residual <= equations.system.tolerance) {
+                    return Err(problem.failed(&reason, INCLUSION_REMEDY));
+                }
             }
             inclusion = self.inclusion_residual(problem, equations.velocity)?;
         }

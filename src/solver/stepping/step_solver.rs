@@ -353,8 +353,13 @@ impl StepSolver {
             let mut solution = forces.like()?;
             self.precondition(forces, &mut solution)?;
             if self.springs.are_needed() && !is_pressed_on {
-                // Foundations that nothing presses on yet do not resist: start where springs bear the loads.
-                trial.copy_from(&solution)?;
+                // Foundations that nothing presses on yet do not resist: start where springs bear the loads. Dashpots, which bear less
+                // and less of a faster motion, resist most at rest.
+                let are_dashpots = |contact: &Contact<D>| !contact.law.depends_on_displacement();
+                match problem.body.contacts.iter().all(are_dashpots) {
+                    true => trial.fill(0.0)?,
+                    false => trial.copy_from(&solution)?,
+                }
                 restore_pressures(problem.body, problem.state)?;
                 is_pressed_on = true;
                 continue;

@@ -28,10 +28,10 @@ impl ExponentialDamper {
     }
 
     fn slope_at(&self, velocity: f64) -> f64 {
-        if velocity <= 0.0 { 0.0 } else { self.limit / self.velocity * (-velocity / self.velocity).exp() }
+        if velocity < 0.0 { 0.0 } else { self.limit / self.velocity * (-velocity / self.velocity).exp() }
     }
 
-    /// The root of `c v + p(v) = s` for a positive `s`. The left side is increasing and concave, so that Newton's method converges
+    /// The root of `c v + p(v) = s` for an `s` that is not negative. The left side is increasing and concave, so that Newton's method converges
     /// from below. It starts below the root, because the pressure is below its limit and below its tangent at rest.
     fn approach(&self, s: f64, c: f64) -> f64 {
         let low = f64::max((s - self.limit) / c, s / (c + self.limit / self.velocity));
@@ -49,7 +49,8 @@ impl NormalParameters for ExponentialDamper {
 
 impl Response for ExponentialDamper {
     fn resolve(&self, s: f64, c: f64, _node: NodeContext) -> Resolved {
-        if s > 0.0 {
+        // A body at rest, which nothing presses on yet, meets the slope of approach.
+        if s >= 0.0 {
             let velocity = self.approach(s, c);
             let derivative = 1.0 / (c + self.slope_at(velocity));
             Resolved { velocity, pressure: self.pressure_at(velocity), derivative, branch: 1 }
@@ -105,6 +106,12 @@ mod tests {
         assert!((OIL.pressure(1e-12, NODE) / 5e-12 - 1.0).abs() < 1e-11, "a damper of 5 Pa s/m");
         assert_eq!(OIL.pressure(1e9, NODE), 10.0);
         assert_eq!([OIL.branch(-1.0, NODE), OIL.branch(HALF, NODE)], [0, 1]);
+        let at_rest = OIL.resolve(0.0, 3.0, NODE);
+        assert_eq!(
+            (at_rest.velocity, at_rest.pressure, at_rest.derivative),
+            (0.0, 0.0, 1.0 / 8.0),
+            "5 Pa s/m beside 3"
+        );
     }
 
     #[test]
