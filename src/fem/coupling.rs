@@ -128,6 +128,8 @@ pub struct MasterShare {
     pub master: u32,
     /// Its share, without unit.
     pub share: f64,
+    /// Whether it is on the other side, no neighbour of the slave node.
+    pub is_faced: bool,
 }
 
 /// The change of basis `T` of this rank.
@@ -157,7 +159,7 @@ struct HeldTogether<const D: usize> {
 }
 
 impl<const D: usize> HeldTogether<D> {
-    /// The held directions of a slave node along which most of these masters are held.
+    /// The held directions of a slave node along which most of these masters on the other side are held.
     fn of(held: &Held<D>, slave: u32, masters: &[(u32, f64)]) -> Vec<Self> {
         let (frame, free) = held.frame(slave as usize);
         let along = |direction: &Vector<D>| {
@@ -199,7 +201,9 @@ impl<const D: usize> Coupling<D> {
                 let columns: Vec<Vector<D>> = columns.collect();
                 values.extend((0..D * D).map(|k| columns[k % D][k / D]));
             }
-            held_together.extend(HeldTogether::of(held, slave as u32, &masters[first..]));
+            let faced = of_slave.iter().zip(&masters[first..]).filter(|(pair, _)| pair.is_faced);
+            let faced: Vec<(u32, f64)> = faced.map(|(_, master)| *master).collect();
+            held_together.extend(HeldTogether::of(held, slave as u32, &faced));
             slaves.push((slave as u32, first..masters.len()));
         }
         let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);

@@ -7,7 +7,7 @@ use crate::{
         mortar::{Contribution, Facet, contributions},
         surface_points,
     },
-    linear_algebra::tensor::{Vector, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, norm},
     mesh::Mesh,
     parallel::{
         agreement::Agreed,
@@ -186,7 +186,11 @@ impl<const D: usize> Pair<D> {
         let slaves: Vec<Facet<D>> = self.on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
         let masters = gather_facets(session, mesh, places, &self.against)?;
         let depth = DEEPEST * longest_side(session, places);
-        let all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
+        let mut all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
+        if mesh.order() == 2 {
+            let faced = gather_places(session, mesh, places, [&self.on, &self.against])?;
+            all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &faced));
+        }
         let own: BTreeSet<u32> = slaves.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
         let mut lawless = self.lawless.clone();
         loop {
@@ -252,7 +256,11 @@ pub fn shares<const D: usize>(mesh: &Mesh<D>, pairs: &[Pair<D>]) -> Vec<MasterSh
     let of_node = |node: &PairedNode<D>| {
         let slave = mesh.global_node(node.node);
         let masters = node.masters.iter();
-        masters.map(move |&(master, share)| MasterShare { slave, master, share }).collect::<Vec<_>>()
+        let of_master = move |&(master, share): &(u32, f64)| {
+            let is_faced = !node.is_beside(master);
+            MasterShare { slave, master, share, is_faced }
+        };
+        masters.map(of_master).collect::<Vec<_>>()
     };
     let mut all: Vec<MasterShare> = pairs.iter().flat_map(|pair| &pair.nodes).flat_map(of_node).collect();
     all.sort_by_key(|share| share.slave);
@@ -290,6 +298,40 @@ fn gather_facets<const D: usize>(
     let corners = places.chunks_exact(D * D);
     let corners = corners.map(|all| std::array::from_fn(|a| std::array::from_fn(|i| all[a * D + i])));
     Ok(nodes.chunks_exact(per_facet).zip(corners).map(|(nodes, at)| Facet::new(nodes.to_vec(), at)).collect())
+}
+
+/// The places in m of the nodes of these own facets and of these facets of all ranks, by global numbers. Collective.
+fn gather_places<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    places: &[Vector<D>],
+    [own, of_all]: [&[u32]; 2],
+) -> Result<BTreeMap<u32, Vector<D>>, Agreed> {
+    let of = |facets: &[u32]| -> BTreeMap<u32, Vector<D>> {
+        let nodes = facets.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+        nodes.map(|node| (mesh.global_node(node), places[node as usize])).collect()
+    };
+    let sent = of(of_all);
+    let numbers: Vec<u32> = sent.keys().copied().collect();
+    let values: Vec<f64> = sent.into_values().flatten().collect();
+    let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);
+    let mut all = of(own);
+    all.extend(numbers.into_iter().zip(values.as_chunks().0.iter().copied()));
+    Ok(all)
+}
+
+/// The integral of a multiplier times the distance between two quadratic surfaces, which bulge between the corners of their facets as far as
+/// their middle nodes are off, in m^D.
+fn gap_between_nodes<const D: usize>(
+    Contribution { node, normal, masters, .. }: &Contribution<D>,
+    places: &BTreeMap<u32, Vector<D>>,
+) -> f64 {
+    let from = &places[node];
+    let parts = masters.iter().map(|(master, share)| {
+        let way = add_scaled(&places[master], -1.0, from);
+        share * dot(&way, normal)
+    });
+    parts.sum()
 }
 
 /// What the facets around a node contribute to it.

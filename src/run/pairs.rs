@@ -218,7 +218,8 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
             let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
                 let free = |master: u32| norm(&held.free_part(master as usize, direction));
                 let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);
-                masters.iter().map(|(master, share)| (*share, free(*master))).collect()
+                let faced = masters.iter().filter(|(master, _)| !node.is_beside(mesh.global_node(*master)));
+                faced.map(|(master, share)| (*share, free(*master))).collect()
             };
             if let Some(why) = conflict(node, held, rubs, facing) {
                 found.get_or_insert((node.node as usize, pair.contact, why.into()));

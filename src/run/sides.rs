@@ -115,7 +115,7 @@ impl<const D: usize> Circumstances<D> {
         };
         let nodes = pair.nodes.iter().filter(|node| {
             let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
-                node.masters.iter().map(|(master, share)| (*share, free(master, direction))).collect()
+                node.faced().map(|(master, share)| (*share, free(master, direction))).collect()
             };
             conflict(node, &self.held, rubs(contact), facing).is_some()
         });

@@ -708,3 +708,29 @@ fn a_beam_is_lifted_from_its_plane_in_one_step_node_by_node() {
     let lifting = results.table("resultants.csv").only("source", "support right").last("force_y");
     assert!((lifting / exact - 1.0).abs() < 1e-3, "{lifting} N for {exact} N");
 }
+
+#[test]
+fn a_block_that_nothing_holds_falls_on_a_plane_under_any_load() {
+    // The load alone decides whether springs in place of contact let it fall as far as the plane.
+    for (modulus, pressure) in [("1e8", "1.0"), ("2e11", "6e3"), ("1e5", "1e-4"), ("1e7", "1.0")] {
+        for law in ["{unilateral = {}}", "{compliance = {stiffness = 1e9}}"] {
+            let case = Case::written_as(
+                "
+                mesh.rectangle = {size = [1.0, 0.5], cells = [4, 2]}
+                support = [{on = ['top'], fix = ['x']}]
+                traction = [{on = ['top'], pressure = 1.0}]
+                time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+                contact = [{on = ['bottom'], normal = {}, obstacle.plane = {point = [0.0, -1e-4], normal = [0, 1]}}]
+                [material]
+                hypothesis = 'plane_strain'
+                elasticity = {youngs_modulus = 1e8, poisson_ratio = 0.3}",
+            )
+            .set("material.elasticity.youngs_modulus", modulus)
+            .set("traction.0.pressure", pressure)
+            .set("contact.0.normal", law);
+            let force = case.run(1).table("resultants.csv").only("source", "contact bottom").last("force_y");
+            let load: f64 = pressure.parse().expect("a number");
+            assert!((force / load - 1.0).abs() < 1e-4, "{modulus}, {law}: {force} N for {load}");
+        }
+    }
+}

@@ -124,6 +124,15 @@ fn bodies_that_supports_move_along_their_contact_rub_by_their_relative_velocity(
                 let case = format!("{on} order {order}, {lower} and {upper} m/s");
                 assert!((force - known).abs() < 1e-6, "{case}: {force} N");
                 assert!((force + opposite).abs() < 1e-9, "{case}: {opposite} N against");
+                // What supports feel of it.
+                let reactions: f64 =
+                    (table.words("source").into_iter().collect::<std::collections::BTreeSet<_>>())
+                        .into_iter()
+                        .filter(|source| source.starts_with("support upper."))
+                        .map(last)
+                        .sum();
+                let of_upper = if on == sides[0] { force } else { opposite };
+                assert!((reactions + of_upper).abs() < 1e-6, "{case}: {reactions} N at its supports");
                 let history = results.table("history.csv");
                 let work: f64 = history.numbers("contact_dissipation").iter().sum();
                 assert!(
@@ -975,5 +984,31 @@ fn quadratic_facets_that_are_covered_in_part_carry_the_weight_and_the_friction_o
                 assert!((rubbing / 3e4 - 1.0).abs() < 1e-6, "{what}: {source} {rubbing} N");
             }
         }
+    }
+}
+
+#[test]
+fn quadratic_facets_that_bulge_under_load_slide_with_the_pressure_of_hertz() {
+    let case = Case::written_as(
+        "
+        support = [{on = ['lower.bottom'], fix = 'all'}, {on = ['upper.top'], fix = ['x'], displacement = ['0.2*t']}]
+        traction = [{on = ['upper.top'], pressure = 770602.6}]
+        time = {end = 1.0, step = 0.1, scheme = 'implicit_euler'}
+        contact = [{on = ['upper.bottom'], against = ['lower.top'], sliding = 'finite', normal.unilateral.gap = 'x^2/8'}]
+        [mesh]
+        order = 2
+        rectangle = [{name = 'lower', corner = [-1.0, -1.0], size = [2.0, 1.0], cells = [40, 8], grading = {y = 1.5, toward = ['top']}},
+            {name = 'upper', corner = [-0.7, 0.0], size = [1.4, 1.0], cells = [35, 8], grading = {y = 1.5, toward = ['bottom']}}]
+        [material]
+        hypothesis = 'plane_strain'
+        elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.3}",
+    );
+    let largest = case
+        .run(1)
+        .table("resultants.csv")
+        .only("source", "contact upper.bottom")
+        .numbers("largest_pressure");
+    for pressure in largest {
+        assert!((pressure / 6.868e6 - 1.0).abs() < 0.05, "{pressure} Pa for 6.868 MPa");
     }
 }

@@ -8,6 +8,7 @@ use crate::{
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
 };
 
 /// Adds the energy that contact dissipated in a committed step, the numerical part, and the work on obstacles; adds the powers of friction
@@ -81,6 +82,23 @@ pub(super) fn keep_closeness<const D: usize, const S: usize>(
         body.contacts.iter_mut().for_each(|contact| contact.keep_slip([&displacement, &velocity]));
     }
     Ok(())
+}
+
+/// The multiple of a motion at which it has closed a gap of each contact whose gaps it closes, and goes on as far again; 1 where that is less.
+/// Collective.
+pub(super) fn multiple_to_touch<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    motion: &mut DistributedVector,
+) -> Result<f64> {
+    motion.update_ghosts()?;
+    let motion = motion.local()?;
+    let mut most = 1.0_f64;
+    for contact in &body.contacts {
+        let [negative] = session.largest([-contact.multiple_to_touch(&motion)]);
+        most = if negative.is_finite() { most.max(-2.0 * negative) } else { most };
+    }
+    Ok(most)
 }
 
 /// Sets the pressures of all contacts to those of the converged state, and obstacles that forces move to the start of the step.

@@ -4,7 +4,7 @@ use super::{
     StepOutcome,
     bounded::{self, Bounded},
     condensed::Condensed,
-    contacts::restore_pressures,
+    contacts::{multiple_to_touch, restore_pressures},
     corrections::correct,
     equations::{Floor, StepMatrix},
     factor_cache::{FactorCache, Prepared},
@@ -353,12 +353,16 @@ impl StepSolver {
             let mut solution = forces.like()?;
             self.precondition(forces, &mut solution)?;
             if self.springs.are_needed() && !is_pressed_on {
-                // Foundations that nothing presses on yet do not resist: start where springs bear the loads. Dashpots, which bear less
-                // and less of a faster motion, resist most at rest.
+                // Foundations that nothing presses on yet do not resist: start where springs bear the loads, or farther on in the same
+                // direction where the gaps are closed. Dashpots, which bear less and less of a faster motion, resist most at rest.
                 let are_dashpots = |contact: &Contact<D>| !contact.law.depends_on_displacement();
                 match problem.body.contacts.iter().all(are_dashpots) {
                     true => trial.fill(0.0)?,
-                    false => trial.copy_from(&solution)?,
+                    false => {
+                        trial.copy_from(&solution)?;
+                        let multiple = multiple_to_touch(session, problem.body, trial)?;
+                        trial.scale(multiple)?;
+                    }
                 }
                 restore_pressures(problem.body, problem.state)?;
                 is_pressed_on = true;

@@ -1,6 +1,13 @@
 //! Other start velocities of a step that may have several solutions.
 
-use super::{Contact, point::Vectors::Body};
+use super::{
+    Contact,
+    point::{Point, Vectors::Body},
+};
+use crate::linear_algebra::tensor::larger;
+
+/// Points that a motion closes by less than this share of the fastest one do not count.
+const SLOW: f64 = 1e-3;
 
 impl<const D: usize> Contact<D> {
     /// The largest velocity in m/s at which a law on this rank has a kink; 0 where no law has one.
@@ -9,6 +16,16 @@ impl<const D: usize> Contact<D> {
         let sliding =
             self.friction.as_ref().map_or(0.0, |friction| friction.law.corner_velocity(friction.context));
         f64::max(normal, sliding)
+    }
+
+    /// The multiple of a motion that closes the gap of a point on this rank first, in the step that has begun; infinite where it closes none.
+    pub fn multiple_to_touch(&self, velocity: &[f64]) -> f64 {
+        let way = |point: &Point<D>| point.context.step_length * point.normal_component(Body, velocity);
+        let carrying = || self.points.iter().filter(|point| point.carries(&self.law) && point.can_touch());
+        let longest = carrying().map(way).fold(0.0, larger);
+        let closing = carrying().filter(|point| way(point) > SLOW * longest);
+        let multiples = closing.map(|point| (-point.context.penetration).max(0.0) / way(point));
+        multiples.fold(f64::INFINITY, f64::min)
     }
 
     /// Sets the normal velocity of the nodal points to the value of `velocity` for their node, in m/s, and the velocity along a
