@@ -119,6 +119,12 @@ pub struct Traction {
     /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["top"])]
     pub on: Vec<String>,
+    /// The part of these boundaries that is loaded: the facets at whose centre, the mean of their corners, this expression in x, y, z
+    /// is not 0. A facet is loaded as a whole or not at all; `solver check` prints the loaded area. A product of conditions holds
+    /// where all hold, their `max` where one holds. Absent: the whole boundaries.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
+    #[schemars(extend("variables" = "x, y, z"), example = "x > 0.5", example = "(x > 1)*(x < 2)")]
+    pub part: Option<Scalar>,
     /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
     /// x, y, z.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -336,6 +342,7 @@ impl Traction {
 
     pub(in crate::job) fn check_names(&self, table: &mut Table<'_>, mesh: MeshNames<'_>) {
         check_on(table, &self.on, None, mesh);
+        table.check_flat("where", self.part.as_ref(), mesh.dimension);
         table.check_vector("value", &self.value, mesh.dimension);
         table.check_flat("pressure", self.pressure.as_ref(), mesh.dimension);
     }
