@@ -171,10 +171,8 @@ fn pressures_on_parts_of_a_curved_boundary_add_to_that_on_all_of_it() {
 
 #[test]
 fn checks_name_the_loaded_part_and_its_area() {
-    let case = quarter(&mesh("straight"), 1).set(
-        "traction",
-        "[{on = ['mantle'], pressure = 10}, {on = ['top'], where = 'x > y', pressure = 1}]",
-    );
+    let case = quarter(&mesh("straight"), 1)
+        .set("traction", "[{on = ['mantle'], pressure = 10}, {on = ['top'], where = 'x > y', pressure = 1}]");
     let printed = launch::run(2, &["check", case.written().to_str().expect("a path"), "--json"]);
     let report: serde_json::Value = serde_json::from_str(&printed.expect(0).stdout).expect("an object");
     let [mantle, top] = [0, 1].map(|at| &report["tractions"][at]);
