@@ -614,6 +614,23 @@ fn rubbed(scheme: &str, before: f64) -> Case {
         .set("output.profile", "[{ on = 'block.bottom' }]")
 }
 
+/// The block in space, with quadratic cells.
+fn in_space(scheme: &str, before: f64) -> Case {
+    dragged(scheme, before)
+        .without("mesh.rectangle")
+        .without("material.hypothesis")
+        .set("mesh.box", "{ size = [1, 0.5, 0.5], cells = [2, 1, 1] }")
+        .set("mesh.order", "2")
+        .set("traction.0.value", "[0, 0.5, -8]")
+        .set(
+            "support",
+            &format!(
+                "[{{ on = ['left'], fix = ['x'], displacement = ['0.02*(t + {before})'] }}, {{ on = ['front'], fix = ['y'] }}]"
+            ),
+        )
+        .set("output.probe", "[{ name = 'corner', point = [1, 0.5, 0.5] }, { name = 'foot', point = [0.5, 0.25, 0] }]")
+}
+
 /// The numbers of a column of the last output.
 fn at_the_end(case: &Case, file: &str, column: &str) -> Vec<f64> {
     let table = case.results().table(file);
@@ -629,6 +646,7 @@ fn a_stage_that_resets_the_displacement_is_the_straight_run_from_there_on() {
         (dragged as fn(&str, f64) -> Case, "implicit_euler", [1, 3]),
         (rubbed as fn(&str, f64) -> Case, "implicit_euler", [2, 1]),
         (rubbed as fn(&str, f64) -> Case, "implicit_euler", [1, 2]),
+        (in_space as fn(&str, f64) -> Case, "implicit_euler", [3, 2]),
     ] {
         let straight = make(scheme, 0.0).set("time.end", "1.0").run_and_keep(1);
         let first = make(scheme, 0.0).run_and_keep(ranks[0]);
