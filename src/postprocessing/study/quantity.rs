@@ -204,7 +204,7 @@ mod tests {
     #[test]
     fn a_period_is_that_between_crossings_of_the_mean_in_a_window() {
         let folder = tempfile::tempdir().expect("folder");
-        let rows = (0..40).map(|n| {
+        let rows = (0..40_i32).map(|n| {
             // A jump at 5 s, then a sawtooth about 10 with the period of 8 rows of 0.25 s.
             let (time, saw) = (0.25 * f64::from(n), f64::from((n % 8 - 4).abs()));
             format!("{n},{time},{}\n", if n < 20 { 0.0 } else { 8.0 + saw })
