@@ -128,6 +128,9 @@ enum Command {
         /// cluster; then run the study without this option to write the tables.
         #[arg(long, value_name = "I/N", conflicts_with = "ablate")]
         part: Option<study::Part>,
+        /// Print only runs that fail, as errors; the study's folder has the rest.
+        #[arg(short, long)]
+        quiet: bool,
     },
     /// Write pictures and one self-contained HTML page.
     Report {
@@ -236,8 +239,9 @@ fn dispatch(cli: Cli) -> Result<Exit> {
             }
             partition((&mesh, scale), parts, &output)
         }
-        Some(Command::Study { study, overrides, ablate, part }) => {
-            run_study(&study, &overrides, ablate, part)
+        Some(Command::Study { study, overrides, ablate, part, quiet }) => {
+            let options = study::Options { with_ablation: ablate, is_quiet: quiet };
+            run_study(&study, &overrides, options, part)
         }
         Some(Command::Report { folder, other, cells, contours }) => {
             report_on(&folder, other.as_deref(), report::Options { per_cell: cells, contours })
@@ -546,13 +550,18 @@ fn on_all_ranks(
     })
 }
 
-fn run_study(path: &Path, overrides: &[String], ablate: bool, part: Option<study::Part>) -> Result<Exit> {
+fn run_study(
+    path: &Path,
+    overrides: &[String],
+    options: study::Options,
+    part: Option<study::Part>,
+) -> Result<Exit> {
     in_session(|session, _| {
         let colour = std::io::stderr().is_terminal();
         let plan = session.agree(study::Plan::load(path, overrides, colour))?;
         match part {
-            Some(part) => study::study_part(session, &plan, part),
-            None => study::study(session, &plan, ablate),
+            Some(part) => study::study_part(session, &plan, part, options.is_quiet),
+            None => study::study(session, &plan, options),
         }
     })
 }

@@ -695,12 +695,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
     }
 
-    /// Strain of the displacement, one a cell: the mean over its points.
+    /// Strain of the displacement as outputs count it, one a cell: the mean over its points.
     pub fn strain(&self, state: &State) -> Result<Vec<Mandel<S>>> {
         let mut out = vec![[0.0; S]; self.mesh.cell_count()];
         let shares = self.point_shares();
         let needs = Needs { strain: true, ..Needs::default() };
+        let counted = state.counted_displacement()?;
         with_nodal(state, |nodal| {
+            let nodal = Nodal { displacement: &counted, previous_displacement: &counted, ..nodal };
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
                 add_means(&shares, batch, &batch.strain, &mut out);
             });

@@ -3,9 +3,10 @@
 use crate::{
     error::Result,
     fem::effect::{Blend, Step},
-    linear_algebra::petsc::DistributedVector,
+    linear_algebra::petsc::{DistributedVector, LocalRead},
     mesh::Mesh,
 };
+use std::ops::Deref;
 
 /// Nodal fields, `D` values a node, with ghosts up to date.
 #[derive(Debug)]
@@ -14,6 +15,8 @@ pub struct State {
     pub displacement: DistributedVector,
     /// Displacement before the last step in m; present if the scheme needs it.
     pub previous_displacement: Option<DistributedVector>,
+    /// The displacement in m from which outputs and supports count; none in a run that counts from the undeformed body.
+    pub displacement_origin: Option<DistributedVector>,
     /// Velocity in m/s.
     pub velocity: DistributedVector,
     /// Velocity before the last step in m/s.
@@ -29,6 +32,32 @@ pub struct State {
     pub step_length: f64,
 }
 
+/// Values of a field, or what they exceed those of another one by.
+pub enum Counted<'a> {
+    /// The values.
+    Whole(LocalRead<'a>),
+    /// The differences.
+    Difference(Vec<f64>),
+}
+
+impl<'a> Counted<'a> {
+    fn from(values: LocalRead<'a>, origin: Option<LocalRead<'_>>) -> Self {
+        let Some(origin) = origin else { return Self::Whole(values) };
+        Self::Difference(values.iter().zip(origin.iter()).map(|(value, origin)| value - origin).collect())
+    }
+}
+
+impl Deref for Counted<'_> {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        match self {
+            Self::Whole(values) => values,
+            Self::Difference(values) => values,
+        }
+    }
+}
+
 impl State {
     /// At rest, undeformed, at time 0. Collective.
     pub fn at_rest<const D: usize>(mesh: &Mesh<D>) -> Result<Self> {
@@ -38,6 +67,7 @@ impl State {
         Ok(Self {
             displacement,
             previous_displacement: None,
+            displacement_origin: None,
             velocity,
             previous_velocity,
             contact_traction: None,
@@ -45,6 +75,27 @@ impl State {
             step: 0,
             step_length: 0.0,
         })
+    }
+
+    /// The displacement of local nodes in m as outputs count it.
+    pub fn counted_displacement(&self) -> Result<Counted<'_>> {
+        let origin = self.displacement_origin.as_ref().map(DistributedVector::local).transpose()?;
+        Ok(Counted::from(self.displacement.local()?, origin))
+    }
+
+    /// The same of owned nodes.
+    pub fn counted_displacement_of_owned(&self) -> Result<Counted<'_>> {
+        let origin = self.displacement_origin.as_ref().map(DistributedVector::owned).transpose()?;
+        Ok(Counted::from(self.displacement.owned()?, origin))
+    }
+
+    /// Lets displacements count from the present one.
+    pub fn count_from_here(&mut self) -> Result<()> {
+        let mut origin = self.displacement.like()?;
+        origin.copy_from(&self.displacement)?;
+        origin.update_ghosts()?;
+        self.displacement_origin = Some(origin);
+        Ok(())
     }
 
     /// Commits the velocity of a solved step and the displacement at its end, `u_n = u_{n-1} + k v_n` unless it is given. Collective.

@@ -1,5 +1,6 @@
 //! The axis of a body of revolution.
 
+use super::parts::part_of;
 use crate::{
     error::Result,
     fem::space::{facets, longest_side},
@@ -39,29 +40,26 @@ pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) ->
     let job = &loaded.job;
     for (number, contact) in job.contact.iter().enumerate().filter(|(_, contact)| contact.part.is_none()) {
         let names = contact.on.iter().chain(&contact.against);
-        let [inside, _] = facets_on_axis(session, mesh, names);
+        let [inside, _] = on_axis(session, mesh, &facets(mesh, names));
         session.agree(refusal(loaded, &format!("contact.{number}.on"), inside > 0))?;
     }
     for (number, traction) in job.traction.iter().enumerate() {
-        let [inside, all] = facets_on_axis(session, mesh, &traction.on);
+        let part = part_of(session, mesh, ("traction", &traction.on), traction.part.as_ref())?;
+        let [inside, all] = on_axis(session, mesh, &part);
         session.agree(refusal(loaded, &format!("traction.{number}.on"), inside > 0 && inside == all))?;
     }
     let gives_way =
         |support: &Support| support.stiffness.is_some() || support.damping.is_some() || support.absorbing;
     for (number, support) in job.support.iter().enumerate().filter(|(_, support)| gives_way(support)) {
-        let [inside, all] = facets_on_axis(session, mesh, &support.on);
+        let part = part_of(session, mesh, ("support", &support.on), support.part.as_ref())?;
+        let [inside, all] = on_axis(session, mesh, &part);
         session.agree(refusal(loaded, &format!("support.{number}.on"), inside > 0 && inside == all))?;
     }
     Ok(())
 }
 
-/// How many of the facets of these boundaries are on the axis, and how many there are. Collective.
-fn facets_on_axis<'a>(
-    session: &Session,
-    mesh: &Mesh<2>,
-    names: impl IntoIterator<Item = &'a String>,
-) -> [usize; 2] {
-    let all = facets(mesh, names);
+/// How many of these facets are on the axis, and how many there are. Collective.
+fn on_axis(session: &Session, mesh: &Mesh<2>, all: &[u32]) -> [usize; 2] {
     let is_inside = |facet: &&u32| {
         mesh.facets[**facet as usize].iter().all(|&node| mesh.is_on_axis(&mesh.nodes[node as usize]))
     };
@@ -75,6 +73,6 @@ fn refusal(loaded: &Loaded, key: &str, is_refused: bool) -> Result<()> {
     Err(loaded.fault(
         key,
         "this boundary or a part of it is the axis, which is inside the body of revolution and has no area",
-        "choose a boundary off the axis; contact may exclude it with `where`",
+        "choose a boundary off the axis, or exclude the axis with `where`",
     ))
 }

@@ -15,9 +15,7 @@ use crate::{
             surface_effects,
         },
         pairs::{Pair, PairedNode, nodes_of},
-        space::{
-            Geometry, Held, SurfacePoint, cell_rule, facets, place_in_cell, surface_means, surface_points,
-        },
+        space::{Geometry, Held, SurfacePoint, cell_rule, place_in_cell, surface_means, surface_points},
         state::State,
     },
     job::{self, Job},
@@ -27,7 +25,7 @@ use crate::{
     },
     linear_algebra::tensor::{Mandel, Vector, component, norm},
     mesh::Mesh,
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
     solver::stepping::evaluation,
 };
 use std::collections::BTreeSet;
@@ -45,7 +43,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let supports = Supports::of_body(session, &mesh, &job.support, &state.velocity)?;
     let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
-    let load = load(job, &mesh, &materials.all);
+    let load = load(session, job, &mesh, &materials.all)?;
     let elastic_support = elastic_support::<D, S>(session, job, &mesh, &supports.held, &materials)?;
     let coupling = coupling(session, &mesh, &pairs, &supports.held)?;
     let (mut contacts, parts) = contacts(session, job, &mesh, &pairs, &supports)?;
@@ -339,21 +337,23 @@ fn refuse_moving_contact<const D: usize>(
     Ok(())
 }
 
-fn load<const D: usize>(job: &Job, mesh: &Mesh<D>, materials: &[Material<f64>]) -> Load {
-    let traction = |t: &job::Traction| Traction {
-        facets: facets(mesh, &t.on),
-        value: t.value.clone(),
-        pressure: t.pressure.clone(),
+/// The loads of a job. Collective.
+fn load<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    materials: &[Material<f64>],
+) -> Result<Load, Agreed> {
+    let traction = |t: &job::Traction| {
+        let facets = part_of(session, mesh, ("traction", &t.on), t.part.as_ref())?;
+        Ok(Traction { facets, value: t.value.clone(), pressure: t.pressure.clone() })
     };
     let gravity = job.gravity.as_ref().and_then(|gravity| {
         let density = ByMaterial::new(materials.iter().map(|m| m.density).collect())?;
         Some(Gravity { acceleration: gravity.acceleration.clone(), density })
     });
-    Load {
-        tractions: job.traction.iter().map(traction).collect(),
-        body_forces: job.body_force.clone(),
-        gravity,
-    }
+    let tractions = job.traction.iter().map(traction).collect::<Result<_, Agreed>>()?;
+    Ok(Load { tractions, body_forces: job.body_force.clone(), gravity })
 }
 
 /// Sets the initial values at owned nodes; held components keep the displacement and have no velocity.

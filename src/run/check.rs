@@ -5,6 +5,7 @@ use super::{
     estimate::MemoryEstimate,
     folder::refuse_unwritable,
     header,
+    loads::{self, LoadedArea},
     obstacles::{self, ContactGaps},
     setup::{Setup, setup},
     steps,
@@ -51,6 +52,7 @@ pub struct Report {
     effects: Vec<&'static str>,
     contact_points: u64,
     gaps: Vec<ContactGaps>,
+    tractions: Vec<LoadedArea>,
     probes: Vec<Probe>,
     scheme: &'static str,
     steps: u64,
@@ -141,6 +143,7 @@ fn report<const D: usize, const S: usize>(
         effects: body.effect_names(),
         contact_points: inventory.contact_points,
         gaps: obstacles::gaps(session, job, body, &ready.state)?,
+        tractions: loads::areas(session, job, body),
         probes: job.output.probe.clone(),
         scheme: scheme.scheme().name(),
         steps,
@@ -259,6 +262,7 @@ impl Report {
             lines.push(format!("contact    {} points", self.contact_points));
         }
         lines.extend(self.gaps.iter().map(ContactGaps::line));
+        lines.extend(self.tractions.iter().map(LoadedArea::line));
         if !self.probes.is_empty() {
             let names: Vec<&str> = self.probes.iter().map(|p| p.name.as_str()).collect();
             lines.push(format!("probes     {}: inside the body", names.join(", ")));

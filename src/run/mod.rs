@@ -10,6 +10,7 @@ mod folder;
 mod header;
 mod validate;
 mod inventory;
+mod loads;
 mod materials;
 mod memory;
 mod obstacles;

@@ -16,7 +16,7 @@ use crate::{
         checkpoint_folder::{checkpoint_path, list},
         history::Totals,
     },
-    job::Loaded,
+    job::{Loaded, Reset},
     linear_algebra::tensor::{Vector, norm},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
@@ -151,6 +151,10 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         body.elastic_support.reactions = vec![0.0; body.mesh.owned * D];
     }
     let mut found = checkpoint::transfer(session, &file, &physics, body, state)?;
+    let initial = loaded.job.initial.as_ref();
+    if initial.is_some_and(|initial| initial.reset.contains(&Reset::Displacement)) {
+        session.agree(count_from_here(body, state))?;
+    }
     found.at_rest.retain(|name| name != SUPPORT_REACTION.name(Moment::Last));
     let handover = take_over(session, &found.physics, body, state)?;
     let moved = moved_before(session, &found.physics, &body.mesh, &state.velocity)?;
@@ -174,12 +178,23 @@ pub(super) fn transfer<const D: usize, const S: usize>(
             words += &format!("; {what}: {}", names.join(", "));
         }
     }
+    if state.displacement_origin.is_some() {
+        words += "; displacements count from the start of a stage";
+    }
     words += &handover.words();
     let warning = match handover.warning() {
         None => imbalance(session, body, state, loaded.job.time.step)?,
         released => released,
     };
     Ok(Some(StartState { digest: found.digest, words, warning }))
+}
+
+/// Lets displacements of outputs and supports count from the present one. Collective.
+fn count_from_here<const D: usize, const S: usize>(body: &mut Body<D, S>, state: &mut State) -> Result<()> {
+    state.count_from_here()?;
+    let origin = state.displacement.owned()?;
+    body.support_motion.iter_mut().for_each(|motion| motion.count_from(&origin));
+    Ok(())
 }
 
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.

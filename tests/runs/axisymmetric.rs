@@ -2,6 +2,7 @@
 
 use crate::{
     case::Case,
+    launch,
     results::{Results, assert_same_answer, relative_difference},
 };
 
@@ -224,6 +225,13 @@ fn a_mesh_beyond_the_axis_and_what_acts_on_the_axis_are_refused() {
     inside.run_with(2, &[]).expect(2).says("is inside the body of revolution");
     let loaded = cylinder().set("traction", "[{ on = ['left'], value = [1, 0] }]");
     loaded.run_with(2, &[]).expect(2).says("is inside the body of revolution");
+    let part = "[{ on = ['left', 'top'], where = 'x < 1e-9', value = [1, 0] }]";
+    let loaded = cylinder().set("traction", part);
+    loaded.run_with(2, &[]).expect(2).says("is inside the body of revolution");
+    let loaded = cylinder().set("traction", &part.replace("<", ">="));
+    let text = loaded.written();
+    let words = format!("traction   left, top where x >= 1e-9: {} m^2 in 4 facets", "3.14159");
+    launch::run(2, &["check", text.to_str().expect("a path")]).expect(0).says(&words);
     let moved = cylinder().set("initial", "{ displacement = [0.001, 0] }");
     moved.run_with(2, &[]).expect(2).says("on the axis of the body of revolution, where it is 0");
 }

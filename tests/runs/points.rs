@@ -138,3 +138,50 @@ fn a_group_inside_the_body_is_noted_and_no_table_may_name_it() {
         outcome.says("\"fault\" has facets inside the body").says("name a boundary");
     }
 }
+
+/// The mantle of the quarter of a disc, of radius 1 m and 0.3 m high, under a pressure of 10 Pa: the sum of the forces along x and
+/// along y is 10 Pa on the area of its projection, also if its facets are curved.
+#[test]
+fn pressures_on_parts_of_a_curved_boundary_add_to_that_on_all_of_it() {
+    let part = |condition: &str| format!("{{on = ['mantle'], where = '{condition}', pressure = 10}}");
+    for order in [1, 2] {
+        let forces = |tractions: &str, ranks: usize| {
+            let case = quarter(&mesh("curved"), order).set("traction", tractions).run_and_keep(ranks);
+            let table = case.results().table("resultants.csv");
+            let of = |source: &str| {
+                let rows = table.only("source", source);
+                ["force_x", "force_y"].map(|name| rows.last(name))
+            };
+            [of("traction mantle"), of("traction mantle (2)")]
+        };
+        let parts = format!("[{}, {}]", part("y > x"), part("y <= x"));
+        let alone = forces(&parts, 1);
+        let [[upper_x, upper_y], [lower_x, lower_y]] = alone;
+        // Facets have the right side of the diagonal up to their size.
+        assert!(upper_y < 2.0 * upper_x && lower_x < 2.0 * lower_y, "{alone:?}");
+        for sum in [upper_x + lower_x, upper_y + lower_y] {
+            assert!((sum + 3.0).abs() < 1e-12, "order {order}: {sum} N");
+        }
+        for ranks in [2, 3] {
+            let off = relative_difference(alone.as_flattened(), forces(&parts, ranks).as_flattened());
+            assert!(off < 1e-14, "order {order}, {ranks} ranks: {off}");
+        }
+    }
+}
+
+#[test]
+fn checks_name_the_loaded_part_and_its_area() {
+    let case = quarter(&mesh("straight"), 1)
+        .set("traction", "[{on = ['mantle'], pressure = 10}, {on = ['top'], where = 'x > y', pressure = 1}]");
+    let printed = launch::run(2, &["check", case.written().to_str().expect("a path"), "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&printed.expect(0).stdout).expect("an object");
+    let [mantle, top] = [0, 1].map(|at| &report["tractions"][at]);
+    assert_eq!((&mantle["on"][0], &mantle["where"]), (&"mantle".into(), &serde_json::Value::Null));
+    // About a quarter of the cylinder.
+    let area = mantle["area"].as_f64().expect("a number");
+    assert!((area - 0.15 * std::f64::consts::PI).abs() < 1e-4, "{area}");
+    assert_eq!((&top["on"][0], &top["where"]), (&"top".into(), &"x > y".into()));
+    // About half of the quarter of the disc.
+    let area = top["area"].as_f64().expect("a number");
+    assert!(top["facets"].as_u64().is_some_and(|count| count > 0) && (0.3..0.5).contains(&area), "{top}");
+}

@@ -534,3 +534,199 @@ fn a_column_at_rest_in_space_stays_at_rest_when_its_sides_give_way() {
     let way = moved(&first, &second);
     assert!(way < 1e-8 * 4e-3, "{way:e} m");
 }
+
+/// A block with flow that a moving plate carries along a rough plane: contact in touch, friction that remembers the slip. `before` is the
+/// time in s of the stage before.
+fn dragged(scheme: &str, before: f64) -> Case {
+    let way = format!("'0.02*(t + {before})'");
+    let text = format!(
+        r#"
+[mesh.rectangle]
+size = [1, 0.5]
+cells = [6, 3]
+[material]
+hypothesis = "plane_strain"
+density = 10
+elasticity = {{ youngs_modulus = 1000, poisson_ratio = 0.3 }}
+viscosity = {{ volumetric = 3.75, shear = 5 }}
+viscoplasticity.perzyna = {{ relaxation = 5, yield_stress = 2, hardening_modulus = 100 }}
+[[support]]
+on = ["left"]
+fix = ["x"]
+displacement = [{way}]
+[[traction]]
+on = ["top"]
+where = "x > 0.3"
+value = [0, -8]
+[[contact]]
+on = ["bottom"]
+normal.compliance.stiffness = 2000
+friction.expression.coefficient = "0.2 + 0.2*exp(-l/0.01)"
+wear.coefficient = 1e-3
+[time]
+scheme = "{scheme}"
+end = 0.5
+step = 0.025
+[solver]
+tolerance = 1e-13
+[checkpoint]
+every = 10
+keep = 10
+[output]
+also = ["strain", "gap"]
+probe_also = ["strain", "gap", "contact_pressure"]
+fields.every = 100
+[[output.probe]]
+name = "corner"
+point = [1, 0.5]
+[[output.probe]]
+name = "foot"
+point = [0.5, 0]
+[[output.profile]]
+on = "bottom"
+"#
+    );
+    Case::written_as(&text)
+}
+
+/// The block on another one, which a mesh that does not match shares no nodes with.
+fn rubbed(scheme: &str, before: f64) -> Case {
+    let block = |name: &str, y: f64, cells: &str| {
+        format!("{{ name = '{name}', corner = [0, {y}], size = [1, 0.5], cells = {cells} }}")
+    };
+    dragged(scheme, before)
+        .set(
+            "mesh.rectangle",
+            &format!("[{}, {}]", block("base", -0.5, "[4, 2]"), block("block", 0.0, "[5, 2]")),
+        )
+        .set("support.0.on", "['block.left']")
+        .set("traction.0.on", "['block.top']")
+        .set("contact.0.on", "['block.bottom']")
+        .set("contact.0.against", "['base.top']")
+        .set(
+            "support",
+            &format!(
+                "[{{ on = ['block.left'], fix = ['x'], displacement = ['0.02*(t + {before})'] }}, \
+                 {{ on = ['base.bottom'], fix = 'all' }}]"
+            ),
+        )
+        .without("contact.0.wear")
+        .set("output.profile", "[{ on = 'block.bottom' }]")
+}
+
+/// The block in space, with quadratic cells.
+fn in_space(scheme: &str, before: f64) -> Case {
+    dragged(scheme, before)
+        .without("mesh.rectangle")
+        .without("material.hypothesis")
+        .set("mesh.box", "{ size = [1, 0.5, 0.5], cells = [2, 1, 1] }")
+        .set("mesh.order", "2")
+        .set("traction.0.value", "[0, 0.5, -8]")
+        .set(
+            "support",
+            &format!(
+                "[{{ on = ['left'], fix = ['x'], displacement = ['0.02*(t + {before})'] }}, {{ on = ['front'], fix = ['y'] }}]"
+            ),
+        )
+        .set("output.probe", "[{ name = 'corner', point = [1, 0.5, 0.5] }, { name = 'foot', point = [0.5, 0.25, 0] }]")
+}
+
+/// The numbers of a column of the last output.
+fn at_the_end(case: &Case, file: &str, column: &str) -> Vec<f64> {
+    let table = case.results().table(file);
+    let last = table.words("time").last().expect("a row").to_string();
+    table.only("time", &last).numbers(column)
+}
+
+/// What changes in a straight run after the first stage, and what is there at its end, are the last values of a stage that resets the
+/// displacement, on other ranks.
+#[test]
+fn a_stage_that_resets_the_displacement_is_the_straight_run_from_there_on() {
+    for (make, scheme, ranks) in [
+        (dragged as fn(&str, f64) -> Case, "implicit_euler", [1, 3]),
+        (rubbed as fn(&str, f64) -> Case, "implicit_euler", [2, 1]),
+        (rubbed as fn(&str, f64) -> Case, "implicit_euler", [1, 2]),
+        (in_space as fn(&str, f64) -> Case, "implicit_euler", [3, 2]),
+    ] {
+        let straight = make(scheme, 0.0).set("time.end", "1.0").run_and_keep(1);
+        let first = make(scheme, 0.0).run_and_keep(ranks[0]);
+        let from = format!("{:?}", out(&first));
+        // The support counts from where it is, too: 0.02 t.
+        let second = make(scheme, 0.0).set("initial.from", &from).set("initial.reset", "['displacement']");
+        let outcome =
+            second.run_with(ranks[1], &[]).expect(0).says("displacements count from the start of a stage");
+        assert!(!format!("{}{}", outcome.stdout, outcome.stderr).contains("out of balance"));
+        let columns = [
+            ("probes.csv", "displacement_x", true),
+            ("probes.csv", "displacement_y", true),
+            ("probes.csv", "strain_xx", true),
+            ("probes.csv", "strain_yy", true),
+            ("probes.csv", "velocity_x", false),
+            ("probes.csv", "gap", false),
+            ("probes.csv", "contact_pressure", false),
+            ("profiles.csv", "normal_displacement", true),
+            ("profiles.csv", "gap", false),
+            ("profiles.csv", "contact_pressure", false),
+            ("resultants.csv", "force_x", false),
+            ("resultants.csv", "force_y", false),
+        ];
+        let compare = |second: &Case, what: &str| {
+            for (file, column, is_counted) in columns {
+                let [whole, half, found] =
+                    [&straight, &first, second].map(|case| at_the_end(case, file, column));
+                let change = whole.iter().zip(&half).map(|(whole, half)| whole - half).collect();
+                let expected: Vec<f64> = if is_counted { change } else { whole };
+                let bound = 1e-10 * expected.iter().chain(&half).fold(1e-3, |m: f64, x| m.max(x.abs()));
+                for (found, expected) in
+                    found.iter().zip(&expected).filter(|(_, expected)| expected.is_finite())
+                {
+                    let off = (found - expected).abs();
+                    assert!(
+                        off < bound,
+                        "{what}, {scheme}, {ranks:?}: {column} {found} instead of {expected}"
+                    );
+                }
+            }
+        };
+        compare(&second, "stage");
+        // At its first step the second stage has hardly moved.
+        let moved = second.results().table("probes.csv").numbers("displacement_x")[0];
+        assert!(moved.abs() < 0.02 * 0.06, "{moved}");
+        // Restarted on other ranks, and as the start of a third stage.
+        let stopped = make(scheme, 0.0).set("initial.from", &from).set("initial.reset", "['displacement']");
+        stopped.run_with(1, &["--set", "time.end=0.25"]).expect(0);
+        stopped.run_with(2, &["--restart"]).expect(0).says("checkpoint-10.h5");
+        compare(&stopped, "restart");
+    }
+}
+
+#[test]
+fn a_third_stage_counts_from_where_the_second_one_did_unless_it_resets_again() {
+    let first = dragged("implicit_euler", 0.0).run_and_keep(1);
+    let stage = |before: &Case, way: &str, reset: &str| {
+        dragged("implicit_euler", 0.0)
+            .set("support.0.displacement", &format!("['{way}']"))
+            .set("initial.from", &format!("{:?}", out(before)))
+            .set("initial.reset", reset)
+    };
+    let second = stage(&first, "0.02*t", "['displacement']").run_and_keep(2);
+    let way = |case: &Case, at: usize| {
+        let profile = case.results().table("profiles.csv").numbers("tangential_displacement_x");
+        if at == 0 {
+            profile[0]
+        } else {
+            *at_the_end(case, "profiles.csv", "tangential_displacement_x").first().expect("a row")
+        }
+    };
+    // The corner at the plate follows it.
+    assert!((way(&second, 1) - 0.01).abs() < 1e-12, "{}", way(&second, 1));
+    let third = stage(&second, "0.02*(t + 0.5)", "[]").run_and_keep(1);
+    assert!((way(&third, 0) - 0.01).abs() < 1e-12, "{}", way(&third, 0));
+    assert!((way(&third, 1) - 0.02).abs() < 1e-12, "{}", way(&third, 1));
+    let again = stage(&second, "0.02*t", "['displacement']").run_and_keep(1);
+    assert!(way(&again, 0).abs() < 1e-12, "{}", way(&again, 0));
+    let strain = |case: &Case| at_the_end(case, "probes.csv", "strain_yy");
+    let force = |case: &Case| at_the_end(case, "resultants.csv", "force_x");
+    assert!(relative_difference(&force(&third), &force(&again)) < 1e-10, "the same forces");
+    assert!(relative_difference(&strain(&third), &strain(&again)) > 1e-3, "counted from another state");
+}

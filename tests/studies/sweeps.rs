@@ -136,3 +136,91 @@ fn parameters_are_swept_like_keys() {
     let typo = Scene::new(&job, "[sweep]\n\"parameters.roh\" = [1.0, 2.0]\n");
     typo.study(1, &[]).expect(2).says("no parameter `roh`").says("did you mean `parameters.rho`?");
 }
+
+#[test]
+fn a_sweep_over_two_keys_has_maps_and_a_quiet_one_prints_failures_only() {
+    let sweep = "[sweep]\n\"material.density\" = [2.0, 1.0, -1.0]\n\"time.scheme\" = [\"implicit_euler\", \"bdf2\"]\n\
+                 [[response]]\nof = \"history.kinetic_energy\"\n[[response]]\nof = \"probe.middle.period.velocity_x\"\n";
+    let scene = Scene::new(super::scene::SQUARE, sweep);
+    let outcome = scene.study(2, &["-q"]).expect(1);
+    assert_eq!(outcome.stdout, "", "nothing but errors");
+    assert_eq!(outcome.stderr.matches("error: run refused").count(), 2, "{}", outcome.stderr);
+    let outcome = outcome.says("error: 2 of 6 runs failed or could not be compared");
+    assert!(
+        !outcome.stderr.contains("responses") && !outcome.stderr.contains("side by side"),
+        "{}",
+        outcome.stderr
+    );
+
+    let results = scene.results();
+    assert_eq!(results["runs"][0]["status"], "completed");
+    assert!(number(&results, "/runs/0/response/0") > 0.0);
+    // The velocity grows all the time.
+    assert_eq!(results["runs"][0]["response"][1], Value::Null);
+    let note = results["runs"][0]["notes"][0].as_str().expect("a note");
+    assert!(note.contains("`probe.middle.period.velocity_x` has no period"), "{note}");
+    let read = |name: &str| std::fs::read_to_string(scene.path("out/study").join(name)).expect(name);
+    let map = read("map-history-kinetic_energy.svg");
+    assert_eq!(map.matches("stroke=\"#fff\"").count(), 6, "{map}");
+    assert_eq!(map.matches("stroke=\"#888\"").count(), 2, "{map}");
+    for words in
+        [">-1.0<", ">1.0<", ">2.0<", ">bdf2<", ">implicit_euler<", ">material.density<", ">time.scheme<"]
+    {
+        assert!(map.contains(words), "{words}: {map}");
+    }
+    let text = read("study.md");
+    assert!(text.contains("(map-history-kinetic_energy.svg)"), "{text}");
+    assert!(text.contains("2 runs without a value are crossed out"), "{text}");
+    assert!(scene.path("out/study/map-history-kinetic_energy.png").exists());
+
+    // Without failures nothing is printed; with one key there is no map.
+    let plain = Scene::new(super::scene::SQUARE, "[sweep]\n\"material.density\" = [1.0, 2.0]\n");
+    let outcome = plain.study(2, &["--quiet"]).expect(0);
+    assert_eq!((outcome.stdout.as_str(), outcome.stderr.as_str()), ("", ""));
+    let outcome = plain.study(1, &["-q", "--part", "1/2"]).expect(0);
+    assert_eq!((outcome.stdout.as_str(), outcome.stderr.as_str()), ("", ""));
+    assert!(!crate::results::names(&plain.path("out/study")).iter().any(|name| name.starts_with("map-")));
+}
+
+/// A mass on a spring: the period is 2 pi root(m/k).
+#[test]
+fn the_period_of_a_bar_on_springs_is_that_of_its_mass_and_their_stiffness() {
+    let job = r#"
+[mesh.rectangle]
+size = [1, 1]
+cells = [1, 1]
+[material]
+hypothesis = "plane_strain"
+density = 1
+elasticity = { youngs_modulus = 1e6, poisson_ratio = 0 }
+[[support]]
+on = ["left"]
+stiffness.normal = 100
+[initial]
+velocity = [1, 0]
+[time]
+scheme = "bdf2"
+end = 3
+step = 0.005
+[output]
+probe = [{ name = "middle", point = [0.5, 0.5] }]
+"#;
+    let sweep = "[sweep]\n\"material.density\" = [1.0, 4.0]\n\
+                 [[response]]\nof = \"probe.middle.period.displacement_x\"\nfrom = 0.1\n\
+                 [[response]]\nof = \"history.period.kinetic_energy\"\n";
+    let scene = Scene::new(job, sweep);
+    scene.study(2, &[]).expect(0);
+    let results = scene.results();
+    for (run, mass) in [(0, 1.0_f64), (1, 4.0)] {
+        let expected = std::f64::consts::TAU * (mass / 100.0).sqrt();
+        let period = number(&results, &format!("/runs/{run}/response/0"));
+        assert!((period / expected - 1.0).abs() < 5e-3, "{period} s, not {expected} s");
+        // The energy has half of it.
+        let half = number(&results, &format!("/runs/{run}/response/1"));
+        assert!((2.0 * half / expected - 1.0).abs() < 5e-3, "{half} s");
+    }
+    let chart = std::fs::read_to_string(
+        scene.path("out/study/response-probe-middle-period-displacement_x--from-0-1-s-.svg"),
+    );
+    assert!(chart.expect("a chart").contains("displacement_x (from 0.1 s) / s"));
+}

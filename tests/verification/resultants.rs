@@ -1,7 +1,7 @@
 //! Resultants of scenes whose forces, pressures and areas are known.
 
 use super::{
-    run_on,
+    World, run_on,
     scenes::{any_mesh, brick, crossed, simulation, supports},
 };
 use clarke::{
@@ -9,10 +9,13 @@ use clarke::{
         effect::ContactAreas,
         resultants::{Resultants, Source},
     },
+    job::Job,
     linear_algebra::tensor::larger,
     mesh::GlobalMesh,
     parallel::session::Session,
+    run::Simulation,
 };
+use std::path::Path;
 
 /// A block on a rigid plane with friction, pressed down by 3 Pa and pulled along x by `pull` in Pa.
 fn job<const D: usize>(scheme: &str, pull: f64) -> String {
@@ -96,6 +99,74 @@ fn all(session: &Session) {
     close(along(Source::Traction(0)), 2.4, "pull");
     close(along(Source::Support(0)) + along(Source::Contact(0)), -2.4, "what holds");
     assert!(along(Source::Support(0)) < 0.0 && along(Source::Contact(0)) < 0.0, "{areas:?}");
+}
+
+/// The area, the force and the moment of a traction of -3 Pa on the facets of the top with such centres, by hand.
+fn by_hand<const D: usize>(mesh: &GlobalMesh<D>, is_loaded: impl Fn(&[f64; D]) -> bool) -> [f64; 3] {
+    let top = mesh.boundaries.iter().find(|boundary| boundary.name == "top").expect("a boundary");
+    let mut sums = [0.0; 3];
+    for &facet in &top.facets {
+        let corners = mesh.facets[facet as usize].map(|node| mesh.nodes[node as usize]);
+        let centre: [f64; D] =
+            std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / D as f64);
+        if is_loaded(&centre) {
+            let [a, b] =
+                [1, D - 1].map(|at| std::array::from_fn::<f64, D, _>(|i| corners[at][i] - corners[0][i]));
+            // The top is a plane across the last axis.
+            let area = if D == 2 { a[0].abs() } else { (a[0] * b[1] - a[1] * b[0]).abs() / 2.0 };
+            sums = [sums[0] + area, sums[1] - 3.0 * area, sums[2] - 3.0 * area * centre[0]];
+        }
+    }
+    sums
+}
+
+/// Loads on parts of a boundary are those of the facets whose centres belong to them, and together the load on all of it.
+fn parts<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>, order: usize) {
+    let (value, y) = if D == 2 { ("0, -3", "y") } else { ("0, 0, -3", "z") };
+    let part = |condition: &str| {
+        format!("[[traction]]\non = [\"top\"]\nwhere = \"{condition}\"\nvalue = [{value}]\n")
+    };
+    let whole = format!("[mesh]\norder = {order}\n{}", job::<D>("bdf2", 0.0));
+    let (before, after) = whole.split_once("[[traction]]").expect("a traction");
+    let (_, after) = after.split_once("]\n[[contact]]").expect("a contact");
+    let text =
+        format!("{before}{}{}[[contact]]{after}", part(&format!("({y} > 0)*(x > 0.5)")), part("x <= 0.5"));
+    let (rows, _) = last::<D, S>(session, mesh, &text);
+    let [right, left] = [by_hand(mesh, |centre| centre[0] > 0.5), by_hand(mesh, |centre| centre[0] <= 0.5)];
+    assert!(right[0] > 0.1 && left[0] > 0.1, "both parts have facets");
+    for (at, [_, force, moment]) in [right, left].into_iter().enumerate() {
+        let (_, found, turn) = rows.iter().find(|row| row.0 == Source::Traction(at)).expect("a source");
+        close(found[1], force, &format!("force of part {at}, order {order}"));
+        let turn = if D == 2 { turn[2] } else { -turn[1] };
+        close(turn, moment, &format!("moment of part {at}, order {order}"));
+    }
+    let (_, carried, _) = rows.iter().find(|row| row.0 == Source::Contact(0)).expect("a source");
+    close(carried[1], -right[1] - left[1], "what the contact carries");
+}
+
+/// Parts that are nothing are refused.
+fn refused(session: &Session) {
+    for (condition, words) in [
+        ("x > 9", "traction on top: `where` holds at no facet of these boundaries; correct the expression"),
+        ("sqrt(x - 0.5)", "traction on top: `where` is not a number at"),
+    ] {
+        let text = job::<2>("bdf2", 0.0).replace("value = [", &format!("where = \"{condition}\"\nvalue = ["));
+        let mut loaded = Job::from_text(&text, "job.toml", Path::new("."), &[]).expect("a job");
+        let mesh = session.is_first().then(|| crossed([4, 3]));
+        let error = Simulation::<2, 4>::new(session, &mut loaded, mesh).err().map(|error| error.to_string());
+        assert!(error.as_ref().is_some_and(|error| error.contains(words)), "{error:?} instead of {words}");
+    }
+}
+
+#[test]
+fn parts_of_boundaries_are_loaded_by_the_facets_whose_centres_belong_to_them() {
+    run_on(&[1, 2, 3], |World { session, .. }| {
+        for order in [1, 2] {
+            parts::<2, 4>(&session, &crossed([4, 3]), order);
+            parts::<3, 6>(&session, &brick([3, 2, 2]), order);
+        }
+        refused(&session);
+    });
 }
 
 /// What all forces lack to the rate of momentum in the worst step, relative to the largest of them, with the default tolerance.

@@ -54,6 +54,8 @@ struct Prescribed {
 struct MovedNode<const D: usize> {
     node: u32,
     place: Vector<D>,
+    /// The displacement in m from which prescribed ones count.
+    origin: Vector<D>,
     /// The prescribed values along independent unit directions, each with its part of the motion: the vector whose component along
     /// this direction is 1, and 0 along the others.
     parts: Vec<Part<D>>,
@@ -281,7 +283,8 @@ impl<const D: usize> SupportMotion<D> {
         velocity.fill(0.0);
         for moved in &self.nodes {
             let along = |direction: &Vector<D>| {
-                (0..D).map(|i| direction[i] * start[moved.node as usize * D + i]).sum::<f64>()
+                let way = |i: usize| start[moved.node as usize * D + i] - moved.origin[i];
+                (0..D).map(|i| direction[i] * way(i)).sum::<f64>()
             };
             moved.add(velocity, |part, number| {
                 let Prescribed { value, is_displacement } = &self.values[number];
@@ -290,6 +293,13 @@ impl<const D: usize> SupportMotion<D> {
             })?;
         }
         Ok(())
+    }
+
+    /// Lets prescribed displacements count from this one of owned nodes.
+    pub fn count_from(&mut self, origin: &[f64]) {
+        for moved in &mut self.nodes {
+            moved.origin = std::array::from_fn(|i| origin[moved.node as usize * D + i]);
+        }
     }
 
     /// Sets displacements of owned nodes at time 0 to those of the supports.
@@ -370,7 +380,7 @@ impl<const D: usize> MovedNode<D> {
         let duals = dual_basis(&directions, INDEPENDENT).unwrap_or_default();
         let parts = independent.iter().zip(duals);
         let parts = parts.map(|(&(direction, value), dual)| Part { value, direction, dual }).collect();
-        Ok(Self { node, place, parts })
+        Ok(Self { node, place, origin: [0.0; D], parts })
     }
 
     /// Adds to a nodal value the vector with these components along the directions that move.

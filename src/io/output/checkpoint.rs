@@ -21,6 +21,8 @@ use std::{collections::BTreeMap, path::Path};
 
 /// The displacement from which pairs of bodies that slide were formed.
 const PAIRED: &str = "paired_displacement";
+/// The displacement from which outputs and supports count.
+const ORIGIN: &str = "displacement_origin";
 /// Version of the format; increased when older files can no longer be read.
 const FORMAT: u32 = 3;
 
@@ -187,6 +189,9 @@ pub fn save<const D: usize, const S: usize>(
         width: D,
         values: p,
     }));
+    let origin = state.displacement_origin.as_ref().map(DistributedVector::owned).transpose()?;
+    let origin = origin.as_deref();
+    tables.extend(origin.map(|values| IdTable { name: ORIGIN, set: "nodes", width: D, values }));
     let paired = body.paired_displacement.as_ref().map(DistributedVector::owned).transpose()?;
     let paired = paired.as_deref();
     tables.extend(paired.map(|values| IdTable { name: PAIRED, set: "nodes", width: D, values }));
@@ -219,6 +224,10 @@ pub fn restore<const D: usize, const S: usize>(
     let fields = [&mut state.displacement, &mut state.velocity, &mut state.previous_velocity];
     for (field, values) in fields.into_iter().zip(&values) {
         fill(field, values)?;
+    }
+    if checkpoint.tables("nodes")?.iter().any(|name| name == ORIGIN) {
+        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(ORIGIN, D)], &nodes)?;
+        count_from(&values[0], body, state)?;
     }
     if let Some(traction) = &mut state.contact_traction {
         let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(TRACTION, D)], &nodes)?;
@@ -315,7 +324,11 @@ pub fn transfer<const D: usize, const S: usize>(
         }
         body.form_pairs(session, &paired)?;
     }
-    let mut known: Vec<&str> = vec!["displacement", "velocity", PAIRED];
+    if of_nodes.iter().any(|name| name == ORIGIN) {
+        let values = checkpoint.read("nodes", total_nodes, &[(ORIGIN, D)], &nodes)?;
+        count_from(&values[0], body, state)?;
+    }
+    let mut known: Vec<&str> = vec!["displacement", "velocity", PAIRED, ORIGIN];
     if let Some(traction) = &mut state.contact_traction
         && of_nodes.iter().any(|name| name == TRACTION)
     {
@@ -434,6 +447,19 @@ fn damaged(error: Agreed) -> Error {
 fn fill(field: &mut DistributedVector, values: &[f64]) -> Result<()> {
     field.owned_mut()?.copy_from_slice(values);
     field.update_ghosts()
+}
+
+/// Lets displacements of outputs and supports count from this one of owned nodes. Collective.
+fn count_from<const D: usize, const S: usize>(
+    values: &[f64],
+    body: &mut Body<D, S>,
+    state: &mut State,
+) -> Result<()> {
+    let mut origin = state.displacement.like()?;
+    fill(&mut origin, values)?;
+    state.displacement_origin = Some(origin);
+    body.support_motion.iter_mut().for_each(|motion| motion.count_from(values));
+    Ok(())
 }
 
 fn refused(path: &Path, words: &str) -> Error {

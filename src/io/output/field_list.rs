@@ -49,7 +49,7 @@ macro_rules! fields {
 fields! {
     /// Displacement of the nodes.
     DISPLACEMENT = OutputField::plain("displacement", Place::Node, Shape::Vector, "m"),
-        |at| Computed::of(at.state.displacement.owned()?);
+        |at| Computed::of(at.state.counted_displacement_of_owned()?);
     /// Velocity of the nodes.
     VELOCITY = OutputField::plain("velocity", Place::Node, Shape::Vector, "m/s").with_picture("speed", "speed"),
         |at| Computed::of(at.state.velocity.owned()?);

@@ -96,7 +96,7 @@ impl<const D: usize> Probes<D> {
 
     /// Finds the displacements and velocities at the probes that this rank evaluates.
     fn evaluate(&mut self, state: &State) -> Result<()> {
-        let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
+        let (displacement, velocity) = (state.counted_displacement()?, state.velocity.local()?);
         let width = self.width();
         let [mine, all] = &mut self.room;
         mine.clear();

@@ -151,7 +151,7 @@ impl<const D: usize> Profile<D> {
     ) -> Result<Vec<f64>> {
         let by_stress =
             if self.contacts.is_empty() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
-        let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
+        let (displacement, velocity) = (state.counted_displacement()?, state.velocity.local()?);
         let mut out = Vec::with_capacity(self.points.len() * (4 * D + 4));
         for (at, point) in self.points.iter().enumerate() {
             let node = point.node as usize;

@@ -9,7 +9,7 @@ pub(crate) struct TableQuantity<'a> {
     pub table: &'static RunTable,
     /// The probe, source or boundary, which may contain dots; absent for a table without names.
     pub of: Option<&'a str>,
-    /// The extremum, `mean`, `amplitude` or `first`.
+    /// The extremum, `mean`, `amplitude`, `period` or `first`.
     pub side: Option<&'a str>,
     /// The column.
     pub column: &'a str,
@@ -23,7 +23,9 @@ impl<'a> TableQuantity<'a> {
         let (before, column) = rest.rsplit_once('.').unwrap_or(("", rest));
         let (of, side) = match before.rsplit_once('.') {
             _ if table.keys.is_empty() => (None, Some(before).filter(|side| !side.is_empty())),
-            Some((of, side @ ("max" | "min" | "mean" | "amplitude" | "first"))) => (Some(of), Some(side)),
+            Some((of, side @ ("max" | "min" | "mean" | "amplitude" | "period" | "first"))) => {
+                (Some(of), Some(side))
+            }
             _ => (Some(before), None),
         };
         Some(Self { table, of, side, column })
@@ -34,7 +36,7 @@ impl<'a> TableQuantity<'a> {
         let sides: &[Option<&str>] = if self.table.word == "profile" {
             &[Some("max"), Some("min"), Some("first")]
         } else {
-            &[None, Some("max"), Some("min"), Some("mean"), Some("amplitude")]
+            &[None, Some("max"), Some("min"), Some("mean"), Some("amplitude"), Some("period")]
         };
         sides.contains(&self.side) && self.of != Some("")
     }
@@ -93,7 +95,7 @@ const OBJECTS: [(&str, &[&str]); 6] = [
 /// What names a quantity.
 const FORMS: &str = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
                      resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also history.max.COLUMN and \
-                     resultant.SOURCE.max.COLUMN; .min., .mean. or .amplitude. in place of .max., of profiles .min. or .first.)";
+                     resultant.SOURCE.max.COLUMN; .min., .mean., .amplitude. or .period. in place of .max., of profiles .min. or .first.)";
 
 /// A job whose runs have quantities.
 #[derive(Clone, Copy)]
@@ -257,6 +259,7 @@ on = 'bottom'
             "history.max.dt",
             "probe.middle.velocity_y",
             "probe.middle.amplitude.displacement_x",
+            "history.period.kinetic_energy",
             "resultant.support left.moment_z",
             "resultant.contact bottom.max.largest_pressure",
             "profile.bottom.first.contact_pressure",

@@ -119,6 +119,12 @@ pub struct Traction {
     /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["top"])]
     pub on: Vec<String>,
+    /// The part of these boundaries that is loaded: the facets at whose centre, the mean of their corners, this expression in x, y, z
+    /// is not 0. A facet is loaded as a whole or not at all; `solver check` prints the loaded area. A product of conditions holds
+    /// where all hold, their `max` where one holds. Absent: the whole boundaries.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
+    #[schemars(extend("variables" = "x, y, z"), example = "x > 0.5", example = "(x > 1)*(x < 2)")]
+    pub part: Option<Scalar>,
     /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
     /// x, y, z.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -163,6 +169,10 @@ pub struct Initial {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("format" = "path"), example = "out/first_stage", example = "out/first_stage/checkpoint-64.h5")]
     pub from: Option<PathBuf>,
+    /// What starts anew in the state of `from`, whose time is 0 in any case.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(example = ["displacement"])]
+    pub reset: Vec<Reset>,
     /// The displacement at time 0, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent:
     /// zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -177,6 +187,17 @@ pub struct Initial {
     /// these materials takes its place. Absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<InitialStress>,
+}
+
+/// A part of the state of another run that may start anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Reset {
+    /// Displacements count from the start state: displacement and strain are 0 there in fields, probes and profiles, and a support
+    /// with `displacement` moves by its value from where it is. Body, obstacles and springs remain where they are, so that
+    /// stresses, gaps, forces, bonds, friction and all histories go on unchanged. `gap` and `max_strain` are still those of the whole
+    /// deformation.
+    Displacement,
 }
 
 /// The components of the initial stress: numbers, or expressions in the undeformed coordinates x, y, z; positive in tension.
@@ -336,6 +357,7 @@ impl Traction {
 
     pub(in crate::job) fn check_names(&self, table: &mut Table<'_>, mesh: MeshNames<'_>) {
         check_on(table, &self.on, None, mesh);
+        table.check_flat("where", self.part.as_ref(), mesh.dimension);
         table.check_vector("value", &self.value, mesh.dimension);
         table.check_flat("pressure", self.pressure.as_ref(), mesh.dimension);
     }
@@ -351,6 +373,11 @@ impl Initial {
     pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
         for (key, _) in self.vectors().filter(|_| self.from.is_some()) {
             table.fault_at_key(key, "`from` gives the whole initial state", "delete this key, or `from`");
+        }
+        table.refuse_repeats("reset", "item");
+        if self.from.is_none() && !self.reset.is_empty() {
+            let message = "`reset` is about the state of another run, which `from` names";
+            table.fault_at_key("reset", message, "add `from`, or delete this key");
         }
     }
 

@@ -18,7 +18,8 @@ pub use crate::laws::{
     schemes::Scheme,
 };
 pub use boundary::{
-    Axis, BodyForce, Fix, FixedDirections, Gravity, Initial, InitialStress, Resistance, Support, Traction,
+    Axis, BodyForce, Fix, FixedDirections, Gravity, Initial, InitialStress, Reset, Resistance, Support,
+    Traction,
 };
 pub(super) use contact::{check_contact, check_names as check_contact_names};
 pub use material::Region;

@@ -10,6 +10,7 @@ pub mod colour;
 pub mod common;
 pub mod frame;
 mod letters;
+pub mod map;
 pub mod markup;
 mod paint;
 pub mod picture;

@@ -5,7 +5,7 @@
 use super::{
     compare::Compared,
     document::{Norm, Over, Quantity, Space},
-    execute::{Outcome, execute},
+    execute::{Outcome, Speaker, execute},
     measure::Target,
     plan::{Plan, Planned, remove_unused_output},
     record::Record,
@@ -112,9 +112,9 @@ fn remove(value: &mut Value, parts: &[&str]) {
 }
 
 /// Runs the base job whole and without each effect; `None` if it was requested to stop. Collective.
-pub(super) fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Option<Ablation>> {
+pub(super) fn ablate(session: &Session, plan: &Plan, speaker: Speaker<'_>) -> Result<Option<Ablation>> {
     let folder = folder(plan);
-    let Some(whole) = run(session, plan, "whole", plan.base.clone(), say)? else {
+    let Some(whole) = run(session, plan, "whole", plan.base.clone(), speaker)? else {
         return Ok(None);
     };
     let seconds = |record: &Record| seconds_of(record, plan.study.timing.take).map(|s| s.computing);
@@ -140,7 +140,7 @@ pub(super) fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Resu
             Err(error) => effect.error = Some(first_line(&error.to_string())),
             Ok(loaded) => {
                 let name = format!("without-{}", path.replace('.', "-"));
-                let Some(record) = run(session, plan, &name, loaded, say)? else {
+                let Some(record) = run(session, plan, &name, loaded, speaker)? else {
                     return Ok(None);
                 };
                 effect.status = record.status.clone();
@@ -188,7 +188,7 @@ fn run(
     plan: &Plan,
     name: &str,
     mut loaded: Loaded,
-    say: &dyn Fn(&str),
+    speaker: Speaker<'_>,
 ) -> Result<Option<Record>> {
     loaded.job.output.profile.clear();
     remove_unused_output(&mut loaded.job, &folder(plan).join(name));
@@ -209,7 +209,10 @@ fn run(
     Ok(match execute(session, &planned, plan.study.timing.repetitions as usize)? {
         Outcome::Stopped => None,
         Outcome::Ran { record, .. } => {
-            say(&format!("ablation {name}: {}", record.error.as_deref().unwrap_or("completed")));
+            match &record.error {
+                Some(error) => speaker.complain(&format!("ablation {name}: {error}")),
+                None => speaker.say(&format!("ablation {name}: completed")),
+            }
             Some(*record)
         }
     })

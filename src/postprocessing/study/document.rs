@@ -34,7 +34,8 @@ pub struct Study {
     #[serde(default)]
     #[schemars(extend("key_help" = "quote the whole key: \"time.step\" = [0.1, 0.2]"))]
     pub sweep: BTreeMap<String, Values>,
-    /// Quantities reported for each run in responses.csv and a table, and in charts over each numeric key of the sweep.
+    /// Quantities reported for each run in responses.csv and a table, in charts over each numeric key of the sweep, and, if two of its keys have
+    /// several values and none is random, in maps over these two.
     #[serde(default)]
     pub response: Vec<Response>,
     /// The solution with which runs are compared. Absent: runs are timed only, and contain the fields of their last state only.
@@ -188,8 +189,8 @@ pub struct Response {
     /// A quantity named as in [check] of a job: a number of summary.json such as "max_von_mises", or history.COLUMN,
     /// probe.NAME.COLUMN or resultant.SOURCE.COLUMN at the end; history.max.COLUMN, probe.NAME.max.COLUMN or
     /// resultant.SOURCE.max.COLUMN over all steps; profile.BOUNDARY.max.COLUMN over the boundary at the end. .min. and, of profiles,
-    /// .first. in place of .max. Also, of histories, probes and resultants, .mean. over time and .amplitude., half of the difference
-    /// between maximum and minimum. Probes and profiles are those of the base job.
+    /// .first. in place of .max. Also, of histories, probes and resultants, .mean. over time, .amplitude., half of the difference
+    /// between maximum and minimum, and .period. in s, the mean time between crossings of the mean in the same direction. Probes and profiles are those of the base job.
     #[schemars(length(min = 1), example = "probe.tip.displacement_y")]
     pub of: String,
     /// Start of a window of time: only steps that end in it count. Of histories, probes and resultants. Absent: the start of the run.

@@ -30,11 +30,42 @@ pub(super) enum Outcome {
     Stopped,
 }
 
-/// Writes lines to the terminal, on the first rank.
-pub(super) fn speaker(session: &Session) -> impl Fn(&str) {
-    move |words| {
-        if session.is_first() {
+/// Writes lines to the terminal, on the first rank of a session.
+#[derive(Clone, Copy)]
+pub(super) struct Speaker<'a> {
+    session: &'a Session,
+    is_quiet: bool,
+}
+
+impl<'a> Speaker<'a> {
+    /// Says everything, or only what went wrong.
+    pub(super) fn new(session: &'a Session, is_quiet: bool) -> Self {
+        Self { session, is_quiet }
+    }
+
+    /// The same on a group of ranks.
+    pub(super) fn of_group(self, ranks: &Session) -> Speaker<'_> {
+        Speaker { session: ranks, is_quiet: self.is_quiet }
+    }
+
+    /// Whether it only says what went wrong.
+    pub(super) fn is_quiet(self) -> bool {
+        self.is_quiet
+    }
+
+    /// Says what happens.
+    pub(super) fn say(self, words: &str) {
+        if self.session.is_first() && !self.is_quiet {
             let _ = writeln!(std::io::stdout(), "{}", wrapped(words, WORDS));
+        }
+    }
+
+    /// Says what went wrong: among the other lines, or, if there are none, as an error.
+    pub(super) fn complain(self, words: &str) {
+        if !self.is_quiet {
+            self.say(words);
+        } else if self.session.is_first() {
+            let _ = writeln!(std::io::stderr(), "{}", wrapped(&format!("error: {words}"), WORDS));
         }
     }
 }
@@ -45,15 +76,15 @@ pub(super) fn announced(
     planned: &Planned,
     repetitions: usize,
     count: &str,
-    say: &dyn Fn(&str),
+    speaker: Speaker<'_>,
 ) -> Result<Option<Ran>> {
     let Outcome::Ran { record, found } = execute(session, planned, repetitions)? else { return Ok(None) };
-    let words = match &record.error {
-        Some(error) => format!("failed: {error}"),
-        None if found => "already finished".into(),
-        None => format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()),
-    };
-    say(&format!("run {count:<9} {:<40} {words}", planned.name));
+    let line = |words: &str| format!("run {count:<9} {:<40} {words}", planned.name);
+    match &record.error {
+        Some(error) => speaker.complain(&line(&format!("failed: {error}"))),
+        None if found => speaker.say(&line("already finished")),
+        None => speaker.say(&line(&format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()))),
+    }
     Ok(Some(Ran { record: *record, found }))
 }
 

@@ -11,10 +11,12 @@ mod difference;
 mod document;
 mod exact;
 mod execute;
+mod map;
 mod measure;
 mod orders;
 mod overlap;
 mod part;
+mod period;
 mod plan;
 mod plot;
 mod quantity;
@@ -43,7 +45,7 @@ use crate::{
 };
 use compare::Compared;
 use document::Take;
-use execute::{announced, speaker};
+use execute::{Speaker, announced};
 use plan::{Planned, PlannedReference, RefusedRun};
 use record::{Counts, Ran, seconds_of};
 use results::RunResult;
@@ -64,54 +66,74 @@ pub fn describe_markdown() -> String {
     markdown_of(document::kind())
 }
 
-/// Executes the study and writes its tables; with `with_ablation` the base job is also run without each of its effects. Collective.
-pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit> {
-    let say = speaker(session);
+/// How a study is executed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Options {
+    /// Whether the base job is also run without each of its effects.
+    pub with_ablation: bool,
+    /// Whether only failures are printed, as errors.
+    pub is_quiet: bool,
+}
+
+/// Executes the study and writes its tables. Collective.
+pub fn study(session: &Session, plan: &Plan, Options { with_ablation, is_quiet }: Options) -> Result<Exit> {
+    let speaker = Speaker::new(session, is_quiet);
     let repetitions = plan.study.timing.repetitions as usize;
     let number = |index: usize| format!("{}/{}", index + 1, plan.runs.len());
     let numbered = |(index, planned)| (planned, repetitions, number(index));
     let runs: Vec<Numbered> = plan.runs.iter().enumerate().map(numbered).collect();
-    let once = |planned, what| announced(session, planned, 1, what, &say);
-    announce_refused(plan, &say);
+    let once = |planned, what| announced(session, planned, 1, what, speaker);
+    announce_refused(plan, speaker);
     let reference = reference_run(plan).map(|planned| once(planned, "reference"));
     let Some(reference) = reference.into_iter().collect::<Result<Option<Vec<Ran>>>>()? else {
-        return stopped(&say);
+        return stopped(speaker);
     };
-    let Some(ran) = execute_all(session, plan, &runs, &say)? else { return stopped(&say) };
+    let Some(ran) = execute_all(session, plan, &runs, speaker)? else { return stopped(speaker) };
     let on_meshes = plan.split.iter().map(|planned| once(planned, "split"));
-    let Some(on_meshes) = on_meshes.collect::<Result<Option<Vec<Ran>>>>()? else { return stopped(&say) };
+    let Some(on_meshes) = on_meshes.collect::<Result<Option<Vec<Ran>>>>()? else { return stopped(speaker) };
     let mut results = assembled(session, plan, reference.first(), &ran, &on_meshes)?;
     if with_ablation {
-        match ablate::ablate(session, plan, &say)? {
+        match ablate::ablate(session, plan, speaker)? {
             Some(ablation) => results.ablation = Some(ablation),
-            None => return stopped(&say),
+            None => return stopped(speaker),
         }
     }
     session.on_first(|| write::all(plan, &results))?;
     let tables = table::all(&results).iter().map(|t| t.text()).collect::<Vec<_>>().join("\n");
-    say(&format!("\n{tables}\nfiles      {}", plan.folder.display()));
-    let failed = results.runs.iter().chain(&results.reference).filter(|run| run.error.is_some()).count();
-    if failed > 0 {
-        let all = plan.runs.len() + plan.refused.len();
-        say(&format!("{failed} of {all} runs failed or could not be compared; see above"));
-        return Ok(Exit::Failed);
+    speaker.say(&format!("\n{tables}\nfiles      {}", plan.folder.display()));
+    Ok(announce_failed(plan, &results, speaker))
+}
+
+/// Says how many runs failed or could not be compared, and of the latter, which no line names yet, the reason.
+fn announce_failed(plan: &Plan, results: &Results, speaker: Speaker<'_>) -> Exit {
+    let failed = || results.runs.iter().chain(&results.reference).filter(|run| run.error.is_some());
+    let count = failed().count();
+    if count == 0 {
+        return Exit::Done;
     }
-    Ok(Exit::Done)
+    if speaker.is_quiet() {
+        for run in failed().filter(|run| run.status == "completed") {
+            speaker.complain(&format!("run {}: {}", run.name, run.error.as_deref().unwrap_or_default()));
+        }
+    }
+    let all = plan.runs.len() + plan.refused.len();
+    speaker.complain(&format!("{count} of {all} runs failed or could not be compared; see above"));
+    Exit::Failed
 }
 
 /// Executes a part of the runs of the study, each in its own folder, and writes no tables. When all parts are finished, the study,
 /// started on the same number of ranks (on any, for runs side by side), uses their runs. Collective.
-pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
-    let say = speaker(session);
+pub fn study_part(session: &Session, plan: &Plan, part: Part, is_quiet: bool) -> Result<Exit> {
+    let speaker = Speaker::new(session, is_quiet);
     let repetitions = plan.study.timing.repetitions as usize;
     let once = reference_run(plan).into_iter().chain(&plan.split).map(|planned| (planned, 1));
     let all: Vec<_> = once.chain(plan.runs.iter().map(|planned| (planned, repetitions))).collect();
     let mine = all.iter().enumerate().filter(|(index, _)| part.has(*index));
     let count = |index: usize| format!("{}/{}", index + 1, all.len());
-    announce_refused(plan, &say);
+    announce_refused(plan, speaker);
     let mine: Vec<Numbered> =
         mine.map(|(index, (planned, repetitions))| (*planned, *repetitions, count(index))).collect();
-    let Some(ran) = execute_all(session, plan, &mine, &say)? else { return stopped(&say) };
+    let Some(ran) = execute_all(session, plan, &mine, speaker)? else { return stopped(speaker) };
     let failed = ran.iter().any(|ran| ran.record.error.is_some());
     Ok(if failed { Exit::Failed } else { Exit::Done })
 }
@@ -125,15 +147,15 @@ fn reference_run(plan: &Plan) -> Option<&Planned> {
 }
 
 /// Says which runs of the sweep are refused, each with its first fault, before the first run starts.
-fn announce_refused(plan: &Plan, say: &dyn Fn(&str)) {
+fn announce_refused(plan: &Plan, speaker: Speaker<'_>) {
     for run in &plan.refused {
         let fault = run.error.lines().next().unwrap_or_default();
-        say(&format!("run refused   {:<40} {fault}", run.name));
+        speaker.complain(&format!("run refused   {:<40} {fault}", run.name));
     }
 }
 
-fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {
-    say("stopped on request; the same command continues with the unfinished runs");
+fn stopped(speaker: Speaker<'_>) -> Result<Exit> {
+    speaker.say("stopped on request; the same command continues with the unfinished runs");
     Ok(Exit::Stopped)
 }
 

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    io::output::{columns::RunTable, field_snapshot::Snapshot},
+    io::output::{columns::RunTable, field_snapshot::Snapshot, quantity_name::TableQuantity},
     job::Job,
     postprocessing::drawing::{
         body::{Coloured, DrawnBody},
@@ -54,7 +54,7 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
 }
 
 /// The dimension of the bodies, by which units are: 3 also of bodies of revolution; that of a mesh file is found in the fields of a run.
-fn dimension(plan: &Plan) -> usize {
+pub(super) fn dimension(plan: &Plan) -> usize {
     let of_run = |job: &Job| {
         let fields = || Snapshot::read(&job.output_folder().join("fields.vtkhdf")).ok();
         let of_mesh = job.dimension().filter(|_| !job.is_revolved());
@@ -219,10 +219,13 @@ fn response(
 }
 
 /// The unit of a response of bodies of this dimension; empty for numbers without one.
-fn unit_of_response(name: &str, dimension: usize) -> &'static str {
+pub(super) fn unit_of_response(name: &str, dimension: usize) -> &'static str {
     // Without a window of time.
     let name = name.split(" (").next().unwrap_or(name);
     let (source, column) = (name.split('.').next(), name.rsplit('.').next().unwrap_or(name));
+    if TableQuantity::parse(name).is_some_and(|quantity| quantity.side == Some("period")) {
+        return "s";
+    }
     if let Some(table) = source.and_then(RunTable::of) {
         return table.unit(column, dimension);
     }

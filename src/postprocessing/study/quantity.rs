@@ -1,5 +1,6 @@
 //! Quantities of a finished run by name, as in `[check]` of a job.
 
+use super::period::period;
 use crate::{
     io::output::{csv::records, quantity_name::TableQuantity},
     linear_algebra::tensor::larger,
@@ -30,36 +31,54 @@ impl Window {
     }
 }
 
+/// A quantity that a run has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Found {
+    /// Its value.
+    Number(f64),
+    /// The values do not oscillate, so that they have no period.
+    NoPeriod,
+}
+
 /// The quantity in the output folder of a run, if it exists.
 ///
 /// A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table: `history.COLUMN`,
 /// `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN`, `.min.` or `.first.` over the
-/// boundary or at its first point, at the last output. With `.max.`, `.min.`, `.mean.` or `.amplitude.` before the column, the others
-/// are over all steps.
+/// boundary or at its first point, at the last output. With `.max.`, `.min.`, `.mean.`, `.amplitude.` or `.period.` before the column,
+/// the others are over all steps.
 pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
-    quantity_in(folder, name, Window::default())
+    match quantity_in(folder, name, Window::default())? {
+        Found::Number(number) => Some(number),
+        Found::NoPeriod => None,
+    }
 }
 
 /// As [`quantity`], of the steps in a window of time. Only histories, probes and resultants have values there.
-pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<f64> {
+pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<Found> {
     let Some(TableQuantity { table, of, side, column: field }) = TableQuantity::parse(name) else {
         let text = std::fs::read_to_string(folder.join("summary.json")).ok()?;
         let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
-        return summary.pointer(&format!("/{}", name.replace('.', "/")))?.as_f64();
+        return summary.pointer(&format!("/{}", name.replace('.', "/")))?.as_f64().map(Found::Number);
     };
     let filter = table.keys.last().copied().zip(of);
     let numbers = |name: &str| column(folder, table.file, filter, name);
     if table.keys.first() == Some(&"time") {
         let times = numbers("time")?;
         let rows = times.iter().zip(numbers(field)?).filter(|(time, _)| Some(*time) == times.last());
-        return extreme(side?, rows.map(|(_, value)| value));
+        return extreme(side?, rows.map(|(_, value)| value)).map(Found::Number);
     }
-    if window.is_whole() && side != Some("mean") {
-        return over_steps(side, &numbers(field)?);
+    let is_over_time = matches!(side, Some("mean" | "period"));
+    if window.is_whole() && !is_over_time {
+        return over_steps(side, &numbers(field)?).map(Found::Number);
     }
     let rows = numbers("time")?.into_iter().zip(numbers(field)?).filter(|(time, _)| window.contains(*time));
     let (times, values): (Vec<f64>, Vec<f64>) = rows.unzip();
-    if side == Some("mean") { mean(&times, &values) } else { over_steps(side, &values) }
+    if side == Some("period") {
+        let level = mean(&times, &values)?;
+        return Some(period(&times, &values, level).map_or(Found::NoPeriod, Found::Number));
+    }
+    let value = if side == Some("mean") { mean(&times, &values) } else { over_steps(side, &values) };
+    value.map(Found::Number)
 }
 
 /// The last value, an extremum or the amplitude.
@@ -178,7 +197,28 @@ mod tests {
             ("probe.a.mean.velocity_y", Some(2.5), Some(3.5), None),
             ("probe.a.max.velocity_y", Some(5.0), None, None),
         ] {
-            assert_eq!(value(name, from, to), expected, "{name} from {from:?} to {to:?}");
+            assert_eq!(value(name, from, to), expected.map(Found::Number), "{name} from {from:?} to {to:?}");
         }
+    }
+
+    #[test]
+    fn a_period_is_that_between_crossings_of_the_mean_in_a_window() {
+        let folder = tempfile::tempdir().expect("folder");
+        let rows = (0..40_i32).map(|n| {
+            // A jump at 5 s, then a sawtooth about 10 with the period of 8 rows of 0.25 s.
+            let (time, saw) = (0.25 * f64::from(n), f64::from((n % 8 - 4).abs()));
+            format!("{n},{time},{}\n", if n < 20 { 0.0 } else { 8.0 + saw })
+        });
+        let text = format!("step,time,work\n{}", rows.collect::<String>());
+        std::fs::write(folder.path().join("history.csv"), text).expect("written");
+        let value = |from: Option<f64>, to: Option<f64>| {
+            quantity_in(folder.path(), "history.period.work", Window { from, to })
+        };
+        assert_eq!(value(Some(5.0), None), Some(Found::Number(2.0)));
+        assert_eq!(value(None, None), Some(Found::NoPeriod), "the jump crosses the mean of the run once");
+        assert_eq!(value(None, Some(4.0)), Some(Found::NoPeriod), "nothing moves");
+        assert_eq!(value(Some(20.0), None), None, "no steps");
+        assert_eq!(quantity(folder.path(), "history.period.work"), None);
+        assert_eq!(quantity(folder.path(), "history.period.nothing"), None);
     }
 }

@@ -1,6 +1,11 @@
 //! Responses: quantities of the finished runs.
 
-use super::{document::Response, plan::Plan, quantity::quantity_in, results::Results};
+use super::{
+    document::Response,
+    plan::Plan,
+    quantity::{Found, quantity_in},
+    results::Results,
+};
 use crate::{
     io::output::{columns::RunTable, csv::records},
     laws::nearest::nearest,
@@ -8,30 +13,44 @@ use crate::{
 };
 use std::path::Path;
 
+/// Marks of responses: that a run has the quantity with a value, or without one because its values do not oscillate.
+const VALUE: f64 = 1.0;
+const NO_PERIOD: f64 = 2.0;
+
 /// Adds the responses of the completed runs; a quantity that a run does not have is an error of this run. Collective.
 pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
     let names: &[Response] = &plan.study.response;
-    // For each response of each run, whether it exists and its value; zeros on all ranks but the first.
+    // For each response of each run a mark, 0 for a quantity that it lacks, and its value; zeros on all ranks but the first.
     let mut found = vec![0.0; 2 * names.len() * results.runs.len()];
     let place = |run: usize, name: usize| 2 * (run * names.len() + name);
     let folders: Vec<&Path> = plan.runs.iter().map(|planned| planned.loaded.job.output_folder()).collect();
     for (at, run) in results.runs.iter().enumerate() {
         for (name, response) in names.iter().enumerate() {
             let here = session.is_first() && run.status == "completed";
-            if let Some(value) =
-                here.then(|| quantity_in(folders[at], &response.of, response.window())).flatten()
-            {
-                found[place(at, name)] = 1.0;
-                found[place(at, name) + 1] = value;
-            }
+            let value = here.then(|| quantity_in(folders[at], &response.of, response.window())).flatten();
+            let (mark, value) = match value {
+                None => continue,
+                Some(Found::Number(value)) => (VALUE, value),
+                Some(Found::NoPeriod) => (NO_PERIOD, 0.0),
+            };
+            found[place(at, name)] = mark;
+            found[place(at, name) + 1] = value;
         }
     }
     let found = session.sum_of_lists(&found);
     for (at, run) in results.runs.iter_mut().enumerate() {
-        let value = |name: usize| (found[place(at, name)] > 0.0).then(|| found[place(at, name) + 1]);
+        let mark = |name: usize| found[place(at, name)];
+        let value = |name: usize| (mark(name) == VALUE).then(|| found[place(at, name) + 1]);
         run.response = (0..names.len()).map(value).collect();
-        let missing = names.iter().zip(&run.response).find(|(_, value)| value.is_none());
-        if let Some((response, _)) = missing.filter(|_| run.status == "completed" && run.error.is_none()) {
+        let still = names.iter().enumerate().filter(|(name, _)| mark(*name) == NO_PERIOD);
+        run.notes.extend(still.map(|(_, response)| {
+            format!(
+                "`{}` has no period: its values cross their mean less than twice in the same direction",
+                response.name()
+            )
+        }));
+        let missing = names.iter().enumerate().find(|(name, _)| mark(*name) == 0.0);
+        if let Some((_, response)) = missing.filter(|_| run.status == "completed" && run.error.is_none()) {
             let near = near(folders[at], &response.of).filter(|near| *near != response.of);
             let help = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
             run.error = Some(format!("it has no quantity `{}`{help}", response.name()));

@@ -1,7 +1,7 @@
 //! Runs of a study side by side, each on a group of ranks.
 
 use super::{
-    execute::{announced, speaker},
+    execute::{Speaker, announced},
     plan::{Plan, Planned},
     record::{Ran, Record},
 };
@@ -19,14 +19,14 @@ pub(super) fn execute_all(
     session: &Session,
     plan: &Plan,
     runs: &[Numbered],
-    say: &dyn Fn(&str),
+    speaker: Speaker<'_>,
 ) -> Result<Option<Vec<Ran>>> {
     let (grouped, alone): (Vec<usize>, Vec<usize>) =
         (0..runs.len()).partition(|at| runs[*at].0.is_side_by_side);
     let mut all: Vec<Option<Ran>> = runs.iter().map(|_| None).collect();
     for at in alone {
         let (planned, repetitions, number) = &runs[at];
-        let Some(ran) = announced(session, planned, *repetitions, number, say)? else { return Ok(None) };
+        let Some(ran) = announced(session, planned, *repetitions, number, speaker)? else { return Ok(None) };
         all[at] = Some(ran);
     }
     let least = session.agree(least_ranks(session, plan))?;
@@ -35,11 +35,11 @@ pub(super) fn execute_all(
         return Ok(Some(all.into_iter().flatten().collect()));
     }
     if groups > 1 {
-        say(&format!("{} runs side by side, {groups} at a time", grouped.len()));
+        speaker.say(&format!("{} runs side by side, {groups} at a time", grouped.len()));
     }
     let group = session.rank() * groups / session.ranks();
     let mine: Vec<&Numbered> = grouped.iter().skip(group).step_by(groups).map(|at| &runs[*at]).collect();
-    let found = session.in_group(group, |ranks| execute_mine(ranks, &mine))?;
+    let found = session.in_group(group, |ranks| execute_mine(ranks, &mine, speaker.of_group(ranks)))?;
     // All groups meet here, also those with a failure.
     let found = session.agree(found)?;
     if session.total(usize::from(found.is_none())) > 0 {
@@ -61,11 +61,10 @@ pub(super) fn execute_all(
 
 /// Executes the runs of a group, one after the other; for each, whether an earlier study had finished it, on the first rank of the
 /// group. `None` if they were requested to stop. Collective over the group.
-fn execute_mine(ranks: &Session, mine: &[&Numbered]) -> Result<Option<Vec<bool>>> {
-    let say = speaker(ranks);
+fn execute_mine(ranks: &Session, mine: &[&Numbered], speaker: Speaker<'_>) -> Result<Option<Vec<bool>>> {
     let mut found = Vec::new();
     for (planned, repetitions, number) in mine {
-        match announced(ranks, planned, *repetitions, number, &say)? {
+        match announced(ranks, planned, *repetitions, number, speaker)? {
             Some(ran) => found.push(ran.found && ranks.is_first()),
             None => return Ok(None),
         }

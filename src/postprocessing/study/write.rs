@@ -1,6 +1,6 @@
 //! The files of a study: `study.json`, `study.csv`, `study.md`, `errors.csv`, `responses.csv` and the pictures.
 
-use super::{orders::Refined, plan::Plan, plot, results::Results, table};
+use super::{map, orders::Refined, plan::Plan, plot, results::Results, table};
 use crate::{
     error::{Error, Result},
     io::output::csv::entry,
@@ -26,7 +26,8 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<()> {
     if !results.response.is_empty() {
         write(&folder.join("responses.csv"), responses(results).as_bytes())?;
     }
-    let pictures = plot::all(plan, results)?;
+    let mut pictures = plot::all(plan, results)?;
+    pictures.extend(map::all(plan, results)?);
     for picture in &pictures {
         write(&folder.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
         write(&folder.join(format!("{}.png", picture.name)), &picture.png()?)?;

@@ -1,0 +1,83 @@
+//! The areas on which tractions act.
+
+use crate::{
+    fem::{body::Body, space::facet_points},
+    job::{Job, Scalar},
+    laws::digits::Digits,
+    parallel::session::Session,
+};
+use serde::Serialize;
+
+/// The part of the boundary that a traction loads. Names are those of `solver check --json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct LoadedArea {
+    /// The boundaries.
+    on: Vec<String>,
+    /// The condition for their facets, if only a part of them is loaded.
+    #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
+    part: Option<Scalar>,
+    /// Facets that are loaded.
+    facets: usize,
+    /// In m^2, in the plane in m; of a body of revolution that of the whole turn.
+    area: f64,
+    /// Whether the area is a length.
+    #[serde(skip)]
+    is_length: bool,
+}
+
+impl LoadedArea {
+    /// As a line for the terminal.
+    pub(super) fn line(&self) -> String {
+        let part = match &self.part {
+            None => String::new(),
+            Some(Scalar::Number(number)) => format!(" where {number}"),
+            Some(Scalar::Expression(expression)) => format!(" where {}", expression.text()),
+        };
+        let unit = if self.is_length { "m" } else { "m^2" };
+        let (on, area, facets) = (self.on.join(", "), Digits(self.area), self.facets);
+        format!(
+            "traction   {on}{part}: {area} {unit} in {facets} facet{}",
+            if facets == 1 { "" } else { "s" }
+        )
+    }
+}
+
+/// The loaded areas of all tractions of a job. Collective.
+pub(super) fn areas<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+) -> Vec<LoadedArea> {
+    let tables = job.traction.iter().zip(&body.load.tractions);
+    tables
+        .map(|(table, traction)| {
+            let facets = traction.facets.iter();
+            let weights =
+                facets.flat_map(|&facet| facet_points(&body.mesh, facet).1).map(|point| point.weight);
+            let [area] = session.sum([weights.sum()]);
+            LoadedArea {
+                on: table.on.clone(),
+                part: table.part.clone(),
+                facets: session.total(traction.facets.len()),
+                area,
+                is_length: D == 2 && !body.mesh.is_revolved,
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::Expression;
+
+    #[test]
+    fn a_line_has_the_condition_the_area_with_its_unit_and_the_facets() {
+        let part = Expression::parse("x > 0.5").map(Scalar::Expression).ok();
+        let on = || vec!["top".to_owned(), "left".to_owned()];
+        let half = LoadedArea { on: on(), part, facets: 3, area: 0.6, is_length: true };
+        assert_eq!(half.line(), "traction   top, left where x > 0.5: 0.6 m in 3 facets");
+        let whole = LoadedArea { on: on(), part: None, facets: 1, area: 2.0 / 3.0, is_length: false };
+        assert_eq!(whole.line(), "traction   top, left: 0.666667 m^2 in 1 facet");
+    }
+}
