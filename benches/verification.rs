@@ -576,6 +576,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "elliptic-membrane",
+        name: "meshes",
+        job: "verification/elliptic_membrane",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("4 x 6", &["mesh.file=../../meshes/membrane_coarse.msh"]),
+            with("8 x 12", &[]),
+            with("16 x 24", &["mesh.file=../../meshes/membrane_fine.msh"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -711,6 +723,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/viscoelastic_sphere", "obstacle_displacement", 1.3e-2),
     ("verification/viscoelastic_sphere", "", 5e-3),
     ("verification/nafems_plasticity", "", 1e-5),
+    ("verification/elliptic_membrane", "", 1e-6),
 ];
 
 fn folder(name: &str) -> PathBuf {
