@@ -588,6 +588,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "thick-plate",
+        name: "meshes",
+        job: "verification/thick_plate",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("2 x 2 x 2", &["mesh.file=../../meshes/thick_plate_coarse.msh"]),
+            with("4 x 4 x 4", &[]),
+            with("8 x 8 x 8", &["mesh.file=../../meshes/thick_plate_fine.msh"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -724,6 +736,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/viscoelastic_sphere", "", 5e-3),
     ("verification/nafems_plasticity", "", 1e-5),
     ("verification/elliptic_membrane", "", 1e-6),
+    ("verification/thick_plate", "", 1e-2),
 ];
 
 fn folder(name: &str) -> PathBuf {
