@@ -600,6 +600,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "strip-with-hole",
+        name: "meshes",
+        job: "verification/strip_with_hole",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("4 x 8", &["mesh.file=../../meshes/strip_coarse.msh"]),
+            with("8 x 16", &[]),
+            with("16 x 32", &["mesh.file=../../meshes/strip_fine.msh"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -737,6 +749,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/nafems_plasticity", "", 1e-5),
     ("verification/elliptic_membrane", "", 1e-6),
     ("verification/thick_plate", "", 1e-2),
+    ("verification/strip_with_hole", "", 1e-8),
 ];
 
 fn folder(name: &str) -> PathBuf {
