@@ -636,6 +636,30 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "roller",
+        name: "meshes",
+        job: "verification/roller",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("12 x 10", &["mesh.file=../../meshes/roller_coarse.msh"]),
+            with("24 x 20", &[]),
+            with("48 x 40", &["mesh.file=../../meshes/roller_fine.msh"]),
+        ],
+    },
+    Table {
+        page: "roller",
+        name: "linear",
+        job: "verification/roller",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("12 x 10", &["mesh.order=1", "mesh.file=../../meshes/roller_coarse.msh"]),
+            with("24 x 20", &["mesh.order=1"]),
+            with("48 x 40", &["mesh.order=1", "mesh.file=../../meshes/roller_fine.msh"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -775,6 +799,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/thick_plate", "", 1e-2),
     ("verification/strip_with_hole", "", 1e-8),
     ("verification/cook_panel", "", 3e-3),
+    ("verification/roller", "", 2e-2),
 ];
 
 fn folder(name: &str) -> PathBuf {
