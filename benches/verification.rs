@@ -660,6 +660,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "wedge",
+        name: "meshes",
+        job: "verification/wedge",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("16 x 16", &["mesh.rectangle.cells=[16, 16]"]),
+            with("32 x 32", &[]),
+            with("64 x 64", &["mesh.rectangle.cells=[64, 64]"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -800,6 +812,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/strip_with_hole", "", 1e-8),
     ("verification/cook_panel", "", 3e-3),
     ("verification/roller", "", 2e-2),
+    ("verification/wedge", "", 1e-3),
 ];
 
 fn folder(name: &str) -> PathBuf {
