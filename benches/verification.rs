@@ -672,6 +672,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "adhesive-sphere",
+        name: "meshes",
+        job: "verification/adhesive_sphere",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("10 x 4", &["mesh.rectangle.cells=[10, 4]"]),
+            with("20 x 4", &[]),
+            with("40 x 4", &["mesh.rectangle.cells=[40, 4]"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -813,6 +825,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/cook_panel", "", 3e-3),
     ("verification/roller", "", 2e-2),
     ("verification/wedge", "", 1e-3),
+    ("verification/adhesive_sphere", "", 1e-3),
 ];
 
 fn folder(name: &str) -> PathBuf {
