@@ -684,6 +684,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "elastic-foundation",
+        name: "meshes",
+        job: "verification/elastic_foundation",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("80 x 1", &["mesh.rectangle.cells=[80, 1]"]),
+            with("160 x 2", &[]),
+            with("320 x 4", &["mesh.rectangle.cells=[320, 4]"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -826,6 +838,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/roller", "", 2e-2),
     ("verification/wedge", "", 1e-3),
     ("verification/adhesive_sphere", "", 1e-3),
+    ("verification/elastic_foundation", "", 2e-4),
 ];
 
 fn folder(name: &str) -> PathBuf {
