@@ -708,6 +708,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "lap-joint",
+        name: "meshes",
+        job: "verification/lap_joint",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("25 x 2", &["mesh.rectangle.0.cells=[25, 2]", "mesh.rectangle.1.cells=[25, 2]"]),
+            with("50 x 4", &[]),
+            with("100 x 8", &["mesh.rectangle.0.cells=[100, 8]", "mesh.rectangle.1.cells=[100, 8]"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -853,6 +865,8 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/elastic_foundation", "", 2e-4),
     ("verification/lifted_beam", "force_y", 1e-3),
     ("verification/lifted_beam", "open_area", 3e-2),
+    ("verification/lap_joint", "adhesion_energy", 1e-2),
+    ("verification/lap_joint", "", 4e-3),
 ];
 
 fn folder(name: &str) -> PathBuf {
