@@ -720,6 +720,30 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "debonding",
+        name: "meshes",
+        job: "verification/debonding",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("100 x 1", &["mesh.rectangle.cells=[100, 1]"]),
+            with("200 x 2", &[]),
+            with("400 x 4", &["mesh.rectangle.cells=[400, 4]"]),
+        ],
+    },
+    Table {
+        page: "debonding",
+        name: "laws",
+        job: "verification/debonding",
+        columns: Columns::Variants,
+        pictured: false,
+        runs: &[
+            with("energy", &[]),
+            with("bilinear, 20 MPa", &["contact.0.adhesion.strength=2e7"]),
+            with("energy, 100 steps", &["time.step=0.005"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -867,6 +891,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/lifted_beam", "open_area", 3e-2),
     ("verification/lap_joint", "adhesion_energy", 1e-2),
     ("verification/lap_joint", "", 4e-3),
+    ("verification/debonding", "", 1e-6),
 ];
 
 fn folder(name: &str) -> PathBuf {
