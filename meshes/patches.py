@@ -1,5 +1,5 @@
-"""Writes meshes of quadratic triangles with curved sides beside itself: an elliptic membrane, a strip with a hole, Cook's panel and a
-roller on a block.
+"""Writes meshes of quadratic triangles with curved sides beside itself: an elliptic membrane, a strip with a hole, Cook's panel, a
+roller on a block and a shell.
 
     python3 meshes/patches.py
 """
@@ -133,7 +133,18 @@ def roller(cells):
     return mesh
 
 
+def cavity(cells):
+    """A section through a shell of the radii 1 and 4."""
+
+    def place(u, v):
+        return between(ellipse(1.0, 1.0, v), ellipse(4.0, 4.0, v), u)
+
+    mesh = Mesh()
+    mesh.patch((graded(12 * cells), graded(4 * cells)), place, ("inner", "outer", "bottom", "left"))
+    return mesh
+
+
 if __name__ == "__main__":
     for size, cells in (("coarse", 1), ("medium", 2), ("fine", 4)):
-        for name, mesh in (("membrane", membrane), ("strip", strip), ("panel", panel), ("roller", roller)):
-            mesh(cells).write(f"{name}_{size}")
+        for mesh in (membrane, strip, panel, roller, cavity):
+            mesh(cells).write(f"{mesh.__name__}_{size}")
