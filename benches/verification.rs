@@ -780,6 +780,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "hertz-impact",
+        name: "meshes",
+        job: "verification/hertz_impact",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("20 x 15, T/50", &["mesh.rectangle.cells=[20, 15]", "time.step=3.057505e-4"]),
+            with("40 x 30, T/100", &[]),
+            with("80 x 60, T/200", &["mesh.rectangle.cells=[80, 60]", "time.step=7.6437625e-5"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -956,6 +968,9 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/sliding_cylinder", "moment_z", 7e-2),
     ("verification/sliding_cylinder", "", 2e-3),
     ("verification/spherical_cavity", "", 0.0),
+    ("verification/hertz_impact", "obstacle_velocity", 0.0),
+    ("verification/hertz_impact", "obstacle_displacement", 1e-2),
+    ("verification/hertz_impact", "", 4e-3),
     ("orthotropic_strip", "", 0.0),
     ("verification/elliptic_membrane", "", 1e-6),
     ("verification/thick_plate", "", 1e-2),
