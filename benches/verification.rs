@@ -819,6 +819,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "hertz-slides",
+        name: "meshes",
+        job: "verification/hertz_slides",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("40, 35", &["mesh.rectangle.0.cells=[40, 10]", "mesh.rectangle.1.cells=[35, 10]"]),
+            with("80, 70", &[]),
+            with("160, 140", &["mesh.rectangle.0.cells=[160, 40]", "mesh.rectangle.1.cells=[140, 40]"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -1001,6 +1013,9 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/wavy_surface", "", 1e-4),
     ("verification/worn_groove", "force_x", 0.0),
     ("verification/worn_groove", "", 1e-3),
+    ("verification/hertz_slides", "force_x", 0.0),
+    ("verification/hertz_slides", "force_y", 0.0),
+    ("verification/hertz_slides", "", 1e-2),
     ("orthotropic_strip", "", 0.0),
     ("verification/elliptic_membrane", "", 1e-6),
     ("verification/thick_plate", "", 1e-2),
