@@ -69,6 +69,8 @@ pub enum Exchange {
     Held,
     /// The mesh of the side `on` is coarser.
     Coarser,
+    /// Another contact has the side `on` on its other side.
+    Faced,
 }
 
 /// A contact between bodies, with the facets of this rank on both sides.

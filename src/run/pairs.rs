@@ -73,6 +73,7 @@ pub(super) fn find<const D: usize>(
     if pairs.is_empty() {
         return Ok(pairs);
     }
+    circumstances.untangle(session, mesh, job, &mut pairs)?;
     leave_shared_nodes(session, job, mesh, &mut pairs)?;
     let shares = shares(mesh, &pairs);
     let global =
@@ -179,7 +180,8 @@ fn refuse_chains<const D: usize>(
     session.agree(match both {
         None => Ok(()),
         Some(&node) => Err(Error::Refused(format!(
-            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {SHARED}",
+            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; exchange \
+             the sides of one of them by `side`, {SHARED}",
             mesh.nodes[mesh.owned_node(node)]
         ))),
     })

@@ -107,6 +107,36 @@ impl<const D: usize> Circumstances<D> {
         Ok(first)
     }
 
+    /// Exchanges the sides of pairs whose choice is free where nodes would carry the law of one contact and be faced in another one.
+    /// Collective.
+    pub(super) fn untangle(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        job: &Job,
+        pairs: &mut [Pair<D>],
+    ) -> Result<(), Agreed> {
+        let mut least = tangled(session, mesh, job, pairs)?;
+        for at in 0..pairs.len() {
+            let number = pairs[at].contact;
+            let contact = &job.contact[number];
+            let is_free = contact.side == Side::Auto && !contact.against.is_empty();
+            if least == 0 || !is_free || self.earlier.contains_key(&number) {
+                continue;
+            }
+            let mut other = pairs[at].clone().exchanged(Exchange::Faced);
+            other.form(session, mesh, &mesh.nodes)?;
+            let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
+            if session.total(facing) == 0 || session.total(self.conflicts(contact, &other)) > 0 {
+                continue;
+            }
+            let kept = std::mem::replace(&mut pairs[at], other);
+            let left = tangled(session, mesh, job, pairs)?;
+            if left < least { least = left } else { pairs[at] = kept }
+        }
+        Ok(())
+    }
+
     /// The number of nodes owned here whose law supports prevent.
     fn conflicts(&self, contact: &job::Contact, pair: &Pair<D>) -> usize {
         let free = |master: &u32, direction: &Vector<D>| -> f64 {
@@ -186,6 +216,39 @@ fn is_coarser<const D: usize>(session: &Session, pair: &Pair<D>) -> Result<bool,
     Ok(masters.len() > (1 << (D - 1)) * slaves)
 }
 
+/// The number of nodes that carry the law of one pair and are faced in another one, where the law does not leave them to their neighbours.
+/// Collective.
+fn tangled<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    job: &Job,
+    pairs: &[Pair<D>],
+) -> Result<usize, Agreed> {
+    if pairs.len() < 2 {
+        return Ok(0);
+    }
+    let (mut carrying, mut faced) = (Vec::new(), Vec::new());
+    for pair in pairs {
+        let own: Vec<u32> = pair.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
+        let facets = pair.against.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+        let other: Vec<u32> = match pair.slides {
+            true => facets.map(|node| mesh.global_node(node)).collect(),
+            false => pair.nodes.iter().flat_map(PairedNode::faced).map(|(master, _)| *master).collect(),
+        };
+        let all = |nodes: &[u32]| -> Result<BTreeSet<u32>, Agreed> {
+            Ok(gather(session.world(), nodes)?.into_iter().collect())
+        };
+        carrying.push(all(&own)?);
+        faced.push(all(&other)?);
+    }
+    let of_pair = |at: usize| {
+        let others = faced.iter().enumerate().filter(|(other, _)| *other != at);
+        others.map(|(_, faced)| carrying[at].intersection(faced).count()).sum::<usize>()
+    };
+    let leaves = |at: &usize| job.contact[pairs[*at].contact].is_without_scale();
+    Ok((0..pairs.len()).filter(|at| !leaves(at)).map(of_pair).sum())
+}
+
 /// Whether another contact has nodes of either side of a pair. Collective.
 fn meets_another<const D: usize>(
     session: &Session,
@@ -220,6 +283,7 @@ pub(super) fn lines<const D: usize>(job: &Job, pairs: &[Pair<D>]) -> Vec<String>
             Exchange::Continued => "as in the run from which this one starts".into(),
             Exchange::Held => format!("because supports hold nodes of {on}"),
             Exchange::Coarser => format!("because the mesh of {on} is coarser"),
+            Exchange::Faced => format!("because {on} is faced in another contact"),
         };
         Some(format!("contact    contact.{}: nodes of {against} carry the law, {why}", pair.contact))
     };

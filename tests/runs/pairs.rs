@@ -1012,3 +1012,28 @@ fn quadratic_facets_that_bulge_under_load_slide_with_the_pressure_of_hertz() {
         assert!((pressure / 6.868e6 - 1.0).abs() < 0.05, "{pressure} Pa for 6.868 MPa");
     }
 }
+
+#[test]
+fn a_boundary_that_two_contacts_name_on_different_sides_is_faced_in_both() {
+    let case = Case::written_as(
+        "
+        mesh.rectangle = [{name = 'b', size = [1.4, 0.4], cells = [5, 1]}, {name = 'a', corner = [0.2, 0.4], size = [1.0, 0.5], cells = [3, 2]},
+            {name = 'c', corner = [1.21, 0.4], size = [0.15, 0.3], cells = [2, 2]}]
+        material = {hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.2}}
+        support = [{on = ['b.bottom'], fix = 'all'}, {on = ['a.top', 'c.top'], fix = ['x']}]
+        traction = [{on = ['a.top', 'c.top'], value = [0.0, -1e3]}]
+        time = {end = 1.0, step = 0.5, scheme = 'implicit_euler'}
+        contact = [{on = ['b.top'], against = ['a.bottom'], normal.compliance.stiffness = 1e7},
+            {on = ['c.bottom'], against = ['b.top'], normal.compliance.stiffness = 1e7}]",
+    );
+    for ranks in [1, 2] {
+        case.run_with(ranks, &["--force"])
+            .expect(0)
+            .says("contact.0: nodes of a.bottom carry the law, because b.top is faced in another contact");
+        let table = case.results().table("resultants.csv");
+        for (source, load) in [("contact b.top", -1000.0), ("contact c.bottom", 150.0)] {
+            let force = table.only("source", source).last("force_y");
+            assert!((force / load - 1.0).abs() < 1e-9, "{source}: {force} N on {ranks} ranks");
+        }
+    }
+}
