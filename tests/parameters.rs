@@ -224,6 +224,10 @@ damage = { threshold = 50, viscosity = 10, exponent = 2, largest = 0.9 }
 on = ["left"]
 where = "z < 0.5"
 damping = { normal = 3, tangential = 4 }
+[[traction]]
+on = ["top"]
+where = 1
+value = [1, 2, 3]
 [[support]]
 on = ["right"]
 where = 1

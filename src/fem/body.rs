@@ -593,6 +593,20 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(())
     }
 
+    /// Adds the nodal forces of viscous stress that is no linear function of the velocity of this state to `forces` (with ghosts).
+    pub fn add_forces_of_formulas(&self, state: &State, forces: &mut [f64]) -> Result<()> {
+        let called = self.called(|p| p.is_monotone);
+        let Some(needs) = self.needs(|p| p.stress.filter(|_| p.is_monotone)) else { return Ok(()) };
+        let step = Step { time: state.time, ..Step::default() };
+        with_nodal(state, |nodal| {
+            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
+                let effects = called.select(&self.effects);
+                effects.for_each(|effect| effect.add_stress(self.evaluation, step, batch));
+                batch.scatter(&self.mesh, forces);
+            });
+        })
+    }
+
     /// Adds a force of contact in N at a node to `forces` (with ghosts), with the opposite ones on a body that the node faces.
     pub fn add_contact_force(&self, (node, force): (u32, &Vector<D>), forces: &mut [f64]) {
         let mut add = |node: u32, force: &Vector<D>| {

@@ -132,6 +132,11 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     let displacement = session.agree(local(&state.displacement))?;
     let mut open = residual(session, body, state)?;
     session.agree(open.add_scaled(-1.0, &of_form(Form::Viscosity, &|at| velocity[at])?))?;
+    let mut viscous = session.agree(state.velocity.like())?;
+    let add = |forces: &mut DistributedVector| body.add_forces_of_formulas(state, &mut forces.local_mut()?);
+    session.agree(add(&mut viscous))?;
+    session.agree(viscous.add_ghosts_to_owners())?;
+    session.agree(open.add_scaled(1.0, &viscous))?;
     let change = of_form(Form::Elasticity, &|at| length * velocity[at])?;
     let mass = of_form(Form::Mass, &|at| velocity[at])?;
     // The size of the forces of the cells, which cancel where the body is not strained.

@@ -20,6 +20,11 @@ pub trait NonlinearProblem {
         false
     }
 
+    /// Whether to end without a solution, as after the last iteration; the same on all ranks.
+    fn gives_up(&self) -> bool {
+        false
+    }
+
     /// Sets `x` as the point of linearisation.
     fn linearise(&mut self, x: &DistributedVector) -> Result<()>;
 
@@ -72,7 +77,8 @@ impl NonlinearOutcome {
             1.. => "converged",
             -3 => "no direction was found that reduces the residual",
             -4 => "the residual is not a number",
-            -5 => "too many Newton iterations",
+            // Evaluations of the residual are limited only where the problem gives up.
+            -2 | -5 => "too many Newton iterations",
             -6 => "the line search found no decrease of the residual",
             -8 => "the residual has a local minimum that is not a solution",
             _ => "Newton's method diverged",
@@ -180,19 +186,23 @@ unsafe extern "C" fn residual(
     f: sys::Vec,
     context: *mut c_void,
 ) -> sys::PetscErrorCode {
-    let mut is_exact = false;
+    let [mut is_exact, mut gives_up] = [false; 2];
     // SAFETY: `solve` passed a pointer to its live context; PETSc's vectors live for the call.
     let code = unsafe {
         callback::write::<dyn NonlinearProblem>(context, x, f, |problem, x, f| {
             problem.residual(x, f)?;
-            is_exact = problem.is_exact();
+            (is_exact, gives_up) = (problem.is_exact(), problem.gives_up());
             Ok(())
         })
     };
-    if code != 0 || !is_exact {
+    if code != 0 || !(is_exact || gives_up) {
         return code;
     }
     let (same, unchanged) = (f64::from(sys::PETSC_DEFAULT), sys::PETSC_DEFAULT as sys::PetscInt);
+    if !is_exact {
+        // SAFETY: PETSc's live solver; the other tolerances remain.
+        return unsafe { sys::SNESSetTolerances(snes, same, same, same, unchanged, 0) };
+    }
     let mut norm = 0.0;
     // SAFETY: PETSc's live solver and vector; the other tolerances remain.
     unsafe {

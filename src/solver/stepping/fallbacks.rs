@@ -47,6 +47,8 @@ pub(super) struct Conditions {
     pub has_user_search: bool,
     /// Whether all equations except those of the contact points are linear.
     pub interior_is_linear: bool,
+    /// Whether there is friction.
+    pub rubs: bool,
     /// Whether friction moves obstacles that forces drive.
     pub rubs_obstacles: bool,
     /// Whether forces of laws may fall with the motion.
@@ -64,13 +66,13 @@ impl Conditions {
     /// pressure. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
     /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge. Friction
     /// points yield at first for a light obstacle on a stiff body, which points that stick and slide in turn move to and fro; and at
-    /// last for bodies that nothing but little friction holds.
+    /// last for bodies that nothing but little friction holds, or whose points all stick at once.
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         use FrictionIteration::{FixedPoint, Newton};
         use Search::{Backtracking, Descent, Equilibrated, FullSteps, Yielding};
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
-        let little_friction = self.follows_pressure && !self.rubs_obstacles;
+        let rubs = self.rubs && !self.rubs_obstacles;
         [
             (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
@@ -88,7 +90,7 @@ impl Conditions {
             (fixes_bounds, Backtracking, 30.0, FixedPoint),
             (follows_bounds, Descent, 1.0, Newton),
             (fixes_bounds, Descent, 1.0, FixedPoint),
-            (little_friction, Yielding, 1.0, FixedPoint),
+            (rubs, Yielding, 1.0, FixedPoint),
         ]
         .into_iter()
         .filter(move |(is_wanted, search, ..)| *is_wanted && self.allows(*search))
@@ -119,6 +121,7 @@ mod tests {
         friction: FrictionIteration::Newton,
         has_user_search: false,
         interior_is_linear: true,
+        rubs: false,
         rubs_obstacles: false,
         softens: false,
         has_bonds: false,
@@ -138,13 +141,14 @@ mod tests {
     }
 
     #[test]
-    fn friction_points_yield_second_with_driven_obstacles_and_last_with_bounds_that_follow_the_pressure() {
-        let rubs = Conditions { rubs_obstacles: true, interior_is_linear: false, ..FRICTIONLESS };
+    fn friction_points_yield_second_with_driven_obstacles_and_otherwise_last() {
+        let rubs = Conditions { rubs: true, rubs_obstacles: true, interior_is_linear: false, ..FRICTIONLESS };
         let found = searches(rubs);
         assert_eq!(found[1], Search::Yielding);
         assert_eq!(found.iter().filter(|search| **search == Search::Yielding).count(), 1);
-        let coulomb = Conditions { follows_pressure: true, ..FRICTIONLESS };
-        assert_eq!(searches(coulomb).last(), Some(&Search::Yielding));
+        let coulomb = Conditions { rubs: true, follows_pressure: true, ..FRICTIONLESS };
+        let tresca = Conditions { rubs: true, ..FRICTIONLESS };
+        assert!([coulomb, tresca].into_iter().all(|rubs| searches(rubs).last() == Some(&Search::Yielding)));
         assert!(!searches(FRICTIONLESS).contains(&Search::Yielding));
     }
 

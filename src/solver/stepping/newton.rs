@@ -347,6 +347,7 @@ impl Newton {
         let contacts = &body.contacts;
         let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
         let flows = self.flow.is_some();
+        let rubs = contacts.iter().any(|contact| contact.friction().is_some());
         Conditions {
             follows_pressure: contacts.iter().any(follows),
             friction: self.settings.friction,
@@ -354,7 +355,8 @@ impl Newton {
             // Motions of obstacles are not in equilibrium with those of the contact points alone.
             interior_is_linear: !flows
                 && !contacts.iter().any(|contact| contact.needs_ghosts() || contact.obstacle.is_some()),
-            rubs_obstacles: !self.obstacles.is_empty() && contacts.iter().any(|c| c.friction().is_some()),
+            rubs,
+            rubs_obstacles: rubs && !self.obstacles.is_empty(),
             softens: (flows && body.softening().next().is_some()) || contacts.iter().any(decreases),
             has_bonds: flows && body.softens_at_surface(),
         }

@@ -5,6 +5,9 @@ use crate::fem::effect::Step;
 /// A step whose end differs from a prescribed time by at most this share of its length ends at that time.
 pub const TIME_TOLERANCE: f64 = 1e-6;
 
+/// Times whose difference is below this share of them are the same.
+const ROUNDING: f64 = 1e-12;
+
 /// A two-step scheme starts anew where a step is longer than the last one by more than this factor, below the limit `1 + √2` for
 /// its stability.
 const LARGEST_GROWTH: f64 = 2.4;
@@ -27,7 +30,7 @@ pub enum Forgets {
     Nothing,
     /// Jumps of loads.
     Jumps,
-    /// Kinks of loads, steps over jumps, in which a body without mass jumps, too, and the first step, over the jump of loads that are there
+    /// Kinks of loads, steps over jumps and over kinks that are too near to end there, in which a body without mass jumps, too, and the first step, over the jump of loads that are there
     /// at its start: a point with friction that sticks from then on would slide on with a share of its last velocity.
     Kinks,
 }
@@ -133,7 +136,20 @@ impl Landings {
         let start = time - last;
         let jumped = || (last > 0.0 && start <= near) || self.breaks_at(start, true);
         (self.forgets >= Forgets::Jumps && self.breaks_at(time, true))
-            || (self.forgets >= Forgets::Kinks && (jumped() || self.breaks_at(time, false)))
+            || (self.forgets >= Forgets::Kinks
+                && (jumped() || self.breaks_at(time, false) || self.passes_over_kinks([start, time])))
+    }
+
+    /// Whether the step between these times passes over kinks, because they are nearer to each other than steps end: a load that rises
+    /// between them jumps.
+    fn passes_over_kinks(&self, [start, end]: [f64; 2]) -> bool {
+        let near = TIME_TOLERANCE * self.length;
+        let first = self.breakpoints.partition_point(|breakpoint| breakpoint.time < start - near);
+        let mut passed = self.breakpoints[first..].iter().take_while(|next| next.time < end - near);
+        // The first one at the start is that at which the last step ended.
+        let landed = passed.clone().next().map(|at| at.time).filter(|at| *at <= start + near);
+        let from = landed.map_or(start + near, |landed| landed + ROUNDING * landed);
+        passed.any(|breakpoint| breakpoint.time > from)
     }
 
     /// Whether a load or an obstacle motion jumps, or has a kink, at this time, the end of a step.
@@ -281,6 +297,13 @@ mod tests {
         assert_eq!(anew(Forgets::Nothing), [0]);
         assert_eq!(anew(Forgets::Jumps), [0, 3]);
         assert_eq!(anew(Forgets::Kinks), [0, 1, 3, 4, 6], "after the first step and that over the jump, too");
+        let ramp = [0.5, 0.5 + 1e-8, 0.72, 0.72 + 1e-8].map(|time| breakpoint(time, false));
+        let landings = Landings { forgets: Forgets::Kinks, ..landings(ramp.to_vec(), true, Vec::new()) };
+        let begins = |time: f64, last: f64| {
+            landings.fixed_step([time, last], landings.next([time, last])).previous_length == 0.0
+        };
+        assert!(begins(0.5, 0.1) && begins(0.6, 0.1), "after the step over a steep ramp, too");
+        assert!(!begins(0.7, 0.1) && begins(0.72, 0.02) && begins(0.8, 0.08) && !begins(0.9, 0.1));
     }
 
     #[test]

@@ -40,6 +40,9 @@ pub(super) struct Lengths {
 
 /// The least force in N by which equations are measured: the square of a smaller one underflows.
 const LEAST_FORCE: f64 = 1e-150;
+/// The least force in N by which pressures are measured: the least residual at a node that stands for next to no area is below the accuracy
+/// of its pressure.
+const LEAST_REFERENCE: f64 = 1e-130;
 /// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
 /// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
 const ROUNDING_SHARE: f64 = 0.1;
@@ -410,7 +413,7 @@ impl StepSolver {
         // its obstacle has released has none: the accuracy of pressures is then limited by rounding errors.
         let accuracy = self.settings.inclusion_tolerance;
         let size = norm.max(rounding.max(product) / accuracy);
-        let size = if size > 0.0 { size.max(LEAST_FORCE / accuracy) } else { 0.0 };
+        let size = if size > 0.0 { size.max(LEAST_REFERENCE) } else { 0.0 };
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
         // The forces that drive obstacles are among those of the step.
         let mut driving = 0.0;
