@@ -36,12 +36,14 @@ impl Rate {
 
     pub(super) fn of<const D: usize>(&self, value: impl Fn(f64) -> Vector<D>) -> Vector<D> {
         let now = value(self.time);
-        let mut rate = [0.0; D];
+        let (mut rate, mut unit) = ([0.0; D], 0.0);
         for [time, weight] in self.before.into_iter().filter(|[_, weight]| *weight != 0.0) {
             let before = value(time);
             (0..D).for_each(|i| rate[i] += weight * (now[i] - before[i]));
+            unit += weight * (self.time - time);
         }
-        rate
+        // The rate of the time itself is 1, whatever the rounding of the earlier times.
+        rate.map(|rate| rate / unit)
     }
 }
 
