@@ -30,8 +30,9 @@ pub enum Forgets {
     Nothing,
     /// Jumps of loads.
     Jumps,
-    /// Kinks of loads, steps over jumps and over kinks that are too near to end there, in which a body without mass jumps, too, and the first step, over the jump of loads that are there
-    /// at its start: a point with friction that sticks from then on would slide on with a share of its last velocity.
+    /// Kinks of loads, steps over jumps and over kinks that are too near to end there, in which a body without mass jumps, too, and the
+    /// first step, over the jump of loads that are there at its start: a point with friction that sticks from then on would slide on with
+    /// a share of its last velocity.
     Kinks,
 }
 
