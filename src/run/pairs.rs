@@ -87,7 +87,10 @@ pub(super) fn find<const D: usize>(
         let without_law = pair.on.iter().flat_map(global).filter(|node| !on.contains(node));
         let others = without_law.chain(against.iter().copied()).collect();
         ghosts.extend(ghosts_of_surfaces(session, mesh, [on.iter().copied().collect(), others])?);
-        slaves.extend(on);
+        // Nodes that leave their part of the surface to neighbours for the time being carry no law.
+        let beside: Vec<u32> = pair.nodes.iter().flat_map(|node| node.neighbours.iter().copied()).collect();
+        let beside: BTreeSet<u32> = gather(session.world(), &beside)?.into_iter().collect();
+        slaves.extend(on.difference(&beside));
         masters.extend(against);
     }
     refuse_chains(session, mesh, [&slaves, &masters])?;

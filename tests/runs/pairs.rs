@@ -1037,3 +1037,24 @@ fn a_boundary_that_two_contacts_name_on_different_sides_is_faced_in_both() {
         }
     }
 }
+
+#[test]
+fn a_quadratic_block_that_slides_over_the_end_of_another_one_rubs_with_its_weight() {
+    for side in ["on", "against"] {
+        let case = Case::written_as(
+            "
+            mesh = {order = 2, box = [{name = 'l', size = [2.0, 1.0, 0.5], cells = [3, 1, 1]},
+                {name = 'u', corner = [0.5, 0.0, 0.5], size = [1.0, 1.0, 0.5], cells = [2, 1, 1]}]}
+            material.elasticity = {youngs_modulus = 1e8, poisson_ratio = 0.0}
+            support = [{on = ['l.bottom'], fix = 'all'}, {on = ['u.top'], fix = ['x', 'y'], displacement = ['0.7*t', 0.0]}]
+            traction = [{on = ['u.top'], value = [0.0, 0.0, -1e5]}]
+            time = {end = 1.0, step = 0.1, scheme = 'implicit_euler'}
+            contact = [{on = ['u.bottom'], against = ['l.top'], sliding = 'finite', normal.unilateral = {}, friction.coulomb.coefficient = 0.3}]",
+        )
+        .set("contact.0.side", &format!("'{side}'"));
+        let resultants = case.run(2).table("resultants.csv");
+        for force in resultants.only("source", "support u.top").numbers("force_x") {
+            assert!((force.abs() / 3e4 - 1.0).abs() < 1e-6, "{side}: {force} N");
+        }
+    }
+}

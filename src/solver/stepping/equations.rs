@@ -207,7 +207,7 @@ pub struct SolveCounts {
     /// Linearisations that were not positive definite where the energy was minimised.
     pub unstable: usize,
     /// The least norm in N of a residual since the search began, and the number of linearisations until then; only decreases by
-    /// [`PROGRESS`] count.
+    /// a tenth count.
     pub least: (f64, usize),
     /// A hash of the branches of all points for each linearisation; different sets of branches have different hashes.
     pub sets: Vec<f64>,
