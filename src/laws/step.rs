@@ -147,8 +147,10 @@ mod tests {
         for jump in [0.45f64, 0.1, 3.7, 1e6 + 0.3] {
             let last = jump.next_down();
             for time in [jump + 0.05, jump + 0.1, jump + 1.0 / 3.0] {
-                let start = start_of(time, time - last);
-                assert!(start <= last && last - start < 1e-15 * time, "{start} {last}");
+                for length in [time - last, time - jump] {
+                    let start = start_of(time, length);
+                    assert!(start <= last && last - start < 1e-15 * time, "{start} {last}");
+                }
             }
         }
         assert_eq!([start_of(0.3, 0.3), start_of(0.0, 0.0), start_of(0.0, 0.5)], [0.0, 0.0, -0.5]);
