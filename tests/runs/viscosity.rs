@@ -52,3 +52,41 @@ fn a_restarted_run_has_the_same_answer() {
         assert_eq!(whole.results().text(name), case.results().text(name), "{name}");
     }
 }
+
+#[test]
+fn a_stage_that_continues_creep_or_presses_on_a_soft_law_starts_in_balance() {
+    let creeping = || {
+        Case::written_as(
+            "
+            mesh.rectangle = {size = [1.0, 0.5], cells = [2, 2]}
+            support = [{on = ['bottom'], fix = 'all'}]
+            traction = [{on = ['top'], value = [0.0, -1e3]}]
+            time = {end = 0.05, step = 0.005, scheme = 'implicit_euler'}
+            checkpoint.every = 1000
+            [material]
+            hypothesis = 'plane_strain'
+            elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}
+            viscosity.expression = {shear = '2e5*(0.01 + g)^(-0.3)', bulk = 1.7e5, reference_rate = 10}",
+        )
+    };
+    let pressed = || {
+        Case::written_as(
+            "
+            mesh.rectangle = [{name = 'a', size = [1.0, 0.5], cells = [2, 1]},
+                {name = 'b', corner = [0.0, 0.5], size = [1.0, 0.5], cells = [3, 1]}]
+            support = [{on = ['a.bottom'], fix = 'all'}, {on = ['b.top'], fix = ['x']}]
+            traction = [{on = ['b.top'], value = [0.0, -1e3]}]
+            contact = [{on = ['b.bottom'], against = ['a.top'], normal.compliance.stiffness = 1e5}]
+            time = {end = 0.1, step = 0.05, scheme = 'implicit_euler'}
+            checkpoint.every = 1000
+            material = {hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}}",
+        )
+    };
+    for job in [creeping, pressed] {
+        let first = job().run_and_keep(1);
+        let from = first.folder().join("out");
+        let second = job().set("initial.from", &format!("{from:?}")).run_and_keep(1);
+        let warnings = second.results().summary()["warnings"].to_string();
+        assert!(!warnings.contains("balance") && !warnings.contains("inside"), "{warnings}");
+    }
+}
