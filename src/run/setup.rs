@@ -107,5 +107,10 @@ fn refuse(loaded: &Loaded, verdict: &Verdict) -> Result<()> {
     }
     let (found, remedies): (Vec<&str>, Vec<&str>) =
         verdict.refusals.iter().map(|(found, remedy)| (found.as_str(), remedy.as_str())).unzip();
-    Err(loaded.fault("time.step", found.join("; "), remedies.join("; ")))
+    let adaptive = loaded.job.time.adaptive.as_ref();
+    let key = match adaptive.is_some_and(|adaptive| adaptive.largest_step > loaded.job.time.step) {
+        true => "time.adaptive.largest_step",
+        false => "time.step",
+    };
+    Err(loaded.fault(key, found.join("; "), remedies.join("; ")))
 }

@@ -231,6 +231,9 @@ fn a_step_beyond_a_bound_is_refused_with_the_largest_one_and_runs_if_accepted() 
     let unstable = Case::square(8).set("time.step", "0.125");
     let unstable = unstable.run_with(2, &[]).expect(2);
     unstable.says("exceeds 0.1208").says("scheme = \"implicit_euler\"").says("explicit_stability");
+    let adaptive = Case::square(8).set("time.adaptive", "{smallest_step = 0.001, largest_step = 0.128}");
+    let adaptive = adaptive.set("time.step", "0.001").run_with(1, &[]).expect(2);
+    adaptive.says("exceeds 0.1208").says("largest_step = 0.128");
     let several = Case::square(8).set("contact.0.normal.damped_response.slopes", "[10.0, -90.0, 10.0]");
     let refused =
         several.run_with(2, &[]).expect(2).says("may have several solutions").says("\"uniqueness\"");
