@@ -143,6 +143,21 @@ impl<const D: usize> Pair<D> {
         Ok(())
     }
 
+    /// The nodes that carry the law, and those on which their velocities depend or may depend as bodies slide, by global numbers on all
+    /// ranks. Collective.
+    pub fn nodes_of_all(&self, session: &Session, mesh: &Mesh<D>) -> Result<[BTreeSet<u32>; 2], Agreed> {
+        let own: Vec<u32> = self.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
+        let facets = self.against.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+        let faced: Vec<u32> = match self.slides {
+            true => facets.map(|node| mesh.global_node(node)).collect(),
+            false => self.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master).collect(),
+        };
+        let all = |nodes: &[u32]| -> Result<BTreeSet<u32>, Agreed> {
+            Ok(gather(session.world(), nodes)?.into_iter().collect())
+        };
+        Ok([all(&own)?, all(&faced)?])
+    }
+
     /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
     pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
         let mut found = self.paired_nodes(session, mesh, places)?;

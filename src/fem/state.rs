@@ -89,15 +89,6 @@ impl State {
         Ok(Counted::from(self.displacement.owned()?, origin))
     }
 
-    /// Lets displacements count from the present one.
-    pub fn count_from_here(&mut self) -> Result<()> {
-        let mut origin = self.displacement.like()?;
-        origin.copy_from(&self.displacement)?;
-        origin.update_ghosts()?;
-        self.displacement_origin = Some(origin);
-        Ok(())
-    }
-
     /// Commits the velocity of a solved step and the displacement at its end, `u_n = u_{n-1} + k v_n` unless it is given. Collective.
     pub fn commit(
         &mut self,

@@ -106,29 +106,21 @@ fn leave_shared_nodes<const D: usize>(
     mesh: &Mesh<D>,
     pairs: &mut [Pair<D>],
 ) -> Result<(), Agreed> {
-    let of_facets = |facets: &[u32]| -> Vec<u32> {
-        facets.iter().flat_map(|facet| mesh.facet_nodes(*facet)).map(|node| mesh.global_node(node)).collect()
-    };
-    let all =
-        |nodes: &[u32]| Ok::<BTreeSet<u32>, Agreed>(gather(session.world(), nodes)?.into_iter().collect());
     let (mut slaves, mut both) = (Vec::new(), Vec::new());
     for pair in &*pairs {
-        let own: Vec<u32> = pair.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
-        let faced: Vec<u32> = match pair.slides {
-            true => of_facets(&pair.against),
-            false => pair.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master).collect(),
-        };
-        slaves.push(all(&own)?);
-        both.push(all(&[own, faced].concat())?);
+        let [own, faced] = pair.nodes_of_all(session, mesh)?;
+        both.push(&own | &faced);
+        slaves.push(own);
     }
     let mut of_obstacles = Vec::new();
     for (number, contact) in job.contact.iter().enumerate() {
         if pair_of(pairs, number).is_none() {
             let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
-            of_obstacles.extend(of_facets(&on));
+            let nodes = on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+            of_obstacles.extend(nodes.map(|node| mesh.global_node(node)));
         }
     }
-    let of_obstacles = all(&of_obstacles)?;
+    let of_obstacles: BTreeSet<u32> = gather(session.world(), &of_obstacles)?.into_iter().collect();
     for (at, pair) in pairs.iter_mut().enumerate() {
         let contact = &job.contact[pair.contact];
         if contact.against.is_empty() || !contact.is_without_scale() {

@@ -153,7 +153,8 @@ pub(super) fn transfer<const D: usize, const S: usize>(
     let mut found = checkpoint::transfer(session, &file, &physics, body, state)?;
     let initial = loaded.job.initial.as_ref();
     if initial.is_some_and(|initial| initial.reset.contains(&Reset::Displacement)) {
-        session.agree(count_from_here(body, state))?;
+        let here = session.agree(state.displacement.owned().map(|values| values.to_vec()))?;
+        session.agree(checkpoint::count_from(&here, body, state))?;
     }
     found.at_rest.retain(|name| name != SUPPORT_REACTION.name(Moment::Last));
     let handover = take_over(session, &found.physics, body, state)?;
@@ -187,14 +188,6 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         released => released,
     };
     Ok(Some(StartState { digest: found.digest, words, warning }))
-}
-
-/// Lets displacements of outputs and supports count from the present one. Collective.
-fn count_from_here<const D: usize, const S: usize>(body: &mut Body<D, S>, state: &mut State) -> Result<()> {
-    state.count_from_here()?;
-    let origin = state.displacement.owned()?;
-    body.support_motion.iter_mut().for_each(|motion| motion.count_from(&origin));
-    Ok(())
 }
 
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.

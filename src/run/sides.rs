@@ -229,17 +229,9 @@ fn tangled<const D: usize>(
     }
     let (mut carrying, mut faced) = (Vec::new(), Vec::new());
     for pair in pairs {
-        let own: Vec<u32> = pair.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
-        let facets = pair.against.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-        let other: Vec<u32> = match pair.slides {
-            true => facets.map(|node| mesh.global_node(node)).collect(),
-            false => pair.nodes.iter().flat_map(PairedNode::faced).map(|(master, _)| *master).collect(),
-        };
-        let all = |nodes: &[u32]| -> Result<BTreeSet<u32>, Agreed> {
-            Ok(gather(session.world(), nodes)?.into_iter().collect())
-        };
-        carrying.push(all(&own)?);
-        faced.push(all(&other)?);
+        let [own, other] = pair.nodes_of_all(session, mesh)?;
+        carrying.push(own);
+        faced.push(other);
     }
     let of_pair = |at: usize| {
         let others = faced.iter().enumerate().filter(|(other, _)| *other != at);

@@ -450,7 +450,7 @@ fn fill(field: &mut DistributedVector, values: &[f64]) -> Result<()> {
 }
 
 /// Lets displacements of outputs and supports count from this one of owned nodes. Collective.
-fn count_from<const D: usize, const S: usize>(
+pub fn count_from<const D: usize, const S: usize>(
     values: &[f64],
     body: &mut Body<D, S>,
     state: &mut State,
