@@ -46,8 +46,10 @@ const LEAST_REFERENCE: f64 = 1e-130;
 /// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
 /// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
 const ROUNDING_SHARE: f64 = 0.1;
-/// Share of the forces of a step above which no residual counts as rounding errors.
+/// Share of the forces of a step above which no residual counts as rounding errors, unless those of `K v` are as large.
 const LARGEST_FLOOR: f64 = 1e-4;
+/// The largest residual at which Newton's method stagnates by rounding errors, as a multiple of those of `K v`.
+const STAGNANT: f64 = 4.0;
 
 /// How accurately a step is solved, in N.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +58,9 @@ struct Accuracy {
     tolerance: f64,
     /// The size of the forces, of those that drive obstacles, too.
     size: f64,
-    /// The forces to which its residual is compared: not below those at which rounding errors matter to pressures.
+    /// The rounding errors of `K v` at the start.
+    product: f64,
+    /// The forces to which its residual is compared: not below those of which rounding errors are the tolerance.
     reference: f64,
 }
 
@@ -303,11 +307,12 @@ impl StepSolver {
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
         let (session, converged, forces) = (problem.session, problem.converged, problem.forces);
-        let Accuracy { mut tolerance, size, reference } = self.accuracy(problem, trial)?;
-        let floor = Floor { slope: f64::EPSILON * self.matrix_norm, largest: LARGEST_FLOOR * size };
+        let Accuracy { mut tolerance, size, product, reference } = self.accuracy(problem, trial)?;
+        let slope = STAGNANT * f64::EPSILON * self.matrix_norm;
+        let floor = Floor { slope, largest: (LARGEST_FLOOR * size).max(STAGNANT * product) };
         let (mut is_relaxed, mut is_pressed_on) = (false, false);
         loop {
-            let Self { active, step_matrix, newton, flowing, start, products, .. } = &mut *self;
+            let Self { active, step_matrix, newton, flowing, start, products, springs, .. } = &mut *self;
             let Prepared { matrix, solver, scales, .. } = active.as_mut().ok_or_else(unassembled)?;
             let (solver, is_own) = (&mut **solver, step_matrix.is_none());
             let is_single = solver.precision() == Some(Precision::Single);
@@ -316,6 +321,9 @@ impl StepSolver {
             }
             let matrix = &CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products };
             let right_hand_side = forces;
+            // Where contact alone holds a body, a direction may be any rigid motion, whose rounding errors hide that nothing holds it.
+            let is_held = is_pressed_on || !springs.are_needed();
+            let floor = if is_held { floor } else { Floor::default() };
             let system = System { matrix, right_hand_side, tolerance, floor, converged, scales };
             let solved = match (newton, flowing) {
                 (None, _) => solve_linear(solver.krylov().linear_solver(), problem, system, trial),
@@ -372,7 +380,7 @@ impl StepSolver {
                 continue;
             }
             let floor = f64::EPSILON * self.matrix_norm * solution.norm()?;
-            if !floor.is_finite() || floor <= tolerance {
+            if !floor.is_finite() || floor <= tolerance || floor > LARGEST_FLOOR * size {
                 return Err(self.springs.explain(failure));
             }
             if !self.is_nonlinear() {
@@ -427,8 +435,9 @@ impl StepSolver {
         let all = size.max(driving);
         let tolerance =
             (self.settings.tolerance * size).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product);
-        let reference = all.max(rounding.max(product) / accuracy).max(LEAST_FORCE / self.settings.tolerance);
-        Ok(Accuracy { tolerance, size: all, reference })
+        let rounded = rounding.max(product).max(LEAST_FORCE);
+        let reference = all.max(rounded / self.settings.tolerance);
+        Ok(Accuracy { tolerance, size: all, product, reference })
     }
 
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
