@@ -8,6 +8,7 @@ use crate::{
     results::Results,
 };
 use clarke::linear_algebra::tensor::larger;
+use std::process::{Command, Stdio};
 
 const HISTORY: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
 kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
@@ -488,4 +489,20 @@ fn a_run_that_passes_unstable_states_says_so() {
     let calm = case.run(1);
     assert_eq!(calm.summary()["unstable_steps"], 0);
     assert!(!calm.text("run.log").contains("unstable"));
+}
+
+#[test]
+fn runs_on_one_rank_side_by_side_share_no_file_of_open_mpi() {
+    // To Open MPI all processes that no launcher started are the same job.
+    let cases: Vec<Case> = (0..12).map(|_| Case::square(3).set("output.fields", "{every = 1}")).collect();
+    let start = |case: &Case| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_solver"));
+        command.arg("run").arg(case.written()).arg("--quiet");
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("started")
+    };
+    for run in cases.iter().map(start).collect::<Vec<_>>() {
+        let outcome = run.wait_with_output().expect("ended");
+        let printed = String::from_utf8_lossy(&outcome.stderr);
+        assert!(outcome.status.success() && printed.is_empty(), "{printed}");
+    }
 }

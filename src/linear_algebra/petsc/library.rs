@@ -43,8 +43,9 @@ pub(super) fn started() -> Result<Rc<Started>> {
 
 /// The variables with which launchers tell a process its rank.
 const RANKS: [&str; 4] = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
-/// The option of Open MPI with which a process that no launcher has started needs no daemon.
-const ALONE: &str = "OMPI_MCA_ess_singleton_isolated";
+/// The options of Open MPI for a process that no launcher has started: it needs no daemon, and shares no file in memory with others,
+/// which have its name, too.
+const ALONE: [[&str; 2]; 2] = [["OMPI_MCA_ess_singleton_isolated", "1"], ["OMPI_MCA_sharedfp", "^sm"]];
 
 /// The rank of this process before MPI has started, if a launcher provides it.
 pub fn launched_rank() -> Option<u64> {
@@ -54,10 +55,15 @@ pub fn launched_rank() -> Option<u64> {
 /// Lets MPI start without a daemon where no launcher has started this process: Open MPI would start one for processes that this one
 /// starts, and wait for it longer than many a run takes. To be called at the start of a program, before it has threads.
 pub fn start_without_daemon() {
-    if launched_rank().is_none() && std::env::var_os(ALONE).is_none() {
-        // SAFETY: the program has started no thread, and those that the BLAS starts as it is loaded only wait for work: no other
-        // thread reads or writes the environment meanwhile.
-        unsafe { std::env::set_var(ALONE, "1") };
+    if launched_rank().is_some() {
+        return;
+    }
+    for [name, value] in ALONE {
+        if std::env::var_os(name).is_none() {
+            // SAFETY: the program has started no thread, and those that the BLAS starts as it is loaded only wait for work: no other
+            // thread reads or writes the environment meanwhile.
+            unsafe { std::env::set_var(name, value) };
+        }
     }
 }
 

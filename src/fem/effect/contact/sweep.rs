@@ -62,6 +62,7 @@ impl<const D: usize> Contact<D> {
                     add_scaled(&after, moved - worn, &point.normal),
                 ],
                 normal: point.normal,
+                body_size: self.size,
                 loses_obstacle: point.penetration_before > f64::NEG_INFINITY && !point.can_touch(),
             };
             if self.gap.passes(&sweep)? {
