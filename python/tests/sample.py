@@ -1,0 +1,67 @@
+"""A small job of which the results are known by hand, and a run of it for all tests of a process."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import importlib.util
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+
+import clarke
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = tempfile.TemporaryDirectory(prefix="clarke-")
+# A block that slides to a stop: 40 kg/m, 1 m/s, coefficient 0.5 (jobs/sliding_block.toml).
+SLIDING_BLOCK: dict[str, Any] = {
+    "mesh": {"rectangle": {"size": [0.4, 0.1], "cells": [8, 2]}},
+    "material": {
+        "hypothesis": "plane_strain",
+        "density": 1000.0,
+        "viscosity": {"volumetric": 1e6, "shear": 1e6},
+    },
+    "body_force": [{"value": [0.0, -9810.0]}],
+    "contact": [{"on": ["bottom"], "normal": {"unilateral": {}}, "friction": {"coulomb": {"coefficient": 0.5}}}],
+    "initial": {"velocity": [1.0, 0.0]},
+    "time": {"end": 0.25, "step": 0.001},
+    "output": {
+        "fields": {"every": 100},
+        "probe": [{"name": "centre", "point": [0.2, 0.05]}, {"name": "foot", "point": [0.0, 0.0]}],
+        "profile": [{"on": "bottom"}],
+    },
+    "check": {
+        "probe.centre.displacement_x": {"value": 0.10144, "relative": 1e-3},
+        "max_energy_imbalance": {"value": 0.0, "absolute": 1e-9},
+    },
+}
+
+
+def sliding_block(**tables: Any) -> dict[str, Any]:
+    """A copy of the job with other tables."""
+    return copy.deepcopy(SLIDING_BLOCK) | tables
+
+
+def folder() -> Path:
+    """A new folder."""
+    return Path(tempfile.mkdtemp(dir=WORK.name))
+
+
+@functools.cache
+def finished() -> clarke.Results:
+    """A run of the job on two ranks, which tests only read."""
+    return clarke.run(sliding_block(), ranks=2, folder=folder() / "out", quiet=True)
+
+
+def needs(*packages: str) -> Any:
+    """Skips a test without these optional packages, and says so."""
+    missing = [package for package in packages if importlib.util.find_spec(package) is None]
+    return unittest.skipIf(bool(missing), f"optional: pip install {' '.join(missing)}")
+
+
+def script(path: Path, *lines: str) -> Path:
+    """An executable script, in place of a program."""
+    path.write_text("\n".join(["#!/bin/sh", *lines, ""]))
+    path.chmod(0o755)
+    return path
