@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,10 +70,10 @@ def read(path: Path, is_plane: bool) -> Table:
     columns: dict[str, list[Any]] = {}
     for at, name in enumerate(header):
         entries = [row[at] for _, row in rows]
-        if name in WORDS:
-            columns[name] = [unguarded(entry) for entry in entries]
-        else:
-            columns[name] = [_number(path, line, name, row[at]) for line, row in rows]
+        try:
+            columns[name] = _column(name, entries)
+        except ValueError:
+            raise _not_a_number(path, name, [(line, row[at]) for line, row in rows]) from None
     return Table(columns, {name: declared.unit(path.name, name, is_plane) for name in header})
 
 
@@ -87,7 +88,10 @@ def records(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     header = next(reader, None)
     if header is None:
         raise NoResults(f"{path} has no rows yet")
-    rows = [(reader.line_num, row) for row in reader]
+    try:
+        rows = [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
+        raise Damaged(f"{path}, line {reader.line_num}: {error}; the file is damaged") from error
     for line, row in rows:
         if len(row) != len(header):
             raise Damaged(f"{path}, line {line}: {len(row)} entries for {len(header)} columns; the file is damaged")
@@ -99,10 +103,18 @@ def unguarded(entry: str) -> str:
     return entry[1:] if entry.startswith("'") and entry[1:].startswith(GUARDED) else entry
 
 
-def _number(path: Path, line: int, name: str, entry: str) -> float | int:
-    try:
-        if name == "step":
-            return int(entry)
-        return float(entry) if entry else float("nan")
-    except ValueError:
-        raise Damaged(f"{path}, line {line}: {name} is no number: {entry!r}; the file is damaged") from None
+def _column(name: str, entries: list[str]) -> list[Any]:
+    if name in WORDS:
+        return [unguarded(entry) for entry in entries]
+    if name == "step":
+        return [int(entry) for entry in entries]
+    return [float(entry) if entry else math.nan for entry in entries]
+
+
+def _not_a_number(path: Path, name: str, entries: list[tuple[int, str]]) -> Damaged:
+    for line, entry in entries:
+        try:
+            _column(name, [entry])
+        except ValueError:
+            return Damaged(f"{path}, line {line}: {name} is no number: {entry!r}; the file is damaged")
+    return Damaged(f"{path} is damaged")

@@ -170,6 +170,9 @@ class Running(unittest.TestCase):
 
     def test_much_output_on_both_streams_does_not_block(self) -> None:
         lines = "i=0; while [ $i -lt 4000 ]; do echo 0123456789012345678901234567890123456789; echo error $i >&2; i=$((i+1)); done"
+        signal.signal(signal.SIGALRM, lambda *_: self.fail("blocked"))
+        self.addCleanup(signal.alarm, 0)
+        signal.alarm(20)
         ended = program.start([str(sample.script(sample.folder() / "loud", lines))], show=False)
         self.assertEqual((len(ended.output), ended.errors.count("error")), (41 * 4000, 4000))
 
