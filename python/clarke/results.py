@@ -23,14 +23,19 @@ if TYPE_CHECKING:
 TABLES = {"history": "", "resultant": "source", "probe": "probe", "profile": "profile"}
 
 
+# Words of a quantity that only studies compute.
+OF_STUDIES = ("mean", "amplitude", "period")
+
+
 @dataclass(frozen=True)
 class Check:
-    """An expected result of a job, in the unit of the quantity, and whether the run has it."""
+    """An expected result of a job, in the unit of the quantity. `passed` is `None` where this package cannot tell, for the reason in `note`."""
 
     name: str
-    expected: float
+    expected: float | str
     value: float
-    passed: bool
+    passed: bool | None
+    note: str = ""
 
 
 def open(folder: str | os.PathLike[str]) -> Results:
@@ -165,11 +170,8 @@ class Results:
         word, _, rest = name.partition(".")
         if word not in TABLES:
             return self._of_summary(name)
-        before, _, column = rest.rpartition(".")
-        of, _, side = before.rpartition(".") if TABLES[word] else ("", "", before)
-        if side not in ("max", "min", "first", "mean", "amplitude", "period"):
-            of, side = before, ""
-        if side in ("mean", "amplitude", "period"):
+        of, side, column = _parts(word, rest)
+        if side in OF_STUDIES:
             raise Error(f"{name} is a quantity of studies: clarke.sweep(.., responses=[{name!r}])")
         table = self.columns("history") if word == "history" else self.columns(f"{word}s", of)
         if column not in table:
@@ -180,6 +182,8 @@ class Results:
         if not values:
             raise NoResults(f"{name}: the table has no rows yet")
         ends = {"": values[-1], "first": values[0], "max": max(values), "min": min(values)}
+        if side not in ends:
+            raise Error(f"{name}: {side} is no extremum; write history.COLUMN, history.max.COLUMN or history.min.COLUMN")
         return float(ends[side])
 
     def _of_summary(self, name: str) -> float:
@@ -192,14 +196,19 @@ class Results:
 
     def check(self) -> list[Check]:
         """Compares the run with the expected results of its job, the table `[check]`."""
-        checks = []
-        for name, expected in self.job.get("check", {}).items():
-            value = self.quantity(name)
-            off = abs(value - expected["value"])
-            relative, absolute = expected.get("relative", math.inf), expected.get("absolute", math.inf)
-            passed = off <= absolute and (relative == math.inf or off <= relative * abs(expected["value"]))
-            checks.append(Check(name, expected["value"], value, passed))
-        return checks
+        return [self._checked(name, expected) for name, expected in self.job.get("check", {}).items()]
+
+    def _checked(self, name: str, expected: Mapping[str, Any]) -> Check:
+        word, _, rest = name.partition(".")
+        if word in TABLES and _parts(word, rest)[1] in OF_STUDIES:
+            return Check(name, expected["value"], math.nan, None, "a quantity of studies: clarke.sweep has it")
+        value = self.quantity(name)
+        if any(isinstance(number, str) for number in expected.values()):
+            return Check(name, expected["value"], value, None, "a formula of parameters, which only the program evaluates")
+        off = abs(value - expected["value"])
+        relative, absolute = expected.get("relative", math.inf), expected.get("absolute", math.inf)
+        passed = off <= absolute and (relative == math.inf or off <= relative * abs(expected["value"]))
+        return Check(name, expected["value"], value, passed)
 
     def report(
         self,
@@ -214,6 +223,16 @@ class Results:
         folders = [str(self.folder)] + ([str(other.folder)] if other else [])
         program.start([program.find(solver), "report", *options, "--", *folders]).refuse(self.folder)
         return self.folder / "report" / ("comparison.html" if other else "index.html")
+
+
+def _parts(word: str, rest: str) -> tuple[str, str, str]:
+    """Name, side and column of a quantity of a table: `tip`, `max` and `velocity_x` of `probe.tip.max.velocity_x`."""
+    before, _, column = rest.rpartition(".")
+    if not TABLES[word]:
+        return "", before, column
+    of, dot, side = before.rpartition(".")
+    is_side = dot and side in ("max", "min", "first", *OF_STUDIES)
+    return (of, side, column) if is_side else (before, "", column)
 
 
 def _is_locked(path: Path) -> bool:

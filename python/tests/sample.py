@@ -28,7 +28,11 @@ SLIDING_BLOCK: dict[str, Any] = {
     "time": {"end": 0.25, "step": 0.001},
     "output": {
         "fields": {"every": 100},
-        "probe": [{"name": "centre", "point": [0.2, 0.05]}, {"name": "foot", "point": [0.0, 0.0]}],
+        "probe": [
+            {"name": "centre", "point": [0.2, 0.05]},
+            {"name": "foot", "point": [0.0, 0.0]},
+            {"name": "first", "point": [0.4, 0.0]},
+        ],
         "profile": [{"on": "bottom"}],
     },
     "check": {

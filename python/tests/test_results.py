@@ -36,7 +36,7 @@ class Tables(unittest.TestCase):
         centre = run.columns("probes", of="centre")
         # v0^2 / (2 a) - k v0 / 2 with a = 0.5 * 9.81 m/s^2
         self.assertAlmostEqual(centre["displacement_x"][-1], 0.10144, delta=1e-4)
-        self.assertEqual(set(run.columns("probes")["probe"]), {"centre", "foot"})
+        self.assertEqual(set(run.columns("probes")["probe"]), {"centre", "first", "foot"})
         contact = run.columns("resultants", of="contact bottom")
         self.assertAlmostEqual(contact["force_y"][-1], 392.4, delta=1e-3)
         profile = run.columns("profiles", of="bottom")
@@ -49,7 +49,7 @@ class Tables(unittest.TestCase):
 
     def test_unknown_names_are_refused_with_the_known_ones(self) -> None:
         run = sample.finished()
-        with self.assertRaisesRegex(clarke.Error, "no probe 'tip'; there are centre, foot"):
+        with self.assertRaisesRegex(clarke.Error, "no probe 'tip'; there are centre, first, foot"):
             run.columns("probes", of="tip")
         with self.assertRaisesRegex(clarke.Error, "there are history, resultants, probes and profiles"):
             run.columns("energies")
@@ -187,6 +187,12 @@ class Folders(unittest.TestCase):
         self.assertIn("value = 0.10144", text)
         (folder / "job.toml").write_text(text.replace("value = 0.10144", "value = 0.1016"))
         self.assertEqual([check.passed for check in clarke.open(folder).check()], [True, False])
+        more = '[check."history.mean.dt"]\nvalue = 0.001\nrelative = 0.1\n[check."history.dt"]\nvalue = "2*V"\nrelative = 0.1\n'
+        (folder / "job.toml").write_text(text + more)
+        last = clarke.open(folder).check()[-2:]
+        self.assertEqual([check.passed for check in last], [None, None])
+        self.assertRegex(last[0].note, "clarke.sweep")
+        self.assertRegex(last[1].note, "formula")
 
     def test_quantities_are_read_where_their_names_say(self) -> None:
         run = sample.finished()
@@ -196,13 +202,14 @@ class Folders(unittest.TestCase):
             ("certificates.viscosity_modulus", 1e6),
             ("history.dt", history["dt"][-1]),
             ("history.max.kinetic_energy", max(history["kinetic_energy"])),
+            ("probe.first.velocity_x", run.columns("probes", of="first")["velocity_x"][-1]),
             ("probe.foot.min.displacement_x", run.columns("probes", of="foot")["displacement_x"][0]),
             ("profile.bottom.max.contact_pressure", max(pressure[-9:])),
             ("profile.bottom.first.contact_pressure", pressure[-9]),
         ]:
             self.assertEqual(run.quantity(name), value, name)
         for name, words in [
-            ("history.mean.dt", "clarke.sweep"), ("history.energy", "no column energy"), ("status", "no number status"),
+            ("history.mean.dt", "clarke.sweep"), ("history.top.dt", "top is no extremum"), ("history.energy", "no column energy"), ("status", "no number status"),
             ("probe.tip.velocity_x", "no probe 'tip'"), ("certificates.step_range", "no number"),
         ]:  # fmt: skip
             with self.assertRaisesRegex(clarke.Error, words):
