@@ -32,8 +32,9 @@ def run(
 
     `set` changes keys, as in `{"time.step": 1e-3, "contact.0.quadrature": "gauss"}`. `folder` is the output folder, relative to the
     current folder; by default it is that of the job. `restart=True` continues from the newest checkpoint there, or from the checkpoint
-    of this path; `force` overwrites other results. The program's lines appear as it writes them, with `quiet` its errors only. A run
-    that does not complete raises `Refused`, `Failed`, `Stopped` or `InternalFault` with its message.
+    of this path; `force` overwrites other results. `launcher` starts the ranks, for example `srun`. The program's lines appear as it
+    writes them, with `quiet` its errors only. A run that does not complete raises `Refused`, `Failed`, `Stopped` or `InternalFault`
+    with its message.
     """
     changes = dict(set or {})
     target = _target(job, changes, folder)

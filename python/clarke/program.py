@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -88,20 +88,25 @@ def start(command: Sequence[str], show: bool = True) -> Ended:
 
 
 def _wait(process: subprocess.Popen[str]) -> int:
-    actions: list[Callable[[], Any]] = [
-        lambda: process.send_signal(signal.SIGUSR1),
-        lambda: os.killpg(process.pid, signal.SIGKILL),
-    ]
+    """The exit code; after an interrupt that the program did not follow with one of its own, `KeyboardInterrupt`."""
+    interrupts = 0
     while True:
         try:
-            return process.wait()
+            code = process.wait()
         except KeyboardInterrupt:
-            if not actions:
-                raise
-            actions.pop(0)()
+            interrupts += 1
+            if interrupts == 1:
+                process.send_signal(signal.SIGUSR1)
+            else:
+                os.killpg(process.pid, signal.SIGKILL)
         except BaseException:
             os.killpg(process.pid, signal.SIGKILL)
             raise
+        else:
+            break
+    if interrupts and code not in range(4):
+        raise KeyboardInterrupt
+    return code
 
 
 class _Copy:

@@ -21,15 +21,16 @@ if TYPE_CHECKING:
 
 # The first word of a quantity in [check] and the table that it names, with the column of the name behind it.
 TABLES = {"history": "", "resultant": "source", "probe": "probe", "profile": "profile"}
-
-
 # Words of a quantity that only studies compute.
 OF_STUDIES = ("mean", "amplitude", "period")
 
 
 @dataclass(frozen=True)
 class Check:
-    """An expected result of a job, in the unit of the quantity. `passed` is `None` where this package cannot tell, for the reason in `note`."""
+    """An expected result of a job, in the unit of the quantity.
+
+    `passed` is `None` where this package cannot tell, for the reason in `note`.
+    """
 
     name: str
     expected: float | str

@@ -19,9 +19,9 @@ def main(folder: Path) -> None:
     unit = grid.user_dict["units"]["von_mises"]
     deformed = grid.warp_by_vector("displacement")
 
-    plotter = pyvista.Plotter(off_screen=True, window_size=(900, 700))
-    bar = {"title": f"von Mises stress [{unit}]", "vertical": True, "position_x": 0.85, "position_y": 0.3, "fmt": "%.1e"}
-    plotter.add_mesh(deformed, scalars="von_mises", show_edges=True, line_width=0.3, scalar_bar_args=bar)
+    plotter = pyvista.Plotter(off_screen=True, window_size=[900, 700])
+    plotter.add_mesh(deformed, scalars="von_mises", show_edges=True, line_width=0.3, show_scalar_bar=False)
+    plotter.add_scalar_bar(f"von Mises stress [{unit}]", vertical=True, position_x=0.85, position_y=0.3, fmt="%.1e")
     plotter.add_text(f"t = {grid.user_dict['time']:g} s", font_size=12)
     plotter.camera_position = "iso"
     plotter.screenshot(folder / "stress_field.png")

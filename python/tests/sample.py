@@ -7,11 +7,13 @@ import functools
 import importlib.util
 import tempfile
 import unittest
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import clarke
 
+Test = TypeVar("Test")
 ROOT = Path(__file__).resolve().parents[2]
 WORK = tempfile.TemporaryDirectory(prefix="clarke-")
 # A block that slides to a stop: 40 kg/m, 1 m/s, coefficient 0.5 (jobs/sliding_block.toml).
@@ -58,10 +60,11 @@ def finished() -> clarke.Results:
     return clarke.run(sliding_block(), ranks=2, folder=folder() / "out", quiet=True)
 
 
-def needs(*packages: str) -> Any:
+def needs(*packages: str) -> Callable[[Test], Test]:
     """Skips a test without these optional packages, and says so."""
     missing = [package for package in packages if importlib.util.find_spec(package) is None]
-    return unittest.skipIf(bool(missing), f"optional: pip install {' '.join(missing)}")
+    reason = f"optional: pip install {' '.join(missing)}"
+    return lambda test: unittest.skipIf(bool(missing), reason)(test)  # type: ignore[type-var]
 
 
 def script(path: Path, *lines: str) -> Path:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 import unittest
+from collections.abc import Callable
 from unittest import mock
 
 import clarke
@@ -123,7 +124,8 @@ class Running(unittest.TestCase):
         folder = sample.folder() / "out"
         job = sample.sliding_block(checkpoint={"every": 10, "keep": 5})
         clarke.run(job, folder=folder, set={"time.end": 0.02}, quiet=True)
-        for restart, steps in [(True, 30), (folder / "checkpoint-20.h5", 40)]:
+        starts: list[tuple[bool | pathlib.Path, int]] = [(True, 30), (folder / "checkpoint-20.h5", 40)]
+        for restart, steps in starts:
             run = clarke.run(job, folder=folder, set={"time.end": steps / 1000}, restart=restart, quiet=True)
             self.assertEqual(run.columns("history")["step"], list(range(1, steps + 1)))
         self.assertTrue(run.summary["restarted_from"].endswith("checkpoint-20.h5"))
@@ -159,6 +161,17 @@ class Running(unittest.TestCase):
         child.send_signal(signal.SIGINT)
         self.assertEqual(child.wait(timeout=30), 33)
         self.assertTrue(list(folder.glob("checkpoint-*.h5")))
+
+    def test_an_interrupt_of_what_can_not_stop_so_is_an_interrupt(self) -> None:
+        folder = sample.folder()
+        begun = folder / "begun"
+        sleeping = sample.script(folder / "sleeping", f"touch '{begun}'; exec sleep 30")
+        code = f"import clarke; clarke.describe('time', solver={str(sleeping)!r})"
+        child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=_with_package())
+        self.addCleanup(child.kill)
+        _wait_for(begun.exists)
+        child.send_signal(signal.SIGINT)
+        self.assertIn("KeyboardInterrupt", child.communicate(timeout=10)[1])
 
     def test_a_program_that_ends_otherwise_is_an_internal_fault(self) -> None:
         folder = sample.folder()
@@ -203,9 +216,9 @@ def _with_package() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": str(sample.ROOT / "python")}
 
 
-def _wait_for(is_so: object) -> None:
+def _wait_for(is_so: Callable[[], bool]) -> None:
     end = time.monotonic() + 10
-    while not is_so():  # type: ignore[operator]
+    while not is_so():
         if time.monotonic() > end:
             raise AssertionError("it did not happen within 10 s")
         time.sleep(0.02)

@@ -209,9 +209,13 @@ class Folders(unittest.TestCase):
         ]:
             self.assertEqual(run.quantity(name), value, name)
         for name, words in [
-            ("history.mean.dt", "clarke.sweep"), ("history.top.dt", "top is no extremum"), ("history.energy", "no column energy"), ("status", "no number status"),
-            ("probe.tip.velocity_x", "no probe 'tip'"), ("certificates.step_range", "no number"),
-        ]:  # fmt: skip
+            ("history.mean.dt", "clarke.sweep"),
+            ("history.top.dt", "top is no extremum"),
+            ("history.energy", "no column energy"),
+            ("status", "no number status"),
+            ("probe.tip.velocity_x", "no probe 'tip'"),
+            ("certificates.step_range", "no number"),
+        ]:
             with self.assertRaisesRegex(clarke.Error, words):
                 run.quantity(name)
 

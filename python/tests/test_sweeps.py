@@ -5,6 +5,7 @@ import io
 import json
 import math
 import unittest
+from typing import Any
 
 import clarke
 
@@ -19,7 +20,7 @@ class Sweeps(unittest.TestCase):
         folder = sample.folder()
         job = folder / "job.toml"
         job.write_text(clarke.dumps(sample.sliding_block()))
-        responses = [DISPLACEMENT, {"of": "history.mean.kinetic_energy", "to": 0.1}, "max_von_mises"]
+        responses: list[Any] = [DISPLACEMENT, {"of": "history.mean.kinetic_energy", "to": 0.1}, "max_von_mises"]
         with contextlib.redirect_stdout(io.StringIO()) as shown:
             sweep = clarke.sweep(job, {COEFFICIENT: [0.5, 1.0]}, responses, folder=folder / "sweep", ranks=2)
         table = sweep.columns
