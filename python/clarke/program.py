@@ -17,8 +17,8 @@ from typing import IO, Any
 from .errors import SolverMissing, of_code
 
 BUILT = Path("target/release/solver")
-# What mpirun adds to the error of a rank, between two lines of dashes.
-OF_LAUNCHER = re.compile(r"^-{60,}\n.*?^-{60,}\n?", re.MULTILINE | re.DOTALL)
+# What mpirun adds to the error of a rank: a text between two lines of dashes, and lines about signals.
+OF_LAUNCHER = re.compile(r"^-{60,}\n.*?^-{60,}\n?|^mpirun: Forwarding signal [^\n]*\n", re.MULTILINE | re.DOTALL)
 
 
 def find(solver: str | os.PathLike[str] | None = None) -> str:
@@ -56,11 +56,22 @@ class Ended:
         """Raises the error of the exit code, with the program's own message, unless it is one of the accepted codes."""
         if self.code in accepted:
             return
-        said = OF_LAUNCHER.sub("", self.errors).strip() or self.errors.strip()
+        said = OF_LAUNCHER.sub("", self.errors).strip() or (self.errors.strip() if self.code != 3 else "")
+        if self.code == 3 and folder is not None:
+            said = f"{said}\n{_reason_of_stop(folder / 'run.log')}".strip()
         if self.code < 0:
             said = f"{said}\nended by {signal.Signals(-self.code).name}".strip()
         said = said or f"exit code {self.code}, without a message; the last lines:\n{self.output[-500:]}"
         raise of_code(self.code)(said, self.code, self.command, folder)
+
+
+def _reason_of_stop(log: Path) -> str:
+    """The last line about it in the log of a run, which the program prints on its standard output."""
+    try:
+        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((line for line in reversed(lines) if line.startswith("stopping")), "")
 
 
 def start(command: Sequence[str], show: bool = True) -> Ended:

@@ -19,6 +19,10 @@ from clarke import program
 from . import sample
 
 
+# Programs in the background of a script ignore interrupts, and so do those that they start.
+INTERRUPTIBLE = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+
+
 class Finding(unittest.TestCase):
     def test_the_argument_comes_first_then_the_variable_then_the_path(self) -> None:
         folder = sample.folder()
@@ -142,7 +146,7 @@ class Running(unittest.TestCase):
     def test_a_limit_stops_a_run_with_a_checkpoint(self) -> None:
         folder = sample.folder() / "out"
         job = sample.sliding_block(checkpoint={"wall_limit": 0.3})
-        with self.assertRaises(clarke.Stopped):
+        with self.assertRaisesRegex(clarke.Stopped, "^stopping on the wall-time limit of 0.3 s"):
             clarke.run(job, folder=folder, set={"time.end": 1e4}, quiet=True)
         self.assertEqual(clarke.open(folder).status, "stopped")
         self.assertTrue(list(folder.glob("checkpoint-*.h5")))
@@ -151,9 +155,9 @@ class Running(unittest.TestCase):
         folder = sample.folder() / "out"
         job = sample.sliding_block()
         code = (
-            "import clarke, sys\n"
+            f"{INTERRUPTIBLE}import clarke, sys\n"
             f"try: clarke.run({job!r}, folder={str(folder)!r}, ranks=2, set={{'time.end': 1e4}}, quiet=True)\n"
-            "except clarke.Stopped: sys.exit(33)\n"
+            "except clarke.Stopped as stop: sys.exit(33 if 'stopping on' in str(stop) else 34)\n"
         )
         child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL, env=_with_package())
         self.addCleanup(child.kill)
@@ -166,7 +170,7 @@ class Running(unittest.TestCase):
         folder = sample.folder()
         begun = folder / "begun"
         sleeping = sample.script(folder / "sleeping", f"touch '{begun}'; exec sleep 30")
-        code = f"import clarke; clarke.describe('time', solver={str(sleeping)!r})"
+        code = f"{INTERRUPTIBLE}import clarke; clarke.describe('time', solver={str(sleeping)!r})"
         child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=_with_package())
         self.addCleanup(child.kill)
         _wait_for(begun.exists)
