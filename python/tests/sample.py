@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import importlib.util
+import os
 import tempfile
 import unittest
 from collections.abc import Callable
@@ -42,6 +43,8 @@ SLIDING_BLOCK: dict[str, Any] = {
         "max_energy_imbalance": {"value": 0.0, "absolute": 1e-9},
     },
 }
+# Ranks that wait for each other leave the cores to other tests.
+os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
 
 
 def sliding_block(**tables: Any) -> dict[str, Any]:
