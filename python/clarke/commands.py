@@ -45,7 +45,7 @@ def run(
         arguments = ["run", *_sets(changes), *["--force"] * force, *["--quiet"] * quiet]
         if restart is not False:
             arguments.append("--restart" if restart is True else f"--restart={os.fspath(restart)}")
-        program.start([*command, *arguments, "--", str(file)]).refuse(target)
+        program.start([*command, *arguments, "--", str(file)], ranks=ranks).refuse(target)
     if target is None:
         raise Error("the run has completed, but not told where its results are")
     return Results(target)
@@ -82,7 +82,7 @@ def validate(
         changes["output.folder"] = target.absolute()
     command = program.on_ranks(ranks, program.find(solver), launcher)
     with jobs.as_file(job) as file:
-        ended = program.start([*command, "check", "--json", *_sets(changes), "--", str(file)], show=False)
+        ended = program.start([*command, "check", "--json", *_sets(changes), "--", str(file)], show=False, ranks=ranks)
     ended.refuse()
     found = json.loads(ended.output)
     assert isinstance(found, dict)

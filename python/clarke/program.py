@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -74,28 +75,32 @@ def _reason_of_stop(log: Path) -> str:
     return next((line for line in reversed(lines) if line.startswith("stopping")), "")
 
 
-def start(command: Sequence[str], show: bool = True) -> Ended:
+def start(command: Sequence[str], show: bool = True, ranks: int = 1) -> Ended:
     """Starts a program without a shell and waits for it.
 
     Its lines appear as they come on `sys.stdout` and `sys.stderr`, also in notebooks; with `show=False` they are only kept. An interrupt
     (Ctrl-C) asks a run to save its state and to stop, a second one kills it.
     """
-    try:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-            errors="replace",
-            process_group=0,
-        )
-    except OSError as error:
-        raise SolverMissing(f"cannot start {command[0]}: {error.strerror}") from error
-    output, errors = _Copy(process.stdout, sys.stdout, show), _Copy(process.stderr, sys.stderr, show)
-    code = _wait(process)
-    return Ended(list(command), code, output.text(), errors.text())
+    with tempfile.TemporaryDirectory(prefix="clarke-") as own:
+        # Ranks that no launcher has started would share a folder of Open MPI with all others of the user, and remove its files.
+        environment = os.environ | ({"OMPI_MCA_orte_tmpdir_base": own} if ranks == 1 else {})
+        try:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                encoding="utf-8",
+                errors="replace",
+                process_group=0,
+                env=environment,
+            )
+        except OSError as error:
+            raise SolverMissing(f"cannot start {command[0]}: {error.strerror}") from error
+        output, errors = _Copy(process.stdout, sys.stdout, show), _Copy(process.stderr, sys.stderr, show)
+        code = _wait(process)
+        return Ended(list(command), code, output.text(), errors.text())
 
 
 def _wait(process: subprocess.Popen[str]) -> int:

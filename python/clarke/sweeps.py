@@ -58,7 +58,7 @@ def sweep(
             study["timing"] = {"ranks": ranks_of_run}
         before = _written(target)
         with jobs.as_file(jobs.Job(study, _made(target.parent))) as study_file:
-            ended = program.start([*command, "study", *["--quiet"] * quiet, "--", str(study_file)])
+            ended = program.start([*command, "study", *["--quiet"] * quiet, "--", str(study_file)], ranks=ranks)
     # Exit code 1: some runs have failed, and the tables are written.
     ended.refuse(target, accepted=(0, 1) if _written(target) != before else (0,))
     if not isinstance(job, Mapping):

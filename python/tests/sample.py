@@ -43,8 +43,9 @@ SLIDING_BLOCK: dict[str, Any] = {
         "max_energy_imbalance": {"value": 0.0, "absolute": 1e-9},
     },
 }
-# Ranks that wait for each other leave the cores to other tests.
+# Ranks that wait for each other leave the cores to other tests, and launchers do not share a folder with those of other programs.
 os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
+os.environ["OMPI_MCA_orte_tmpdir_base"] = WORK.name
 
 
 def sliding_block(**tables: Any) -> dict[str, Any]:

@@ -185,6 +185,14 @@ class Running(unittest.TestCase):
                 clarke.run(sample.sliding_block(), folder=folder / "out", solver=false_solver)
             self.assertEqual(caught.exception.code, code)
 
+    def test_single_ranks_have_a_folder_of_open_mpi_of_their_own_as_long_as_they_run(self) -> None:
+        folder = sample.folder()
+        show = sample.script(folder / "show", 'test -d "$OMPI_MCA_orte_tmpdir_base" && echo "$OMPI_MCA_orte_tmpdir_base"')
+        one, other, of_launcher = (program.start([str(show)], show=False, ranks=ranks).output.strip() for ranks in (1, 1, 2))
+        self.assertEqual(len({one, other, sample.WORK.name, ""}), 4)
+        self.assertFalse(os.path.exists(one))
+        self.assertEqual(of_launcher, sample.WORK.name)
+
     def test_much_output_on_both_streams_does_not_block(self) -> None:
         lines = "i=0; while [ $i -lt 4000 ]; do echo 0123456789012345678901234567890123456789; echo error $i >&2; i=$((i+1)); done"
         signal.signal(signal.SIGALRM, lambda *_: self.fail("blocked"))
