@@ -5,6 +5,7 @@ JOB ?= jobs/papers/wang_cheng_2022.toml
 RANKS ?= 2
 ARGS ?=
 DEPS ?= yes
+PYTHON ?= python3
 # A PETSc with 64-bit indices, where Debian and Ubuntu put it.
 PETSC64_DIR ?= /usr/lib/petscdir/petsc64-real
 TARGET64 ?= target/petsc64
@@ -29,7 +30,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-effects bench-estimates bench-space verification lint deny msrv book gallery deb install clean
+.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-effects bench-estimates bench-space verification python lint deny msrv book gallery deb install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -51,6 +52,7 @@ help:
 	@echo 'make bench-estimates  estimated and measured times of all jobs (docs/speed.md); ARGS=--write puts the table into it'
 	@echo 'make bench-space  errors in space against seconds and memory (docs/space.md); ARGS=--write puts the tables into it'
 	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'
+	@echo 'make python    the tests of the Python package, 15 s; part of make test. PYTHON=venv/bin/python, with pandas and pyvista, tests more'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make deny      licences of the crates, and known faults in them (cargo-deny; asks the network)'
@@ -139,6 +141,10 @@ bench-space: deps
 # into the pages; words in ARGS that begin the names of pages select them.
 verification: deps
 	cargo bench --locked --bench verification -- $(ARGS)
+
+# Tests that need optional packages are skipped where these are missing, with a line that names them.
+python: build
+	CLARKE_SOLVER=$(abspath $(binary)) $(PYTHON) -m unittest discover -b -v -s python/tests -t python
 
 # With the profile of the build, whose generated code and macros serve here, too.
 lint: deps

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every test, beside random input for the readers of files; then the slowest tests, and the summaries of all tests.
+# Every test, those of the Python package among them, beside random input for the readers of files; then the slowest tests, and the summaries of all tests.
 #
 #   scripts/test.sh [--write]        --write puts the slowest tests into docs/tests.md
 set -euo pipefail
@@ -15,7 +15,9 @@ failed=0
     # What each test takes is told by an unstable option of libtest, which this variable allows.
     cargo --config "target.'cfg(all())'.runner = ['env', 'RUSTC_BOOTSTRAP=1']" \
         test --release --locked --lib --test all -- -Zunstable-options --report-time &&
-        cargo test --release --locked --doc
+        cargo test --release --locked --doc &&
+        CLARKE_SOLVER=$(realpath "${CARGO_TARGET_DIR:-target}")/release/solver \
+            python3 -m unittest discover -b -v -s python/tests -t python
 } 2>&1 | tee "$logs/tests.log" || failed=1
 wait "$random_input" || failed=1
 echo 'Random input:'
