@@ -14,13 +14,13 @@ use crate::{
             Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
             HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, Quantity,
             RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect,
-            SurfaceForce, Term, VISCOUS,
+            SurfaceForce, Tangents, Term, VISCOUS,
         },
         pairs::{Pair, shares},
-        space::{Batch, Geometry, Held, Inputs, Needs, Nodal, assemble, facet_points},
+        space::{Batch, Cell, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, facet_points},
         state::State,
     },
-    laws::material::Isotropic,
+    laws::material::{Anisotropic, Isotropic},
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
         simd::Pack,
@@ -72,6 +72,8 @@ pub struct Body<const D: usize, const S: usize> {
     evaluated: Vec<f64>,
     /// Forces of the interior at supports; empty unless they are requested.
     at_supports: RefCell<SupportForces>,
+    /// The multiple of strains and strain rates up to which the job asks for certificates that the matrix is a bound for.
+    covered: f64,
     /// The fastest relaxation of power laws in 1/s since the last [`Body::take_flow_step_bound`].
     fastest_flow: f64,
 }
@@ -106,6 +108,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             step: Step::default(),
             evaluated: Vec::new(),
             at_supports: RefCell::default(),
+            covered: 1.0,
             fastest_flow: 0.0,
         }
     }
@@ -155,6 +158,33 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Collective.
     pub fn matrix(&self, session: &Session, length: f64) -> Result<BlockRows, Agreed> {
         let rows = self.matrix_of_bodies(session, length)?;
+        self.in_unknowns(session, rows)
+    }
+
+    /// The same matrix with the derivatives of what cells add to the stress at the end of the step, averaged over each cell. Collective.
+    pub fn matrix_with(
+        &self,
+        session: &Session,
+        length: f64,
+        tangents: &Tangents,
+    ) -> Result<BlockRows, Agreed> {
+        let cells = self.geometry.point_count() / self.geometry.points();
+        let mut means = vec![0.0; cells * S * S];
+        for (number, tangent) in tangents.iter::<S>() {
+            let (cell, _, point) = self.geometry.point(number);
+            let whole = self.geometry.cell_at(cell).whole();
+            let mean = &mut means[cell * S * S..][..S * S];
+            mean.iter_mut().zip(tangent).for_each(|(mean, t)| *mean += point.volume / whole.volume * t);
+        }
+        let rows = self.assemble_rows(session, length, |cell, geometry, matrix| {
+            let mean = &means[cell * S * S..][..S * S];
+            matrix.add_form(geometry, 1.0, &Anisotropic::of_entries::<S>(mean));
+        })?;
+        self.in_unknowns(session, rows)
+    }
+
+    /// Rows of a matrix in the velocities of the bodies as those of the matrix in the unknowns. Collective.
+    fn in_unknowns(&self, session: &Session, rows: BlockRows) -> Result<BlockRows, Agreed> {
         match &self.coupling {
             Some(coupling) => coupling.transform(session, &self.mesh, rows),
             None => Ok(rows),
@@ -163,6 +193,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// The same matrix in the velocities of the bodies. Collective.
     pub fn matrix_of_bodies(&self, session: &Session, length: f64) -> Result<BlockRows, Agreed> {
+        self.assemble_rows(session, length, |_, _, _| {})
+    }
+
+    /// The same with what `add` adds to the matrix of a cell, given its number. Collective.
+    fn assemble_rows(
+        &self,
+        session: &Session,
+        length: f64,
+        add: impl Fn(usize, Cell<'_, D>, &mut CellMatrix<D>),
+    ) -> Result<BlockRows, Agreed> {
         let terms: Vec<_> = self
             .terms()
             .filter(|term| !(self.is_explicit() && term.form() == Some(Form::Elasticity)))
@@ -170,6 +210,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut rows =
             assemble(session, &self.mesh, &self.geometry, &self.held, |cell, geometry, matrix| {
                 terms.iter().for_each(|term| term.add_matrix(geometry.material(), geometry, length, matrix));
+                add(cell, geometry, matrix);
                 if let Some(mass) = &self.redistributed_mass {
                     mass.add_to_cell(cell, 1.0 / length, matrix);
                 }
@@ -296,12 +337,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Energies of this rank's cells, contacts and surface after a committed step, and its largest stress and strain.
     pub fn energy(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
+        self.energy_at(self.evaluation, state, step)
+    }
+
+    fn energy_at(&self, at: Evaluation, state: &State, step: Step) -> Result<(Energy, Peaks)> {
         let (mut energy, mut squares) = (Energy::default(), PeakSquares::default());
         let SupportForces { runs, forces } = &mut *self.at_supports.borrow_mut();
         forces.fill(0.0);
         with_nodal(state, |nodal| {
             energy[STORED_IN_CONTACT] = self.energy_of_contacts(state.time, &state.displacement)?;
-            self.elastic_support.add_energy(self.evaluation, step, nodal, &mut energy);
+            self.elastic_support.add_energy(at, step, nodal, &mut energy);
             if let Some(mass) = &self.redistributed_mass {
                 let change = |at: usize| nodal.velocity[at] - nodal.previous_velocity[at];
                 energy[KINETIC] += 0.5 * mass.square(|at| nodal.velocity[at]);
@@ -312,7 +357,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             }
             let effects = self.surface_effects.iter();
             with_seen(self.coupling.as_ref(), &self.held, nodal, |nodal| {
-                effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
+                effects.for_each(|e| e.add_energy(at, step, nodal, &mut energy));
             });
             let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
             let weakening = self.called(|p| p.weakens);
@@ -323,10 +368,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 weakening.select(&self.effects).for_each(|effect| effect.weaken(batch));
                 with_energy
                     .select(&self.effects)
-                    .for_each(|effect| effect.add_energy(self.evaluation, step, batch, &mut energy));
-                with_stress
-                    .select(&self.effects)
-                    .for_each(|effect| effect.add_stress(self.evaluation, step, batch));
+                    .for_each(|effect| effect.add_energy(at, step, batch, &mut energy));
+                with_stress.select(&self.effects).for_each(|effect| effect.add_stress(at, step, batch));
                 if strained {
                     squares.update(batch.count, &batch.strain, &batch.stress);
                 }
@@ -348,7 +391,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// The energies of [`Body::energy`], without the forces at supports, which remain those of the call before.
     pub fn energy_beside(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
         let forces = self.at_supports.take();
-        let energy = self.energy(state, step);
+        let energy = self.energy_at(self.evaluation.at_end(), state, step);
         self.at_supports.replace(forces);
         energy
     }
@@ -477,21 +520,38 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
     }
 
-    /// The largest strain rate on this rank after a committed step as a share of that up to which certificates hold for viscosities that
-    /// are formulas; `None` if there are none, on all ranks alike.
-    pub fn rate_share(&self, state: &State) -> Result<Option<f64>> {
+    /// The largest strain or strain rate on this rank after a committed step as a share of that up to which the job asks for certificates,
+    /// where elasticity or viscosity is a formula; `None` if there are none, on all ranks alike.
+    pub fn range_share(&self, state: &State) -> Result<Option<f64>> {
         let called = self.called(|p| p.is_monotone);
         if called.is_empty() {
             return Ok(None);
         }
-        let needs = Needs { strain_rate: true, ..Needs::default() };
+        let Some(needs) = self.needs(|p| p.stress.filter(|_| p.is_monotone)) else { return Ok(None) };
         let mut most = 0.0;
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-                most = called.select(&self.effects).map(|effect| effect.rate_share(batch)).fold(most, larger);
+                most =
+                    called.select(&self.effects).map(|effect| effect.range_share(batch)).fold(most, larger);
             });
         })?;
         Ok(Some(most))
+    }
+
+    /// Makes the matrix of steps a bound from below of what is monotone up to this multiple of the strains and strain rates up to which the
+    /// job asks for certificates; returns whether that is proven, else nothing changes. All matrices are to be renewed then.
+    pub fn cover(&mut self, multiple: f64) -> bool {
+        let can = self.effects.iter().all(|effect| effect.can_cover(multiple));
+        if can {
+            self.effects.iter_mut().for_each(|effect| effect.cover(multiple));
+            self.covered = multiple;
+        }
+        can
+    }
+
+    /// The multiple of these strains and strain rates up to which certificates hold.
+    pub fn covered(&self) -> f64 {
+        self.covered
     }
 
     /// Keeps the histories before the last step from now on, as far as [`Body::stress_error`] or laws at the end of steps need them.
@@ -566,7 +626,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
             weakening.select(&self.effects).for_each(|effect| effect.weaken(batch));
             let effects = called.select(&self.effects);
-            effects.for_each(|effect| effect.add_stress(self.evaluation, step, batch));
+            effects.for_each(|effect| effect.add_stress(self.evaluation.at_end(), step, batch));
             visit(batch);
         });
     }
@@ -595,8 +655,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Adds the nodal forces of viscous stress that is no linear function of the velocity of this state to `forces` (with ghosts).
     pub fn add_forces_of_formulas(&self, state: &State, forces: &mut [f64]) -> Result<()> {
-        let called = self.called(|p| p.is_monotone);
-        let Some(needs) = self.needs(|p| p.stress.filter(|_| p.is_monotone)) else { return Ok(()) };
+        let called = self.called(|p| p.is_viscous);
+        let Some(needs) = self.needs(|p| p.stress.filter(|_| p.is_viscous)) else { return Ok(()) };
         let step = Step { time: state.time, ..Step::default() };
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {

@@ -203,6 +203,7 @@ fn check_density_and_elasticity(job: &Job, table: &mut Table<'_>) {
         let help = format!("delete it, or replace {} by elasticity", header(&format!("{path}.orthotropic")));
         table.fault_at_key("initial.stress", message, help);
     }
+    check_formulas_of_strain(job, table, has_stress);
     let has_back_stress = |material: &Material| {
         material.viscoplasticity.as_ref().is_some_and(|law| law.with_yield_stress(0.0).has_back_stress())
     };
@@ -220,6 +221,32 @@ fn check_density_and_elasticity(job: &Job, table: &mut Table<'_>) {
         let help =
             "it measures stress errors in the elastic energy norm: add elasticity, or delete error_indicator";
         table.fault("output.error_indicator", message, help);
+    }
+}
+
+/// A shear modulus that is a formula of the strain is taken at the end of implicit steps.
+fn check_formulas_of_strain(job: &Job, table: &mut Table<'_>, has_initial_stress: bool) {
+    let has_formula =
+        |material: &Material| material.elasticity.as_ref().is_some_and(|law| law.expression.is_some());
+    let Some((path, _)) = job.materials().find(|(_, material)| has_formula(material)) else { return };
+    let formula = header(&format!("{path}.elasticity.expression"));
+    if !job.time.scheme.is_implicit() {
+        let scheme = job.time.scheme.name();
+        let message = format!(
+            "with scheme \"{scheme}\" the stress is that of the step before, and no bound of the step is known for {formula}"
+        );
+        table.fault("time.scheme", message, "use \"implicit_euler\", \"bdf2\" or \"midpoint\"");
+    }
+    if has_initial_stress {
+        let message =
+            format!("an initial stress requires linear elasticity, but {formula} is a formula of the strain");
+        table.fault_at_key("initial.stress", message, format!("delete it, or {formula}"));
+    }
+    if job.output.error_indicator {
+        let message = format!(
+            "the error indicator measures stress in the norm of linear elasticity, but {formula} is a formula"
+        );
+        table.fault("output.error_indicator", message, format!("delete it, or {formula}"));
     }
 }
 

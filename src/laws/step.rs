@@ -138,6 +138,16 @@ pub enum Evaluation {
     End(Blend),
 }
 
+impl Evaluation {
+    /// The same at the end of an implicit step that was extrapolated to it.
+    pub fn at_end(self) -> Self {
+        match self {
+            Self::End(blend) => Self::End(blend.to_end()),
+            other => other,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

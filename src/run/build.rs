@@ -290,7 +290,7 @@ pub(super) fn given_resistances<const D: usize>(
 
 /// The impedances in Pa s/m of pressure and shear waves: density times the speed of the waves; none without density or elasticity.
 fn impedances<const S: usize>(material: &Material<f64>) -> Option<[f64; 2]> {
-    let (density, law) = (material.density?, material.elasticity?.tensor(Hypothesis::of(S)));
+    let (density, law) = (material.density?, material.elasticity.as_ref()?.tensor(Hypothesis::of(S)));
     let moduli = [law.volumetric + law.shear, 0.5 * law.shear];
     Some(moduli.map(|modulus| (density * modulus).sqrt()))
 }

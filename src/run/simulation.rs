@@ -120,7 +120,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             let [most] = session.largest([mine]);
             totals.max_slip_pressure = Some(totals.max_slip_pressure.map_or(most, |max| larger(max, most)));
         }
-        if let Some(mine) = session.agree(body.rate_share(state))? {
+        if let Some(mine) = session.agree(body.range_share(state))? {
             let [most] = session.largest([mine]);
             totals.max_rate_share = Some(totals.max_rate_share.map_or(most, |max| larger(max, most)));
         }

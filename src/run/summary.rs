@@ -92,8 +92,8 @@ pub struct Summary {
     /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds; to be compared with
     /// `certificates.slip_pressure_bound`.
     pub max_slip_pressure: Option<f64>,
-    /// Largest equivalent strain rate after any step over the reference rate, beyond which certificates do not hold; present if the
-    /// viscosity is a formula.
+    /// Largest equivalent strain rate after any step over the reference rate, or strain over the reference strain; present if viscosity or
+    /// elasticity is a formula.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_rate_share: Option<f64>,
     /// Solutions found from other start values; present if any were tried.
@@ -141,8 +141,9 @@ impl Summary {
         write_whole(&folder.join(SUMMARY), &(text + "\n"))
     }
 
-    /// Warnings where the run left the range of the theory or of a certificate, given whether the contact boundaries have mass.
-    pub fn range_warnings(&self, surface_has_mass: bool) -> impl Iterator<Item = String> {
+    /// Warnings where the run left the range of the theory or of a certificate, given whether the contact boundaries have mass and the
+    /// multiple of reference rates and strains up to which certificates hold.
+    pub fn range_warnings(&self, surface_has_mass: bool, covered: f64) -> impl Iterator<Item = String> {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
             if bound == 0.0 {
@@ -160,11 +161,12 @@ impl Summary {
                 Digits(bound)
             )
         });
-        let rate = self.max_rate_share.filter(|share| *share > 1.0).map(|share| {
+        let rate = self.max_rate_share.filter(|share| *share > covered).map(|share| {
             format!(
-                "strain rates reached {} times reference_rate of [material.viscosity.expression], beyond which the certificates do not \
-                 hold: raise reference_rate",
-                Digits(share)
+                "strain rates or strains reached {} times the reference_rate or reference_strain of a formula of the material, but its \
+                 stress is proven to grow up to {} times it only: beyond, the certificates do not hold; let the formula fall more slowly there",
+                Digits(share),
+                Digits(covered)
             )
         });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {

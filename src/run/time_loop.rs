@@ -11,6 +11,7 @@ use super::{
     setup::{Setup, setup},
     simulation::Prepared,
     step_line::{Short, ShownColumns, StepLine},
+    steps,
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -27,7 +28,7 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
     solver::{
         certificate::Certificates,
-        stepping::{Preconditioner, StepOutcome},
+        stepping::{Preconditioner, StepOutcome, StepRange},
     },
 };
 use std::time::{Duration, Instant};
@@ -102,6 +103,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         certificates,
         landed: 0,
         fallen: 0,
+        has_covered: false,
+        may_cover: true,
         outputs,
         log,
         columns,
@@ -133,6 +136,9 @@ struct Run<'a, const D: usize, const S: usize> {
     fallen: u64,
     outputs: Outputs<D, S>,
     log: Log,
+    /// Whether the range of strains and strain rates of formulas was extended, and whether it may be extended further.
+    has_covered: bool,
+    may_cover: bool,
     /// What lines of the log tell of a step.
     columns: ShownColumns,
     /// The line of the log after a step, kept to reuse its memory.
@@ -155,11 +161,13 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.log.start_progress(last, state.step);
         }
         let mut saved_at = Instant::now();
+        self.cover_strains()?;
         while let Some(outcome) =
             self.simulation.advance(self.session).or_else(|error| self.explain(error))?
         {
             self.refuse_overflow()?;
             self.cover_steps()?;
+            self.cover_strains()?;
             refuse_uncertified(&self.certificates, &outcome, self.simulation.state.time)?;
             let Simulation { state, landings, adaptive, .. } = &self.simulation;
             self.outputs.after_step(self.session, &self.simulation, &outcome)?;
@@ -197,7 +205,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// Renews the certificates if the run has made steps for which they do not hold, and fails if the new ones require the consent of the
     /// job. Collective.
     fn cover_steps(&mut self) -> Result<()> {
-        let Simulation { body, state, scheme, .. } = &mut self.simulation;
+        let Simulation { state, scheme, .. } = &self.simulation;
         let Some(taken) = scheme.attempted().filter(|taken| !self.certificates.hold_for(*taken)) else {
             return Ok(());
         };
@@ -208,6 +216,40 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
              which are computed anew",
             state.time
         ));
+        self.renew_certificates(range)
+    }
+
+    /// Extends the range of strains and strain rates up to which stresses that are formulas are proven to grow, if the run has left it, and
+    /// renews matrices and certificates; fails if the new ones require the consent of the job. Collective.
+    fn cover_strains(&mut self) -> Result<()> {
+        let Simulation { body, state, scheme, totals, .. } = &mut self.simulation;
+        let share = totals.max_rate_share.filter(|share| *share > body.covered() && self.may_cover);
+        let Some(multiple) = share.map(|share| share.log2().ceil().exp2()) else { return Ok(()) };
+        // All ranks have the same formulas.
+        self.may_cover = body.cover(multiple);
+        if !self.may_cover {
+            return Ok(());
+        }
+        let words = format!(
+            "at t = {:.6e} s strains or strain rates are beyond reference_strain or reference_rate of a formula: up to {} times it the \
+             stress is proven to grow, too; the certificates are computed anew",
+            state.time,
+            Digits(multiple)
+        );
+        match std::mem::replace(&mut self.has_covered, true) {
+            false => self.log.warning(words),
+            true => self.log.quiet_line(words),
+        }
+        scheme.renew(self.session, body, state)?;
+        let range = self.certificates.range.unwrap_or_else(|| steps::range(self.job));
+        let range = scheme.attempted().map_or(range, |taken| range.or(taken));
+        self.renew_certificates(range)
+    }
+
+    /// Computes the certificates for steps in this range, and fails if they require the consent of the job, unlike those before.
+    /// Collective.
+    fn renew_certificates(&mut self, range: StepRange) -> Result<()> {
+        let Simulation { body, state, scheme, .. } = &mut self.simulation;
         let mut matrix = scheme.matrix(self.session, body, range.steps[1])?;
         let renewed = Certificates::of(self.session, body, state, &mut matrix, range)?;
         let words = renewed.verdict(range.steps[1], None, &self.job.solver.accept);
@@ -317,6 +359,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let start = Instant::now();
         let Simulation { body, state, totals, .. } = &self.simulation;
         let path = self.outputs.checkpoint(self.session, body, state, totals)?;
+        self.simulation.scheme.forget_tangents();
         self.deadline.add_save(start.elapsed());
         self.log.quiet_line(format!("saved {}", path.display()));
         Ok(())
@@ -362,9 +405,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         };
         let body = &self.simulation.body;
         let surface_has_mass = body.has_form(Form::Mass) && body.redistributed_mass.is_none();
+        let covered = body.covered();
         let summary = self.summary(status, error, restarted_from);
         let written = self.session.agree(summary).and_then(|mut summary| {
-            summary.range_warnings(surface_has_mass).for_each(|warning| self.log.warning(warning));
+            summary.range_warnings(surface_has_mass, covered).for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
             self.session.on_first(|| {
                 header::closing(&mut self.log, &summary, self.job);

@@ -9,6 +9,7 @@ mod compression;
 mod check_values;
 mod contact;
 mod effects;
+mod elasticity;
 mod example;
 mod failures;
 mod formulas;

@@ -90,3 +90,37 @@ fn a_stage_that_continues_creep_or_presses_on_a_soft_law_starts_in_balance() {
         assert!(!warnings.contains("balance") && !warnings.contains("inside"), "{warnings}");
     }
 }
+
+#[test]
+fn shear_thinning_steps_need_few_corrections() {
+    let case = square("lagged_euler", THINNING).set("time.end", "1.0");
+    let results = case.run(1);
+    let [iterations, steps] = ["newton_iterations", "steps"].map(|name| results.number(name));
+    assert!(iterations < 16.0 * steps, "{iterations} iterations in {steps} steps");
+}
+
+#[test]
+fn the_range_of_the_certificates_is_extended_once_the_run_leaves_it_also_after_a_restart() {
+    let case = || {
+        let case = square("bdf2", THINNING).set("checkpoint.every", "4");
+        case.set("material.viscosity.expression.reference_rate", "0.05")
+    };
+    let (whole, wide) = (case(), square("bdf2", THINNING));
+    whole.run(2);
+    let warnings = whole.results().summary()["warnings"].to_string();
+    assert_eq!(warnings.matches("the certificates are computed anew").count(), 1, "{warnings}");
+    let modulus = |case: &Case| {
+        let summary = case.results().summary();
+        summary["certificates"]["viscosity_modulus"].as_f64().expect("a modulus")
+    };
+    let wide = wide.run_and_keep(2);
+    assert!(modulus(&whole) > modulus(&wide));
+    assert_same_answer(&wide.results(), &whole.results(), 1e-8, "two ranges");
+    let case = case();
+    case.run_with(2, &["--set", "time.end=0.0625"]).expect(0);
+    case.run_with(2, &["--restart"]).expect(0).says("continuing from");
+    assert_eq!(modulus(&whole), modulus(&case));
+    for name in ["probes.csv", "history.csv"] {
+        assert_eq!(whole.results().text(name), case.results().text(name), "{name}");
+    }
+}

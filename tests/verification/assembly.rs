@@ -157,7 +157,7 @@ fn held_components<const D: usize, const S: usize>(session: &Session, body: &Bod
 fn effects<const D: usize, const S: usize>() -> Vec<Box<dyn Effect<D, S>>> {
     vec![
         Box::new(Inertia { density: ByMaterial::uniform(DENSITY) }),
-        Box::new(ViscousStress { tensor: ByMaterial::uniform(VISCOSITY) }),
+        Box::new(ViscousStress::linear(ByMaterial::uniform(VISCOSITY))),
     ]
 }
 
@@ -191,7 +191,7 @@ fn rigid<const D: usize>(number: usize, x: &[f64; D]) -> [f64; D] {
 
 fn rigid_motions<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
     let viscous: Vec<Box<dyn Effect<D, S>>> =
-        vec![Box::new(ViscousStress { tensor: ByMaterial::uniform(VISCOSITY) })];
+        vec![Box::new(ViscousStress::linear(ByMaterial::uniform(VISCOSITY)))];
     let (body, state) = body::<D, S>(session, whole, &[], viscous);
     let rows = body.matrix(session, STEP).expect("assembled");
     let matrix = Matrix::symmetric(D, &rows).expect("matrix");

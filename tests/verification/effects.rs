@@ -127,7 +127,7 @@ fn matrices<const D: usize, const S: usize>(session: &Session, whole: &clarke::m
     let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
     let of = |with_elasticity: bool, at: Evaluation| {
         let mut effects: Vec<Box<dyn Effect<D, S>>> =
-            vec![Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) })];
+            vec![Box::new(ViscousStress::linear(ByMaterial::uniform(tensor)))];
         if with_elasticity {
             let law = ByMaterial::uniform(ElasticLaw { tensor, with_history: false });
             effects.push(Box::new(Elasticity { law }));
@@ -156,7 +156,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
     let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched {
-            inner: ViscousStress { tensor: ByMaterial::uniform(tensor) },
+            inner: ViscousStress::linear(ByMaterial::uniform(tensor)),
             seen: seen.clone(),
         })]
     });
@@ -170,7 +170,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
                 inner: Elasticity { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) },
                 seen: seen.clone(),
             }),
-            Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
+            Box::new(ViscousStress::linear(ByMaterial::uniform(tensor))),
         ]
     });
     assert_eq!(
@@ -194,7 +194,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
             Box::new(Watched { inner: ViscoplasticFlow::<S>::new(laws(), &geometry), seen: seen.clone() }),
-            Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
+            Box::new(ViscousStress::linear(ByMaterial::uniform(tensor))),
         ]
     });
     assert_eq!(

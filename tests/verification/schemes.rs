@@ -151,7 +151,7 @@ fn creep<const D: usize, const S: usize>(
         kinematic_modulus: None,
         metric: Metric::Compliance,
     };
-    let elasticity = Elasticity { youngs_modulus: modulus, poisson_ratio: 0.3 };
+    let elasticity = Elasticity::linear(modulus, 0.3);
     let rate = law.prepare(&elasticity, Hypothesis::of(S)).strain_rate(&stress)[0];
     if D == 3 {
         assert!((rate - 2.0 / 3.0 * (pull - yield_stress) / (2.0 * relaxation)).abs() < 1e-14);

@@ -39,7 +39,7 @@ impl ProjectedOperator for Without<'_> {
 fn solves<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
     let effects: Vec<Box<dyn Effect<D, S>>> = vec![
         Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
-        Box::new(ViscousStress { tensor: ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }) }),
+        Box::new(ViscousStress::linear(ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }))),
     ];
     let (body, state) =
         body::<D, S>(session, whole, &[("left", Fix::Keyword(FixedDirections::All))], effects);

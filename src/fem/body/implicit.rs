@@ -252,7 +252,7 @@ mod tests {
 
     /// The derivative of the forces of flow and damage at the end of a step is that by differences.
     fn check<const D: usize, const S: usize>(mesh: Mesh<D>, hypothesis: Hypothesis) {
-        let material = material::Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+        let material = material::Elasticity::linear(1000.0, 0.4);
         let perzyna = Perzyna {
             relaxation: 100.0,
             yield_stress: 3.0,

@@ -123,7 +123,7 @@ mod tests {
         // Two numbers at each of four nodes.
         let field = 4 * 2 * 8;
         let (geometry, mesh) = square();
-        let elasticity = Elasticity { youngs_modulus: 10.0, poisson_ratio: 0.3 };
+        let elasticity = Elasticity::linear(10.0, 0.3);
         let law = Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: None };
         let law = Viscoplasticity::Maxwell(law).prepare(&elasticity, Hypothesis::PlaneStress);
         let history = ViscoplasticFlow::<3>::new(ByMaterial::uniform(law), &geometry);

@@ -17,8 +17,11 @@ pub struct Phases {
     pub error: Option<Needs>,
     /// Weakens the elastic stress of other effects.
     pub weakens: bool,
-    /// Adds a monotone function of the strain rate at the end of a step, and nothing else there: steps are not softer than their matrix.
+    /// Adds a monotone function of the strain or its rate at the end of a step, and nothing else there: steps are not softer than their
+    /// matrix.
     pub is_monotone: bool,
+    /// This is a function of the strain rate.
+    pub is_viscous: bool,
 }
 
 /// An effect of the body's interior. Calls are made for each batch of cells, and only in the phases that the effect names.
@@ -58,11 +61,19 @@ pub trait Effect<const D: usize, const S: usize> {
     /// Adds its energies after the commit.
     fn add_energy(&self, _at: Evaluation, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
 
-    /// The largest strain rate after the commit as a share of that up to which the constant matrix is not stiffer than what is monotone;
-    /// called if it is.
-    fn rate_share(&self, _batch: &Batch<D, S>) -> f64 {
+    /// The largest strain or strain rate after the commit as a share of that up to which the job asks for certificates; called if what the
+    /// effect adds is monotone.
+    fn range_share(&self, _batch: &Batch<D, S>) -> f64 {
         0.0
     }
+
+    /// Whether the stress is proven to grow up to this multiple of the strains and strain rates up to which the job asks for certificates.
+    fn can_cover(&self, _multiple: f64) -> bool {
+        true
+    }
+
+    /// Changes the constant matrix so that it is not stiffer than what is monotone up to this multiple, which can be covered.
+    fn cover(&mut self, _multiple: f64) {}
 
     /// Adds the energies of an implicit step that was solved, evaluated at its end and not yet committed: what flow and damage take up,
     /// and the scheme's own terms of the elastic energy. The batch has the strains and elastic stresses before the step and after it,

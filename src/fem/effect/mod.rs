@@ -24,6 +24,7 @@ mod load;
 mod mass;
 mod mass_damping;
 mod node_history;
+mod nonlinear_elasticity;
 mod nonlinear_viscosity;
 mod outcome;
 mod peaks;
@@ -66,6 +67,7 @@ pub use initial_stress::InitialStress;
 pub use interior::{Effect, Phases};
 pub use load::{Gravity, Load, Traction, WORK};
 pub use mass_damping::MassDamping;
+pub use nonlinear_elasticity::NonlinearElasticity;
 pub use nonlinear_viscosity::NonlinearViscosity;
 pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
@@ -119,7 +121,8 @@ pub fn effects<const D: usize, const S: usize>(
         effects.push(Box::new(Elasticity { law }));
     }
     if let Some(tensor) = by_material(materials, |m| m.viscosity_tensor(Hypothesis::of(S))) {
-        effects.push(Box::new(ViscousStress { tensor }));
+        let formulas = by_material(materials, |m| m.rate_viscosity().cloned());
+        effects.push(Box::new(ViscousStress::of(tensor, formulas)));
     }
     if let Some(drag) = by_material(materials, Material::drag) {
         effects.push(Box::new(MassDamping { drag }));
@@ -129,7 +132,7 @@ pub fn effects<const D: usize, const S: usize>(
         effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, geometry)));
     }
     let elastic = |m: &Material<f64>| match m.viscoplasticity {
-        None => Some(m.elasticity?.tensor(Hypothesis::of(S))),
+        None => Some(m.linear_elasticity()?.tensor(Hypothesis::of(S))),
         Some(_) => None,
     };
     if let Some(laws) = by_material(materials, elastic).filter(|_| !initial_stress.is_empty()) {
@@ -143,13 +146,16 @@ pub fn effects<const D: usize, const S: usize>(
         let stress = batches.map(pack).collect();
         effects.push(Box::new(InitialStress::new(laws, stress)));
     }
-    let damage = |m: &Material<f64>| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
+    let damage = |m: &Material<f64>| Some(m.damage?.prepare(m.elasticity.as_ref()?, Hypothesis::of(S)));
     if let Some(laws) = by_material(materials, damage) {
         effects.push(Box::new(Damage::new(laws, geometry)));
     }
     // After those that damage weakens.
-    if let Some(laws) = by_material(materials, Material::rate_viscosity) {
-        effects.push(Box::new(NonlinearViscosity { laws }));
+    if let Some(formulas) = by_material(materials, |m| m.rate_viscosity().cloned()) {
+        effects.push(Box::new(NonlinearViscosity::new(formulas)));
+    }
+    if let Some(laws) = by_material(materials, |m| m.elasticity.as_ref()?.strain_elasticity()) {
+        effects.push(Box::new(NonlinearElasticity::new(laws)));
     }
     Ok(effects)
 }
@@ -189,7 +195,7 @@ fn by_material<T>(
 }
 
 fn elastic_law<const S: usize>(material: &Material<f64>) -> Option<ElasticLaw> {
-    let tensor = material.elasticity?.tensor(Hypothesis::of(S));
+    let tensor = material.linear_elasticity()?.tensor(Hypothesis::of(S));
     Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
 }
 

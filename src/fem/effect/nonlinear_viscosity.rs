@@ -1,7 +1,7 @@
 use super::{Effect, Energy, Evaluation, Outcome, Phases, Step, VISCOUS};
 use crate::{
     fem::space::{Batch, Needs},
-    laws::material::{ByMaterial, RateViscosity},
+    laws::material::{ByMaterial, RateViscosity, ViscosityFormula},
     linear_algebra::{
         simd::Pack,
         tensor::{add_scaled, dot, larger},
@@ -12,8 +12,15 @@ use crate::{
 /// [`ViscousStress`](super::ViscousStress) contains; implicit under every scheme.
 #[derive(Debug)]
 pub struct NonlinearViscosity {
-    /// The laws.
-    pub laws: ByMaterial<RateViscosity>,
+    formulas: ByMaterial<ViscosityFormula>,
+    laws: ByMaterial<RateViscosity>,
+}
+
+impl NonlinearViscosity {
+    /// With these formulas, which are not constant.
+    pub fn new(formulas: ByMaterial<ViscosityFormula>) -> Self {
+        Self { laws: formulas.map(ViscosityFormula::rest), formulas }
+    }
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for NonlinearViscosity {
@@ -23,7 +30,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearViscosity {
 
     fn phases(&self, _: Evaluation) -> Phases {
         let rate = Some(Needs { strain_rate: true, ..Needs::default() });
-        Phases { end: rate, energy: rate, stress: rate, is_monotone: true, ..Phases::default() }
+        let phases = Phases { end: rate, energy: rate, stress: rate, ..Phases::default() };
+        Phases { is_monotone: true, is_viscous: true, ..phases }
     }
 
     fn evaluate(&mut self, _: Evaluation, _: Step, batch: &mut Batch<D, S>, outcome: &mut Outcome) {
@@ -46,7 +54,19 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearViscosity {
         batch.stress = Pack::from_lanes(|lane| add_scaled(&batch.stress.lane(lane), 1.0, &added(lane)));
     }
 
-    fn rate_share(&self, batch: &Batch<D, S>) -> f64 {
+    fn can_cover(&self, multiple: f64) -> bool {
+        self.formulas.laws().all(|formula| formula.covering(multiple).is_some())
+    }
+
+    fn cover(&mut self, multiple: f64) {
+        self.laws = self.formulas.map(|formula| {
+            formula
+                .covering(multiple)
+                .map_or_else(|| formula.rest(), |wide| wide.rest().within_reference(formula))
+        });
+    }
+
+    fn range_share(&self, batch: &Batch<D, S>) -> f64 {
         let Some(law) = self.laws.get(batch.material) else { return 0.0 };
         let shares = (0..batch.count).map(|lane| law.share_of_reference(&batch.strain_rate.lane(lane)));
         shares.fold(0.0, larger)

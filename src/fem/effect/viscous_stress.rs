@@ -1,7 +1,8 @@
 use super::{Effect, Energy, EnergyKind, Evaluation, Phases, Role, Step, Term, linear};
 use crate::{
     fem::space::{Batch, Integrity, Needs},
-    laws::material::{ByMaterial, Isotropic},
+    laws::material::{ByMaterial, Isotropic, ViscosityFormula},
+    linear_algebra::tensor::normal_components,
 };
 
 /// Dissipated by viscosity.
@@ -12,6 +13,22 @@ pub const VISCOUS: EnergyKind = EnergyKind::new(2, Role::Dissipated, "viscous_di
 pub struct ViscousStress {
     /// The viscosity tensor `A` in Pa s.
     pub tensor: ByMaterial<Isotropic>,
+    /// The formulas of which it contains the linear part.
+    formulas: Option<ByMaterial<ViscosityFormula>>,
+    /// The multiple of their reference rates up to which it is a bound of them.
+    covered: f64,
+}
+
+impl ViscousStress {
+    /// Of linear viscosities.
+    pub fn linear(tensor: ByMaterial<Isotropic>) -> Self {
+        Self::of(tensor, None)
+    }
+
+    /// Of viscosities, some of which contain the linear parts of these formulas.
+    pub fn of(tensor: ByMaterial<Isotropic>, formulas: Option<ByMaterial<ViscosityFormula>>) -> Self {
+        Self { tensor, formulas, covered: 1.0 }
+    }
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
@@ -26,6 +43,23 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
 
     fn term(&self) -> Term<'_> {
         Term::Viscosity(&self.tensor)
+    }
+
+    fn cover(&mut self, multiple: f64) {
+        let Some(formulas) = &self.formulas else { return };
+        let multiples = [self.covered, multiple];
+        self.tensor = self.tensor.map_each(|material, own| {
+            let Some(formula) = formulas.get(material) else { return *own };
+            let [before, after] = multiples.map(|multiple| match formula.covering(multiple) {
+                Some(wide) => wide.tensor(normal_components::<S>()),
+                None => Isotropic::default(),
+            });
+            Isotropic {
+                volumetric: own.volumetric + after.volumetric - before.volumetric,
+                shear: own.shear + after.shear - before.shear,
+            }
+        });
+        self.covered = multiple;
     }
 
     fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {

@@ -104,7 +104,8 @@ pub struct Totals {
     pub peaks: Peaks,
     /// Largest contact pressure of any step, where friction weakens under a pressure that no law bounds.
     pub max_slip_pressure: Option<f64>,
-    /// Largest equivalent strain rate after any step over the reference rate, where the viscosity is a formula.
+    /// Largest equivalent strain rate after any step over the reference rate, or strain over the reference strain, where viscosity or
+    /// elasticity is a formula.
     pub max_rate_share: Option<f64>,
     /// Newton iterations.
     pub newton_iterations: u64,

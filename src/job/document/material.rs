@@ -20,6 +20,10 @@ pub struct Region {
     pub material: Material,
 }
 
+/// Why a shear modulus that is a formula of the strain is refused in plane stress.
+const PLANE_STRESS: &str = "a shear modulus that depends on the strain is not available in plane stress, where it decides the strain across \
+     the thickness";
+
 /// Poisson's ratio above which linear elements lock.
 const LOCKING: f64 = 0.45;
 
@@ -43,12 +47,24 @@ pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>,
         let message = "the material has two kinds of elasticity";
         table.fault_at_key("orthotropic", message, format!("delete it, or {}", named(table, "elasticity")));
     }
+    check_elasticity_formula(material, table);
     if material.is_damped_by_mass() && material.density.is_none() {
         table.fault("damping.mass", Damping::WITHOUT_DENSITY, format!("add {}", table.path("density")));
     }
     let choice = material.viscosity.iter().flat_map(|law| law.faults_of_choice());
     choice.for_each(|fault| table.refuse(Some(fault.within("viscosity"))));
     table.refuse(material.constant().fault_of_flow());
+}
+
+/// Checks a shear modulus that is a formula of the strain.
+fn check_elasticity_formula(material: &Material, table: &mut Table<'_>) {
+    let Some(law) = material.elasticity.as_ref().filter(|law| law.expression.is_some()) else { return };
+    table.refuse(law.fault().map(|fault| fault.within("elasticity")));
+    for (key, _) in material.laws_that_require_elasticity() {
+        let formula = header(&table.path("elasticity.expression"));
+        let message = format!("`{key}` requires linear elasticity, but {formula} is a formula of the strain");
+        table.fault(key, message, format!("delete it, or {formula}"));
+    }
 }
 
 impl Region {
@@ -74,6 +90,14 @@ pub(in crate::job) fn check_in_body(
     table.refuse(material.constant().fault_of_viscosity(normal_strains));
     let orthotropic = material.orthotropic.iter().flat_map(|law| law.faults(dimension));
     orthotropic.for_each(|fault| table.refuse(Some(fault.within("orthotropic"))));
+    let has_formula = material.elasticity.as_ref().is_some_and(|law| law.expression.is_some());
+    if hypothesis == Some(Hypothesis::PlaneStress) && has_formula {
+        table.fault(
+            "elasticity.expression",
+            PLANE_STRESS,
+            "use plane strain, axisymmetric or 3D, or delete the table",
+        );
+    }
     if hypothesis == Some(Hypothesis::PlaneStress) {
         table.refuse(material.constant().fault_in_plane_stress());
     }

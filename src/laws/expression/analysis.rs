@@ -22,6 +22,9 @@ const MOST_ENCLOSURES: usize = 40_000;
 /// A bound is sharp if it exceeds a value that is taken by at most this share.
 const SHARP: f64 = 0.01;
 
+/// A bound that is infinite is not sharpened where a value of this size is taken, nor one that has next to no digits.
+const LARGE: f64 = 1e100;
+
 /// A piece of at most this number of adjacent numbers is part of the border beside it.
 const NARROW: u64 = 16;
 
@@ -103,7 +106,10 @@ impl Program {
         let mut count = 0;
         while let Some(Part { bound, is_defined, ranges, .. }) = heap.pop() {
             let place = ranges.map(centre);
-            if is_defined && (bound <= taken + SHARP * taken.abs() || count > MOST_ENCLOSURES) {
+            let is_sharp = bound <= taken + SHARP * taken.abs()
+                || (bound == f64::INFINITY && taken >= LARGE)
+                || (bound > 0.0 && bound <= f64::MIN_POSITIVE);
+            if is_defined && (is_sharp || count > MOST_ENCLOSURES) {
                 return Ok(Supremum { bound, place });
             }
             // The axis whose halves exceed what is taken by the fewest orders; without a difference the widest one.

@@ -17,15 +17,22 @@ const LONGEST: [usize; 2] = [10_000, 1 << 20];
 /// Deepest permitted nesting of parentheses, signs and powers.
 const DEEPEST: usize = 200;
 
+fn one() -> Interval {
+    Interval::from(1.0)
+}
 const ADD: Binary = smooth_of_two!(left + right, (left, right) => [R::from(1.0), R::from(1.0)])
-    .linear(|[a, p], [b, q]| Some([a + b, p + q]));
+    .linear(|[a, p], [b, q]| Some([a + b, p + q]))
+    .sharing(|left, right| [one() / (one() + right / left), one() / (one() + left / right)]);
 const SUBTRACT: Binary = smooth_of_two!(left - right, (left, right) => [R::from(1.0), R::from(-1.0)])
-    .linear(|[a, p], [b, q]| Some([a - b, p - q]));
+    .linear(|[a, p], [b, q]| Some([a - b, p - q]))
+    .sharing(|left, right| [one() / (one() - right / left), one() / (one() - left / right)]);
 const MULTIPLY: Binary = smooth_of_two!(left * right, (left, right) => [right, left])
-    .linear(|[a, p], [b, q]| (p == 0.0 || q == 0.0).then_some([a * b, a * q + b * p]));
+    .linear(|[a, p], [b, q]| (p == 0.0 || q == 0.0).then_some([a * b, a * q + b * p]))
+    .sharing(|_, _| [one(); 2]);
 const DIVIDE: Binary =
     smooth_of_two!(left / right, (left, right) => [R::from(1.0) / right, -left / right.square()])
-        .linear(|[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]));
+        .linear(|[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]))
+        .sharing(|_, _| [one(), -one()]);
 const POWER: Binary = {
     fn slopes<R: Real>(base: R, exponent: R) -> [R; 2] {
         [exponent * base.power(exponent - R::from(1.0)), base.power(exponent) * base.ln()]
@@ -35,6 +42,7 @@ const POWER: Binary = {
         [if exponent == 0.0 { 0.0 } else { by_base }, by_exponent]
     }
     Binary::smooth((f64::powf, slopes_of_numbers), (Interval::power, slopes))
+        .sharing(|base, exponent| [exponent, exponent * Real::ln(base)])
 };
 const BELOW: Binary = comparison!(<);
 const AT_MOST: Binary = comparison!(<=);

@@ -14,6 +14,10 @@ pub struct Enclosure {
     pub value: Interval,
     /// Contains all derivatives by one variable within the pieces.
     pub slope: Interval,
+    /// Contains all derivatives of the product with this variable within the pieces, except where it is 0. With the derivative by the
+    /// logarithm of the variable over the value, this is sharp also where terms nearly cancel, as in `1/(1 + x) - x/(1 + x)^2` for the
+    /// product `x/(1 + x)`.
+    pub growth: Interval,
     /// Whether one piece is active of each of its piecewise functions that depend on this variable.
     pub is_one_piece: bool,
     /// Whether one of its functions that depend on this variable may jump.
@@ -24,8 +28,19 @@ impl Program {
     /// Its values and derivatives by one variable in these ranges.
     pub(super) fn enclose(&self, ranges: &Ranges, by: Variable) -> Enclosure {
         let mut machine = Enclosures { ranges, by, is_one_piece: true, may_jump: false };
-        let [value, slope] = self.run(&mut machine);
-        Enclosure { value, slope, is_one_piece: machine.is_one_piece, may_jump: machine.may_jump }
+        let [value, slope, share] = self.run(&mut machine);
+        let argument = ranges[by as usize];
+        let is_known = share.low.is_finite() && share.high.is_finite();
+        let growth = value + argument * slope;
+        let (slope, growth) = match is_known {
+            true => {
+                let by_share = if argument.contains(0.0) { slope } else { value * share / argument };
+                (slope.meet(by_share), growth.meet(value * (Interval::from(1.0) + share)))
+            }
+            false => (slope, growth),
+        };
+        let Enclosures { is_one_piece, may_jump, .. } = machine;
+        Enclosure { value, slope, growth, is_one_piece, may_jump }
     }
 }
 
@@ -46,27 +61,36 @@ impl Enclosures<'_> {
     }
 }
 
+/// Values, derivatives, and derivatives by the logarithm of the variable over the values.
 impl Machine for Enclosures<'_> {
-    type Entry = [Interval; 2];
+    type Entry = [Interval; 3];
 
-    fn number(&self, number: f64) -> [Interval; 2] {
-        [number, 0.0].map(Interval::from)
+    fn number(&self, number: f64) -> [Interval; 3] {
+        [number, 0.0, 0.0].map(Interval::from)
     }
 
-    fn variable(&self, variable: Variable) -> [Interval; 2] {
-        let slope = f64::from(u8::from(variable == self.by));
-        [self.ranges[variable as usize], Interval::from(slope)]
+    fn variable(&self, variable: Variable) -> [Interval; 3] {
+        let slope = Interval::from(f64::from(u8::from(variable == self.by)));
+        [self.ranges[variable as usize], slope, slope]
     }
 
-    fn unary(&mut self, function: &Unary, [argument, slope]: [Interval; 2]) -> [Interval; 2] {
+    fn unary(&mut self, function: &Unary, [argument, slope, share]: [Interval; 3]) -> [Interval; 3] {
         if let Some(piece) = function.piece {
             self.note(&[slope], piece(argument.low) == piece(argument.high), function.jumps);
         }
         let [value, outer] = function.enclosures;
-        [value(argument), chain(|| outer(argument), slope)]
+        let value = value(argument);
+        [
+            value,
+            chain(|| outer(argument), slope),
+            chain(
+                || function.share.map_or_else(|| argument * outer(argument) / value, |of| of(argument)),
+                share,
+            ),
+        ]
     }
 
-    fn binary(&mut self, function: &Binary, [left, right]: [[Interval; 2]; 2]) -> [Interval; 2] {
+    fn binary(&mut self, function: &Binary, [left, right]: [[Interval; 3]; 2]) -> [Interval; 3] {
         let (value, slopes) = function.enclosures;
         let decided = function.piece.map(|piece| (piece.decide)(left[0], right[0]));
         self.note(&[left[1], right[1]], decided != Some(None), function.switches);
@@ -75,13 +99,23 @@ impl Machine for Enclosures<'_> {
             _ => value(left[0], right[0]),
         };
         if left[1].is(0.0) && right[1].is(0.0) {
-            return [value, Interval::from(0.0)];
+            return [value, Interval::from(0.0), Interval::from(0.0)];
         }
         let [by_left, by_right] = slopes(left[0], right[0]);
-        [value, chain(|| by_left, left[1]) + chain(|| by_right, right[1])]
+        let shares = match function.shares {
+            Some(shares) => shares(left[0], right[0]),
+            // The smaller or the larger one of both.
+            None if function.piece.is_some() => [by_left, by_right],
+            None => [left[0] * by_left / value, right[0] * by_right / value],
+        };
+        [
+            value,
+            chain(|| by_left, left[1]) + chain(|| by_right, right[1]),
+            chain(|| shares[0], left[2]) + chain(|| shares[1], right[2]),
+        ]
     }
 
-    fn ternary(&mut self, function: &Ternary, arguments: [[Interval; 2]; 3]) -> [Interval; 2] {
+    fn ternary(&mut self, function: &Ternary, arguments: [[Interval; 3]; 3]) -> [Interval; 3] {
         let decided = (function.decide)(arguments.map(|argument| argument[0]));
         let decisive = if function.switches { 3 } else { 1 };
         let slopes = arguments.map(|argument| argument[1]);
@@ -90,15 +124,15 @@ impl Machine for Enclosures<'_> {
         match (function.switches, decided) {
             (true, piece) => {
                 let value = piece.map_or(Interval::new(0.0, 1.0), Interval::from);
-                [value, Interval::from(0.0)]
+                [value, Interval::from(0.0), Interval::from(0.0)]
             }
             (false, Some(1.0)) => then,
             (false, Some(_)) => otherwise,
-            (false, None) => [then[0].hull(otherwise[0]), then[1].hull(otherwise[1])],
+            (false, None) => std::array::from_fn(|part| then[part].hull(otherwise[part])),
         }
     }
 
-    fn interpolate(&mut self, table: &Table, [argument, slope]: [Interval; 2]) -> [Interval; 2] {
+    fn interpolate(&mut self, table: &Table, [argument, slope, share]: [Interval; 3]) -> [Interval; 3] {
         let [first, last] = [argument.low, argument.high].map(|end| points_before(table, end));
         self.note(&[slope], first == last, false);
         let ends = [interpolate(table, first, argument.low), interpolate(table, last, argument.high)];
@@ -112,7 +146,8 @@ impl Machine for Enclosures<'_> {
         // Interpolated values are rounded a few times.
         let slack = 8.0 * f64::EPSILON * value.low.abs().max(value.high.abs());
         let wide = Interval { low: value.low - slack, high: value.high + slack, ..argument };
-        [if first == last && outer.is(0.0) { value } else { wide }, chain(|| outer, slope)]
+        let value = if first == last && outer.is(0.0) { value } else { wide };
+        [value, chain(|| outer, slope), chain(|| argument * outer / value, share)]
     }
 }
 

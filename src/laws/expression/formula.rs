@@ -46,6 +46,8 @@ scopes! {
     OfCreep: Q P E;
     /// Formulas of the equivalent strain rate.
     OfRate: G;
+    /// Formulas of the equivalent strain.
+    OfStrain: E;
 }
 
 /// A formula of a law, in the variables of its scope.
@@ -88,6 +90,13 @@ impl<S: Scope> Formula<S> {
     /// Whether it contains `variable`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.expression.uses(variable)
+    }
+
+    /// Whether its derivative by a variable of its scope is known to be zero for all values from 0 on, and all values of the others.
+    pub fn is_constant_along(&self, variable: Variable) -> bool {
+        let from_zero = Interval::new(0.0, REACH);
+        let known = self.expression.program.enclose(&[from_zero; COUNT], variable);
+        !self.uses(variable) || (known.slope.is(0.0) && known.value.is_defined && known.is_one_piece)
     }
 
     /// Its value where the variables have these values, and all others are 0.

@@ -86,6 +86,11 @@ impl Interval {
         Self { low: self.low.min(other.low), high: self.high.max(other.high), is_defined }
     }
 
+    /// The numbers that are in both of two intervals that enclose the same ones.
+    pub(super) fn meet(self, other: Self) -> Self {
+        Self { low: self.low.max(other.low), high: self.high.min(other.high), ..self }
+    }
+
     /// The same numbers, defined where both are.
     fn defined_with(self, other: Self) -> Self {
         Self { is_defined: self.is_defined && other.is_defined, ..self }

@@ -27,7 +27,7 @@ pub use breakpoints::Breakpoints;
 pub use compile::Fault;
 pub use enclosure::Enclosure;
 use evaluate::{Arguments, COUNT};
-pub use formula::{Formula, OfCreep, OfMotion, OfRate, OfSliding, Scope, short};
+pub use formula::{Formula, OfCreep, OfMotion, OfRate, OfSliding, OfStrain, Scope, short};
 pub use functions::{Names, is_known};
 pub use interval::Interval;
 use program::Program;

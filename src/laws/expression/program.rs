@@ -29,7 +29,7 @@ pub enum Variable {
     P,
     /// Von Mises norm of the stress in Pa.
     Q,
-    /// Accumulated viscoplastic strain.
+    /// Accumulated viscoplastic strain, or equivalent strain.
     E,
     /// Equivalent strain rate in 1/s.
     G,
@@ -201,6 +201,9 @@ pub(super) struct Unary {
     pub(super) slope: fn(f64) -> f64,
     /// Values and derivatives at all points of an interval.
     pub(super) enclosures: [fn(Interval) -> Interval; 2],
+    /// Its derivative by the logarithm of the argument over its value at all points of an interval, where that is sharper than a quotient
+    /// of the other enclosures.
+    pub(super) share: Option<fn(Interval) -> Interval>,
     /// Records which piece is active, for piecewise functions: never decreasing.
     pub(super) piece: Option<fn(f64) -> f64>,
     /// Its value for a linear function of time, if that is linear, too.
@@ -224,7 +227,11 @@ impl Unary {
         [value, slope]: [fn(f64) -> f64; 2],
         enclosures: [fn(Interval) -> Interval; 2],
     ) -> Self {
-        Self { value, slope, enclosures, piece: None, line: None, switches: false, jumps: false }
+        Self { value, slope, enclosures, share: None, piece: None, line: None, switches: false, jumps: false }
+    }
+
+    pub(super) const fn sharing(self, share: fn(Interval) -> Interval) -> Self {
+        Self { share: Some(share), ..self }
     }
 
     pub(super) const fn linear(self, line: fn(Line) -> Line) -> Self {
@@ -268,6 +275,9 @@ pub(super) struct Binary {
     pub(super) slopes: fn(f64, f64) -> [f64; 2],
     /// The same at all points of intervals.
     pub(super) enclosures: OfTwo<Interval>,
+    /// Its derivatives by the logarithms of both arguments over its value at all points of intervals, where they are sharper than
+    /// quotients of the other enclosures.
+    pub(super) shares: Option<fn(Interval, Interval) -> [Interval; 2]>,
     /// For piecewise functions which piece is active: 1 or 0.
     pub(super) piece: Option<Piece>,
     /// Its value for linear functions of time, where that is linear, too.
@@ -285,7 +295,11 @@ pub(super) struct Piece {
 
 impl Binary {
     pub(super) const fn smooth((value, slopes): OfTwo<f64>, enclosures: OfTwo<Interval>) -> Self {
-        Self { value, slopes, enclosures, piece: None, line: None, switches: false }
+        Self { value, slopes, enclosures, shares: None, piece: None, line: None, switches: false }
+    }
+
+    pub(super) const fn sharing(self, shares: fn(Interval, Interval) -> [Interval; 2]) -> Self {
+        Self { shares: Some(shares), ..self }
     }
 
     pub(super) const fn linear(self, line: fn(Line, Line) -> Option<Line>) -> Self {

@@ -249,6 +249,12 @@ fn derivatives_agree_with_differences_and_enclosures_contain_all() {
                     known.value.contains(value) && known.slope.contains(slope),
                     "{text} at {v}: {value} {slope} {known:?}"
                 );
+                let growth = value + v * slope;
+                let rounding = 1e-14 * (value.abs() + (v * slope).abs());
+                assert!(
+                    known.growth.low <= growth + rounding && growth - rounding <= known.growth.high,
+                    "{text} at {v}: {growth} {known:?}"
+                );
                 if known.is_one_piece && part > 0 && part < 10 {
                     let at = |v| formula.value(&[(Variable::V, v)]);
                     let by_difference = (at(v + 1e-6) - at(v - 1e-6)) / 2e-6;
@@ -257,6 +263,25 @@ fn derivatives_agree_with_differences_and_enclosures_contain_all() {
                         "{text} at {v}: {slope} {by_difference}"
                     );
                 }
+            }
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_terms_that_nearly_cancel_are_enclosed_sharply() {
+    // d/dv of v/(1 + v) is 1/(1 + v)^2, that of v/sqrt(1 + v^2) is (1 + v^2)^(-3/2).
+    for v in [1e-3_f64, 1.0, 1e4] {
+        let part = [(Variable::V, Interval::new(v, 1.01 * v))];
+        for (text, product, exact) in [
+            ("1/(1 + v)", "v/(1 + v)", (1.0 + v).powi(-2)),
+            ("1/sqrt(1 + v^2)", "v/sqrt(1 + v^2)", (1.0 + v * v).powf(-1.5)),
+        ] {
+            let growth = formula(text).enclose(&part, Variable::V).growth;
+            let slope = formula(product).enclose(&part, Variable::V).slope;
+            for found in [growth, slope] {
+                let is_sharp = found.low > 0.9 * exact && found.high < 1.1 * exact;
+                assert!(is_sharp && found.contains(exact), "{text} at {v}: {found:?} {exact}");
             }
         }
     }

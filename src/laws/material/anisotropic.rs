@@ -69,6 +69,17 @@ impl Anisotropic {
         Self { matrix }
     }
 
+    /// The symmetric part of the matrix with these `S` times `S` entries, row by row, over the components of tensors with `S` components.
+    pub fn of_entries<const S: usize>(entries: &[f64]) -> Self {
+        let mut matrix = [[0.0; 6]; 6];
+        for (i, row) in entries.chunks_exact(S).enumerate() {
+            for (j, entry) in row.iter().enumerate() {
+                matrix[in_space::<S>(i)][in_space::<S>(j)] = 0.5 * (entry + entries[j * S + i]);
+            }
+        }
+        Self { matrix }
+    }
+
     /// A bound of its eigenvalues from above, in Pa.
     pub fn most(&self) -> f64 {
         let sums = self.matrix.map(|row| row.iter().map(|entry| entry.abs()).sum());
@@ -123,7 +134,7 @@ mod tests {
     use super::*;
     use crate::laws::material::Elasticity;
 
-    const GLASS: Elasticity = Elasticity { youngs_modulus: 70.0, poisson_ratio: 0.25 };
+    const GLASS: Elasticity = Elasticity::linear(70.0, 0.25);
 
     /// That of an isotropic material, whatever its axes.
     fn isotropic(hypothesis: Hypothesis) -> Anisotropic {

@@ -26,6 +26,17 @@ impl<T> ByMaterial<T> {
         self.0.iter().all(Option::is_some)
     }
 
+    /// Another law for each material that has this one.
+    pub fn map<U>(&self, law: impl Fn(&T) -> U) -> ByMaterial<U> {
+        self.map_each(|_, own| law(own))
+    }
+
+    /// The same, given the material, too.
+    pub fn map_each<U>(&self, law: impl Fn(usize, &T) -> U) -> ByMaterial<U> {
+        let all = self.0.iter().enumerate();
+        ByMaterial(all.map(|(material, own)| own.as_ref().map(|own| law(material, own))).collect())
+    }
+
     /// All existing laws.
     pub fn laws(&self) -> impl Iterator<Item = &T> {
         self.0.iter().flatten()

@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const GLASS: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.25 };
+    const GLASS: Elasticity = Elasticity::linear(1000.0, 0.25);
 
     fn law(exponent: f64) -> Elastic<Damage> {
         let damage = Damage { threshold: 0.5, viscosity: 10.0, exponent, largest: 0.9 };

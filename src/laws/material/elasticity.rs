@@ -1,6 +1,10 @@
-//! Linear isotropic elasticity, and the hypothesis of plane problems.
+//! Isotropic elasticity, and the hypothesis of plane problems.
 
-use super::isotropic::Isotropic;
+use super::{
+    elasticity_formula::{ElasticityFormula, StrainElasticity},
+    isotropic::Isotropic,
+};
+use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,10 +36,13 @@ impl Hypothesis {
     }
 }
 
-/// Isotropic linear elasticity, at a point or with a modulus that may vary with place.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Isotropic elasticity, at a point or with a modulus that may vary with place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(rename = "Elasticity", description = "Isotropic linear elasticity.")]
+#[schemars(
+    rename = "Elasticity",
+    description = "Isotropic elasticity, linear unless it has the table `expression`."
+)]
 pub struct Elasticity<N = f64> {
     /// Young's modulus. An expression in x, y, z is evaluated at the centre of each cell.
     #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
@@ -43,10 +50,32 @@ pub struct Elasticity<N = f64> {
     /// Poisson's ratio.
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]
     pub poisson_ratio: f64,
+    /// A formula of the strain by which the shear modulus is multiplied; the bulk modulus stays. Under implicit schemes, in plane strain,
+    /// bodies of revolution and 3D; without viscoplasticity, damage, damping by the stiffness and initial stress. Absent: elasticity is
+    /// linear.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expression: Option<ElasticityFormula>,
+}
+
+impl<N> Elasticity<N> {
+    /// Linear elasticity.
+    pub const fn linear(youngs_modulus: N, poisson_ratio: f64) -> Self {
+        Self { youngs_modulus, poisson_ratio, expression: None }
+    }
+
+    /// The fault of its formula; its key is that of the table of the elasticity.
+    pub fn fault(&self) -> Option<LawFault> {
+        Some(self.expression.as_ref()?.fault()?.within("expression"))
+    }
 }
 
 impl Elasticity {
-    /// The stress-strain relation under this hypothesis, section 5 of Wang and Cheng (2022) for plane stress.
+    /// The law of the stress, if it is a formula of the strain. For three normal strains, as in plane strain and 3D.
+    pub fn strain_elasticity(&self) -> Option<StrainElasticity> {
+        Some(self.expression.as_ref()?.law(self.tensor(Hypothesis::Space)))
+    }
+
+    /// The linear stress-strain relation under this hypothesis, with a formula that where it is 1, section 5 of Wang and Cheng (2022) for plane stress.
     ///
     /// Plane stress: `E k / (1 - k^2) tr(e) I + E / (1 + k) e` with the trace over the plane; otherwise
     /// `E k / ((1 + k)(1 - 2 k)) tr(e) I + E / (1 + k) e`.
@@ -76,7 +105,7 @@ mod tests {
     use super::*;
     use crate::linear_algebra::tensor::Mandel;
 
-    const PAPER: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+    const PAPER: Elasticity = Elasticity::linear(1000.0, 0.4);
 
     #[test]
     fn plane_stress_gives_youngs_modulus_in_uniaxial_tension() {

@@ -98,8 +98,11 @@ impl Material {
         Material {
             hypothesis: self.hypothesis,
             density: self.density.as_ref().and(density),
-            elasticity: elasticity
-                .map(|(law, youngs_modulus)| Elasticity { youngs_modulus, poisson_ratio: law.poisson_ratio }),
+            elasticity: elasticity.map(|(law, youngs_modulus)| Elasticity {
+                youngs_modulus,
+                poisson_ratio: law.poisson_ratio,
+                expression: law.expression.clone(),
+            }),
             viscosity: self.viscosity.as_ref().and_then(|law| law.with(volumetric, shear)),
             viscoplasticity: flow.map(|law| law.with_yield_stress(yield_stress.unwrap_or(0.0))),
             damping: self.damping,
@@ -131,7 +134,7 @@ impl Material<f64> {
     pub fn numbers(&self) -> Numbers {
         [
             self.density,
-            self.elasticity.map(|law| law.youngs_modulus),
+            self.elasticity.as_ref().map(|law| law.youngs_modulus),
             self.viscosity.as_ref().and_then(|law| law.volumetric),
             self.viscosity.as_ref().and_then(|law| law.shear),
             self.viscoplasticity.as_ref().and_then(|law| law.yield_stress().copied()),
@@ -155,7 +158,7 @@ mod tests {
         Material {
             hypothesis: None,
             density: Some(Scalar::Number(3.0)),
-            elasticity: Some(Elasticity { youngs_modulus: of("10 - y"), poisson_ratio: 0.25 }),
+            elasticity: Some(Elasticity::linear(of("10 - y"), 0.25)),
             viscosity: Some(Viscosity::linear(of("-x"), of("4"))),
             orthotropic: None,
             damping: None,

@@ -9,9 +9,12 @@ mod by_material;
 mod damage;
 mod damping;
 mod elasticity;
+mod elasticity_formula;
+mod growth;
 mod isotropic;
 mod local;
 mod orthotropic;
+mod stored;
 mod viscoplasticity;
 mod viscosity;
 mod viscosity_formula;
@@ -25,6 +28,7 @@ pub use by_material::ByMaterial;
 pub use damage::Damage;
 pub use damping::Damping;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
+pub use elasticity_formula::{ElasticityFormula, StrainElasticity};
 pub use isotropic::{Isotropic, LinearTensor};
 pub use local::Numbers;
 pub use orthotropic::Orthotropic;
@@ -49,7 +53,7 @@ pub struct Material<N = Scalar> {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("variables" = "x, y, z", "unit" = "kg/m^d", "exclusiveMinimum" = 0), example = 1.0)]
     pub density: Option<N>,
-    /// Isotropic linear elasticity. Absent: no elastic stress.
+    /// Isotropic elasticity. Absent: no elastic stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elasticity: Option<Elasticity<N>>,
     /// Orthotropic linear elasticity, in place of isotropic elasticity; without viscoplasticity, damage and damping by the stiffness.
@@ -120,7 +124,7 @@ impl Material<f64> {
     pub fn viscosity_tensor(&self, hypothesis: Hypothesis) -> Option<Isotropic> {
         let own = self.viscosity.as_ref().map(|viscosity| viscosity.tensor(hypothesis));
         let factor = self.stiffness_damping();
-        let Some(elasticity) = self.elasticity.filter(|_| factor > 0.0) else { return own };
+        let Some(elasticity) = self.elasticity.as_ref().filter(|_| factor > 0.0) else { return own };
         let (own, elastic) = (own.unwrap_or_default(), elasticity.tensor(hypothesis));
         Some(Isotropic {
             volumetric: own.volumetric + factor * elastic.volumetric,
@@ -128,9 +132,14 @@ impl Material<f64> {
         })
     }
 
+    /// The elasticity, if its stress is linear.
+    pub fn linear_elasticity(&self) -> Option<&Elasticity> {
+        self.elasticity.as_ref().filter(|law| law.expression.is_none())
+    }
+
     /// What the viscous stress adds to that of [`viscosity_tensor`](Self::viscosity_tensor), if it is not linear.
-    pub fn rate_viscosity(&self) -> Option<RateViscosity> {
-        self.viscosity.as_ref()?.expression.as_ref()?.rest()
+    pub fn rate_viscosity(&self) -> Option<&ViscosityFormula> {
+        self.viscosity.as_ref()?.expression.as_ref().filter(|formula| !formula.is_constant())
     }
 
     /// The force per volume and velocity in kg/(m^d s).
@@ -147,7 +156,7 @@ mod tests {
         Material {
             hypothesis: None,
             density: Some(3.0),
-            elasticity: Some(Elasticity { youngs_modulus: 100.0, poisson_ratio: 0.25 }),
+            elasticity: Some(Elasticity::linear(100.0, 0.25)),
             orthotropic: None,
             viscosity: None,
             damping: Some(Damping { mass, stiffness }),

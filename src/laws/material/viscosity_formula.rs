@@ -12,16 +12,17 @@
 //! The matrix of a step contains the linear viscosity `bulk tr(e) I + m dev e` with the infimum `m` of `d(f g)/dg` up to the reference
 //! rate, from an enclosure. What remains is monotone, so that certificates of the linear viscosity hold for `A`.
 
-use super::{isotropic::Isotropic, viscoplasticity::Tangent};
+use super::{growth::Growth, isotropic::Isotropic, viscoplasticity::Tangent};
 use crate::{
     laws::{
-        expression::{Formula, Interval, OfRate, REACH, Supremum, Unproven, Variable, short},
+        expression::{Formula, OfRate, Variable},
         law::{Derived, LawFault},
     },
     linear_algebra::tensor::{Mandel, dot, normal_components, trace},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// A viscosity that is a formula of the strain rate, in place of `volumetric` and `shear`: the viscous stress is
 /// `bulk tr(e) I + shear dev e` for the strain rate e. In plane stress, trace and deviator are those of the plane.
@@ -36,27 +37,29 @@ pub struct ViscosityFormula {
     /// `bulk - shear/2`.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 1e4)]
     pub bulk: f64,
-    /// Equivalent strain rate up to which the certificates hold: the matrix of a step has the least viscosity that resists a change of
-    /// strain rates up to this one. Faster steps are solved as well; the run warns of them.
+    /// Equivalent strain rate up to which the certificates hold from the start: the matrix of a step has the least viscosity that resists a
+    /// change of strain rates up to this one. Where a step is faster, the run extends the range and computes the certificates anew.
     #[schemars(extend("unit" = "1/s", "exclusiveMinimum" = 0), example = 10.0)]
     pub reference_rate: f64,
     #[serde(skip)]
-    least: Derived<Result<f64, [String; 2]>>,
+    least: Arc<Derived<Result<f64, [String; 2]>>>,
 }
-
-/// Share of a viscosity that is rounding.
-const ROUNDING: f64 = 1e-12;
 
 impl ViscosityFormula {
     /// With this formula.
     pub fn new(shear: Formula<OfRate>, bulk: f64, reference_rate: f64) -> Self {
-        Self { shear, bulk, reference_rate, least: Derived::default() }
+        Self { shear, bulk, reference_rate, least: Arc::default() }
     }
 
     /// The fault of the formula: it must be strongly monotone up to the reference rate, and monotone for all rates.
     pub fn fault(&self) -> Option<LawFault> {
-        let [message, help] = self.least().as_ref().err()?.clone();
-        Some(LawFault::at_value("shear", message, help))
+        self.growth().fault(self.least())
+    }
+
+    /// The same formula with bounds up to this multiple of its reference rate; `None` if its stress may not grow there.
+    pub fn covering(&self, multiple: f64) -> Option<Self> {
+        let wide = Self::new(self.shear.clone(), self.bulk, multiple * self.reference_rate);
+        wide.least().is_ok().then_some(wide)
     }
 
     /// The linear viscosity in Pa s that the matrix of a step contains, in a body with this many normal components.
@@ -65,13 +68,18 @@ impl ViscosityFormula {
         Isotropic { volumetric: self.bulk - least / normal_components as f64, shear: least }
     }
 
-    /// What the viscous stress adds to that of the linear viscosity; nothing for a constant.
-    pub fn rest(&self) -> Option<RateViscosity> {
-        self.shear.uses(Variable::G).then(|| RateViscosity {
+    /// Whether the viscosity is linear.
+    pub fn is_constant(&self) -> bool {
+        self.shear.is_constant_along(Variable::G)
+    }
+
+    /// What the viscous stress adds to that of the linear viscosity.
+    pub fn rest(&self) -> RateViscosity {
+        RateViscosity {
             shear: self.shear.clone(),
             least: self.least_shear(),
             reference_rate: self.reference_rate,
-        })
+        }
     }
 
     /// The infimum in Pa s of `d(f g)/dg` up to the reference rate, from below; 0 if the formula has a fault.
@@ -84,49 +92,21 @@ impl ViscosityFormula {
     }
 
     fn find_least(&self) -> Result<f64, [String; 2]> {
-        let by = Variable::G;
-        let of_stress = self.shear.times(by).map_err(|fault| [fault.message, fault.help])?;
-        if of_stress.jumps_along(by) {
-            return Err([
-                "the viscosity may jump with g: a comparison, if, step, sign or a rounded number contains g"
-                    .into(),
-                "write it with min, max, abs or interpolate, which are continuous".into(),
-            ]);
+        self.growth().least(self.reference_rate)
+    }
+
+    fn growth(&self) -> Growth<'_, OfRate> {
+        Growth {
+            formula: &self.shear,
+            by: Variable::G,
+            key: "shear",
+            what: "viscosity",
+            product: "viscous stress",
+            variable: "strain rate",
+            reference: "reference_rate",
+            unit: " Pa s",
+            remedy: ": write (1e-3 + g)^(-0.4) in place of g^(-0.4)",
         }
-        let fall = |most: f64| {
-            let rates = [(by, Interval::new(0.0, most))];
-            of_stress.supremum([&rates[..]], by, |known| -known.slope).map_err(|unproven| {
-                let (Unproven::Undefined(place) | Unproven::Pieces(place)) = unproven;
-                [
-                    format!("the viscosity has no value near {}", self.shear.at(&place)),
-                    "it must have one for every g from 0 on: write (1e-3 + g)^(-0.4) in place of g^(-0.4)"
-                        .into(),
-                ]
-            })
-        };
-        let scale = self.shear.value(&[(by, self.reference_rate)]).abs();
-        let Supremum { bound, place } = fall(REACH)?;
-        if bound > ROUNDING * scale {
-            return Err([
-                format!(
-                    "the viscous stress may fall with the strain rate near {}: shear*g grows by {} Pa s there",
-                    self.shear.at(&place),
-                    short(-bound)
-                ),
-                "let shear fall more slowly than 1/g, add a small constant to it, or bound its argument, as in min(g, 10)".into(),
-            ]);
-        }
-        let Supremum { bound, place } = fall(self.reference_rate)?;
-        if -bound > ROUNDING * scale {
-            return Ok(-bound);
-        }
-        Err([
-            format!(
-                "the viscous stress may not grow with the strain rate near {}: shear*g must grow up to g = reference_rate",
-                self.shear.at(&place)
-            ),
-            "add a constant to shear, or choose a smaller reference_rate".into(),
-        ])
     }
 }
 
@@ -146,6 +126,11 @@ impl RateViscosity {
         let mean = trace(rate) / normal as f64;
         let deviator: Mandel<S> = std::array::from_fn(|c| if c < normal { rate[c] - mean } else { rate[c] });
         ((2.0 * dot(&deviator, &deviator)).sqrt(), deviator)
+    }
+
+    /// The same law with the reference rate of this formula.
+    pub fn within_reference(self, formula: &ViscosityFormula) -> Self {
+        Self { reference_rate: formula.reference_rate, ..self }
     }
 
     /// The equivalent strain rate in 1/s as a share of the reference rate.
@@ -188,13 +173,13 @@ mod tests {
     }
 
     fn rest(shear: &str) -> RateViscosity {
-        written(shear, 10.0).rest().expect("not constant")
+        written(shear, 10.0).rest()
     }
 
     /// The whole stress of a law.
     fn stress<const S: usize>(law: &ViscosityFormula, rate: &Mandel<S>) -> Mandel<S> {
         let linear = law.tensor(normal_components::<S>()).apply(rate);
-        let rest = law.rest().expect("not constant").stress(rate);
+        let rest = law.rest().stress(rate);
         std::array::from_fn(|c| linear[c] + rest[c])
     }
 
@@ -220,7 +205,10 @@ mod tests {
     #[test]
     fn a_constant_is_the_viscosity_without_a_formula() {
         let law = written("50", 1.0);
-        assert_eq!((law.rest(), law.fault()), (None, None));
+        assert_eq!((law.is_constant(), law.fault()), (true, None));
+        let hidden = written("50 + 0*g", 1.0);
+        assert_eq!((hidden.is_constant(), hidden.fault()), (true, None));
+        assert!(!written("50 + 1e-9*g", 1.0).is_constant());
         assert_eq!(law.tensor(2), Isotropic { volumetric: 15.0, shear: 50.0 });
         assert_eq!(law.tensor(3).smallest_modulus::<6>(), 50.0);
         assert!(
@@ -259,8 +247,8 @@ mod tests {
             ("-2", "grows by -2 Pa s", "more slowly"),
             ("g", "may not grow with the strain rate near g = 0", "add a constant"),
             ("0", "may not grow", "add a constant"),
-            // Bingham's law: as far as enclosures tell, the stress may fall.
-            ("min(5, 5/max(g, 1e-3))", "fall with the strain rate near g = ", "add a small constant"),
+            // Bingham's law: the stress tends to a limit that it has already.
+            ("min(5, 5/max(g, 1e-3))", "may not grow with the strain rate near g = ", "add a constant"),
             ("g^(-0.4)", "no value near g = 0", "1e-3 + g"),
             ("if(g < 1, 2, 3)", "may jump with g", "interpolate"),
             ("if(g < 1, 2, 2 + 1e-9*g)", "may jump with g", "interpolate"),

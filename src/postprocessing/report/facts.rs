@@ -35,7 +35,7 @@ const MORE_MEMBERS: [(&str, &str, &str); 15] = [
     ("max_residual", "largest residual of the equations, as a share of the forces", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
     ("max_slip_pressure", "largest contact pressure with weakening friction", "Pa"),
-    ("max_rate_share", "largest strain rate over the reference rate of the viscosity", ""),
+    ("max_rate_share", "largest strain or strain rate over the reference of its formula", ""),
     ("effects", "effects simulated", ""),
     ("scheme", "time scheme", ""),
     ("preconditioner", "preconditioner", ""),

@@ -201,6 +201,12 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
         self.flow.add_to_free_components(self.cells.basis(), out)
     }
 
+    /// The derivatives of the forces at a velocity. Collective.
+    pub(super) fn tangents(&mut self, velocity: &DistributedVector) -> Result<&Tangents> {
+        self.evaluate(velocity)?;
+        Ok(&self.flow.evaluated_tangents)
+    }
+
     /// Evaluates the forces at a velocity with their derivatives.
     fn evaluate(&mut self, velocity: &DistributedVector) -> Result<()> {
         self.displace(velocity)?;

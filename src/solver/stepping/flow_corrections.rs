@@ -4,13 +4,17 @@
 //! forces, which leaves the residual `F(v_i) - F_i`. Flow changes the stress of a step by less than elasticity does, and viscosity and
 //! inertia add to `K`: where `K` is much stiffer than the derivative of `F`, two or three corrections suffice, each with one solve and
 //! one evaluation of the flow, without its derivative. The forces of the next correction are those of the last one, extrapolated along
-//! the last two (D. G. Anderson, Iterative procedures for nonlinear integral equations, Journal of the ACM 12 (1965), 547-560).
+//! those before (see [`anderson`](super::anderson)).
 //!
-//! Where corrections converge slowly, Newton's method solves the equations of the whole body, from the velocity reached. Its linear
+//! What is factored may be another matrix `K'`: with the derivatives of `F` at a velocity that the step has met, where these stiffen the
+//! body. Then `F(v)` stands for `F(v) - (K' - K) v`. Where corrections converge slowly, such derivatives are found anew.
+//!
+//! Where that does not help, Newton's method solves the equations of the whole body, from the velocity reached. Its linear
 //! systems are preconditioned by the same factor. The choice depends on this step alone: a restarted run makes the same.
 
 use super::{
     StepOutcome,
+    anderson::Anderson,
     condensed::CONTACT_SHARE,
     contacts::restore_pressures,
     corrections::MAX_CORRECTIONS,
@@ -23,7 +27,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::effect::Contact,
+    fem::effect::{Contact, Tangents},
     linear_algebra::petsc::{DistributedVector, ProjectedKsp},
 };
 use std::cell::RefCell;
@@ -31,23 +35,42 @@ use std::cell::RefCell;
 /// A correction that leaves more than this share of the residual is slow: Newton's method takes some ten solves.
 const SLOW: f64 = 0.2;
 
+/// Number of corrections after which a factor with derivatives at the velocity reached takes the place of one without, or with those of an
+/// earlier step: it costs less than a few corrections, and two of them then suffice.
+const MAX_WITH_TANGENTS: usize = 4;
+/// Such corrections may leave a larger residual than those before, up to this multiple.
+const LARGEST_GROWTH: f64 = 10.0;
+/// Numbers of differences along which forces are extrapolated.
+const DEPTH: usize = 1;
+const DEPTH_WITH_TANGENTS: usize = 4;
+
 /// How corrections end, with their work.
 pub(super) enum Corrected {
     Solved(StepOutcome),
-    /// They are slow, or the contact failed.
-    Unfinished(StepOutcome),
+    /// They are slow, or the contact failed; whether some were made from the start on.
+    Unfinished(StepOutcome, bool),
+}
+
+/// A solver with the factor of a matrix.
+pub(super) struct Factored<'a> {
+    pub solver: &'a mut dyn LinearSolver,
+    /// The matrix `K'`, unless it is that of the step.
+    pub other: Option<&'a dyn StepMatrix>,
+    /// Whether it may be replaced by one with derivatives.
+    pub is_replaceable: bool,
 }
 
 /// Work data of steps in which cells flow.
 pub(super) struct FlowCorrections {
     flow: Flow,
-    /// `F_i` and `F(v_i)`.
+    /// `F_i` and `F(v_i)`, and work space.
+    product: DistributedVector,
     given: DistributedVector,
     found: DistributedVector,
     /// `F(v_i) - F_i`.
     change: DistributedVector,
-    /// The last two of the correction before.
-    earlier: [DistributedVector; 2],
+    /// The corrections before.
+    earlier: Anderson,
     /// `b - F_i`.
     right_hand_side: DistributedVector,
     /// The velocity from which the step was started.
@@ -65,14 +88,16 @@ struct Whole {
 }
 
 impl FlowCorrections {
-    /// For cells that flow, with vectors of the layout of `like`.
-    pub(super) fn new(like: &DistributedVector, settings: &SolverSettings) -> Result<Self> {
+    /// For cells that flow, with vectors of the layout of `like`; whether derivatives of what they add stiffen the body.
+    pub(super) fn new(like: &DistributedVector, settings: &SolverSettings, stiffens: bool) -> Result<Self> {
+        let depth = if stiffens { DEPTH_WITH_TANGENTS } else { DEPTH };
         Ok(Self {
             flow: Flow::new(like)?,
+            product: like.like()?,
             given: like.like()?,
             found: like.like()?,
             change: like.like()?,
-            earlier: [like.like()?, like.like()?],
+            earlier: Anderson::new(like, depth)?,
             right_hand_side: like.like()?,
             start: like.like()?,
             whole: None,
@@ -84,17 +109,26 @@ impl FlowCorrections {
     pub(super) fn correct<const D: usize, const S: usize>(
         &mut self,
         newton: &mut Newton,
-        solver: &mut dyn LinearSolver,
+        Factored { solver, other, is_replaceable }: Factored<'_>,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<Corrected> {
+        let of_step = system.matrix;
+        let system = System { matrix: other.unwrap_or(of_step), ..system };
+        let (slow, most) = match is_replaceable {
+            true => (LARGEST_GROWTH, MAX_WITH_TANGENTS),
+            false => (SLOW, MAX_CORRECTIONS),
+        };
+        self.earlier.restart();
         self.start.copy_from(trial)?;
         self.evaluate(problem, trial)?;
+        self.subtract_stiffening(of_step, other, trial)?;
         self.given.copy_from(&self.found)?;
         solver.start(system, trial)?;
         let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
-        for number in 0..MAX_CORRECTIONS {
+        let mut has_progressed = true;
+        for _ in 0..most {
             self.right_hand_side.copy_from(system.right_hand_side)?;
             self.right_hand_side.add_scaled(-1.0, &self.given)?;
             let tolerance = CONTACT_SHARE * system.tolerance;
@@ -104,27 +138,55 @@ impl FlowCorrections {
                 Ok(outcome) => sum = sum.followed_by(outcome),
                 Err(failure) if failure.is_failure() => {
                     self.restart(problem, trial)?;
+                    has_progressed = false;
                     break;
                 }
                 Err(error) => return Err(error.into()),
             }
             solver.expand(of_contact, trial)?;
             self.evaluate(problem, trial)?;
+            self.subtract_stiffening(of_step, other, trial)?;
             let left = self.residual()?;
             if left <= (1.0 - CONTACT_SHARE) * system.tolerance {
                 trial.update_ghosts()?;
                 return Ok(Corrected::Solved(StepOutcome { residual: sum.residual.hypot(left), ..sum }));
             }
-            if left.is_nan() || left > SLOW * last {
-                if left.is_nan() || left > last {
+            if left.is_nan() || left > slow * last {
+                if left.is_nan() || left > last.max(slow * last) {
                     self.restart(problem, trial)?;
+                    has_progressed = false;
                 }
                 break;
             }
-            self.update(number > 0)?;
-            last = left;
+            self.earlier.extrapolate(&self.found, &self.change, &mut self.given)?;
+            last = left.min(last);
         }
-        Ok(Corrected::Unfinished(sum))
+        Ok(Corrected::Unfinished(sum, has_progressed))
+    }
+
+    /// Takes from the forces in `found` what another factored matrix has beyond that of the step. Collective.
+    fn subtract_stiffening(
+        &mut self,
+        of_step: &dyn StepMatrix,
+        other: Option<&dyn StepMatrix>,
+        velocity: &DistributedVector,
+    ) -> Result<()> {
+        let Some(other) = other else { return Ok(()) };
+        other.multiply(velocity, &mut self.product)?;
+        self.found.add_scaled(-1.0, &self.product)?;
+        of_step.multiply(velocity, &mut self.product)?;
+        self.found.add_scaled(1.0, &self.product)
+    }
+
+    /// The derivatives of the forces of flow at a velocity. Collective.
+    pub(super) fn tangents<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        velocity: &DistributedVector,
+    ) -> Result<Tangents> {
+        let start = problem.flow_start;
+        let (cells, _) = problem.body.cells_and_contacts();
+        Ok(self.flow.of(cells, start).tangents(velocity)?.clone())
     }
 
     /// Solves a step by Newton's method for the whole body, preconditioned by this solver. Collective.
@@ -180,24 +242,6 @@ impl FlowCorrections {
     ) -> Result<()> {
         trial.copy_from(&self.start)?;
         restore_pressures(problem.body, problem.state)
-    }
-
-    /// Sets the forces of the next correction; `extrapolates` tells that there was a correction before. Collective.
-    fn update(&mut self, extrapolates: bool) -> Result<()> {
-        let [earlier_found, earlier_change] = &mut self.earlier;
-        self.given.copy_from(&self.found)?;
-        if extrapolates {
-            earlier_change.scale(-1.0)?;
-            earlier_change.add_scaled(1.0, &self.change)?;
-            earlier_found.scale(-1.0)?;
-            earlier_found.add_scaled(1.0, &self.found)?;
-            let share = self.change.dot(earlier_change)? / earlier_change.dot(earlier_change)?;
-            if share.is_finite() {
-                self.given.add_scaled(-share, earlier_found)?;
-            }
-        }
-        earlier_found.copy_from(&self.found)?;
-        earlier_change.copy_from(&self.change)
     }
 }
 

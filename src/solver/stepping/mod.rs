@@ -1,6 +1,7 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
 mod adaptive;
+mod anderson;
 mod bounded;
 mod condensed;
 mod condensed_matrix;

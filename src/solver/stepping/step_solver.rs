@@ -9,7 +9,7 @@ use super::{
     equations::{Floor, StepMatrix},
     factor_cache::{FactorCache, Prepared},
     flow::Flow,
-    flow_corrections::{Corrected, FlowCorrections},
+    flow_corrections::{Corrected, Factored, FlowCorrections},
     force_scale::size_of,
     linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, ProblemSize, SolverSettings},
     newton::Newton,
@@ -50,6 +50,9 @@ const ROUNDING_SHARE: f64 = 0.1;
 const LARGEST_FLOOR: f64 = 1e-4;
 /// The largest residual at which Newton's method stagnates by rounding errors, as a multiple of those of `K v`.
 const STAGNANT: f64 = 4.0;
+
+/// Number of factors with derivatives at velocities of a step after which Newton's method solves it.
+const MOST_FACTORS: usize = 6;
 
 /// How accurately a step is solved, in N.
 #[derive(Debug, Clone, Copy)]
@@ -152,6 +155,14 @@ impl StepSolver {
         self.precision = Precision::Double;
     }
 
+    /// Forgets factors with derivatives at velocities of earlier steps, so that the next step is solved as after a restart.
+    pub(super) fn forget_tangents(&mut self) {
+        if self.active.as_ref().is_some_and(|active| active.has_tangents) {
+            (self.active, self.step_matrix, self.prepared) = (None, None, None);
+        }
+        self.cache.iter_mut().for_each(FactorCache::forget_tangents);
+    }
+
     /// Whether the matrices belong to these lengths.
     pub(super) fn is_prepared_for(&self, lengths: Lengths) -> bool {
         self.prepared == Some(lengths)
@@ -181,7 +192,7 @@ impl StepSolver {
                 cached => cached,
             };
         }
-        if lengths.matrix != length {
+        if lengths.matrix != length || self.active.as_ref().is_some_and(|active| active.has_tangents) {
             let rows = matrix_rows(session, body, lengths.matrix)?;
             self.step_matrix = Some(session.agree(Matrix::symmetric(D, &rows))?);
         }
@@ -222,7 +233,8 @@ impl StepSolver {
         let rows = matrix_rows(session, body, length)?;
         let matrix = session.agree(Matrix::symmetric(D, &rows))?;
         let rows = self.springs.add(session, body, (rows, length))?;
-        let mut prepared = Prepared { length, matrix, solver: self.kind.another(like)?, scales: Vec::new() };
+        let solver = self.kind.another(like)?;
+        let mut prepared = Prepared { length, matrix, has_tangents: false, solver, scales: Vec::new() };
         if !self.complete(session, body, &mut prepared, rows, like)? {
             self.kind = Box::new(Whole::new(session, body, like, &self.settings)?);
             (self.newton, self.flowing) = nonlinear(session, body, &*self.kind, like, &self.settings)?;
@@ -311,14 +323,21 @@ impl StepSolver {
         let slope = STAGNANT * f64::EPSILON * self.matrix_norm;
         let floor = Floor { slope, largest: (LARGEST_FLOOR * size).max(STAGNANT * product) };
         let (mut is_relaxed, mut is_pressed_on) = (false, false);
+        // What is monotone stiffens the body: its derivatives may be part of a factor.
+        let stiffens = problem.body.flows() && !problem.body.flows_beside_viscosity();
+        let (mut factors, mut earlier) = (0, StepOutcome::default());
         loop {
+            let is_replaceable = stiffens && factors < MOST_FACTORS;
             let Self { active, step_matrix, newton, flowing, start, products, springs, .. } = &mut *self;
-            let Prepared { matrix, solver, scales, .. } = active.as_mut().ok_or_else(unassembled)?;
+            let Prepared { matrix, has_tangents, solver, scales, .. } =
+                active.as_mut().ok_or_else(unassembled)?;
             let (solver, is_own) = (&mut **solver, step_matrix.is_none());
             let is_single = solver.precision() == Some(Precision::Single);
             if is_single {
                 keep(trial, start)?;
             }
+            let other = &CountedMatrix { matrix: &*matrix, products };
+            let other: Option<&dyn StepMatrix> = if *has_tangents { Some(other) } else { None };
             let matrix = &CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products };
             let right_hand_side = forces;
             // Where contact alone holds a body, a direction may be any rigid motion, whose rounding errors hide that nothing holds it.
@@ -329,15 +348,26 @@ impl StepSolver {
                 (None, _) => solve_linear(solver.krylov().linear_solver(), problem, system, trial),
                 (Some(newton), None) => correct(newton, solver, problem, system, trial),
                 (Some(newton), Some(flowing)) => {
-                    let corrected = match is_own {
-                        true => flowing.correct(newton, solver, problem, system, trial),
-                        false => Ok(Corrected::Unfinished(StepOutcome::default())),
+                    let factored = Factored { solver: &mut *solver, other, is_replaceable };
+                    let corrected = match is_own || *has_tangents {
+                        true => flowing.correct(newton, factored, problem, system, trial),
+                        false => Ok(Corrected::Unfinished(StepOutcome::default(), false)),
                     };
                     match corrected {
-                        Ok(Corrected::Solved(outcome)) => Ok(outcome),
-                        Ok(Corrected::Unfinished(work)) => flowing
+                        Ok(Corrected::Solved(outcome)) => Ok(earlier.followed_by(outcome)),
+                        Ok(Corrected::Unfinished(work, has_progressed))
+                            if is_replaceable && (has_progressed || factors == 0) =>
+                        {
+                            (factors, earlier) = (factors + 1, earlier.followed_by(work));
+                            if !session.agree(self.refactor_with_tangents(problem, trial))? {
+                                session.agree(self.refactor(problem))?;
+                                factors = MOST_FACTORS;
+                            }
+                            continue;
+                        }
+                        Ok(Corrected::Unfinished(work, _)) => flowing
                             .solve_whole(solver, problem, system, trial)
-                            .map(|outcome| work.followed_by(outcome)),
+                            .map(|outcome| earlier.followed_by(work).followed_by(outcome)),
                         Err(error) => Err(error),
                     }
                 }
@@ -440,23 +470,58 @@ impl StepSolver {
         Ok(Accuracy { tolerance, size: all, product, reference })
     }
 
+    /// Replaces the factor by one of the matrix with the derivatives of what cells add to the stress at this velocity; returns whether there
+    /// is one. Collective.
+    fn refactor_with_tangents<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        velocity: &DistributedVector,
+    ) -> Result<bool> {
+        let (Some(flowing), Some(mut prepared)) = (&mut self.flowing, self.active.take()) else {
+            return Err(unassembled());
+        };
+        let tangents = flowing.tangents(problem, velocity)?;
+        let (session, body, like) = (problem.session, &*problem.body, problem.forces);
+        let Some(Lengths { matrix: length, .. }) = self.prepared else { return Err(unassembled()) };
+        let rows = body.matrix_with(session, length, &tangents)?;
+        let matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        let of_step = std::mem::replace(&mut prepared.matrix, matrix);
+        self.step_matrix.get_or_insert(of_step);
+        prepared.has_tangents = true;
+        let rows = self.springs.add(session, body, (rows, length))?;
+        let is_factored = self.complete(session, body, &mut prepared, rows, like)?;
+        self.active = Some(prepared);
+        Ok(is_factored)
+    }
+
+    /// Replaces the factor by one without derivatives, in the precision of the next factors. Collective.
+    fn refactor<const D: usize, const S: usize>(&mut self, problem: &StepProblem<'_, D, S>) -> Result<()> {
+        let Some(mut prepared) = self.active.take() else { return Err(unassembled()) };
+        let (session, body, like) = (problem.session, &*problem.body, problem.forces);
+        let rows = matrix_rows(session, body, prepared.length)?;
+        if std::mem::take(&mut prepared.has_tangents) {
+            prepared.matrix = session.agree(Matrix::symmetric(D, &rows))?;
+            let is_of_step = self.prepared.is_some_and(|lengths| lengths.matrix == prepared.length);
+            self.step_matrix = self.step_matrix.take().filter(|_| !is_of_step);
+        }
+        let rows = self.springs.add(session, body, (rows, prepared.length))?;
+        self.complete(session, body, &mut prepared, rows, like)?;
+        self.active = Some(prepared);
+        Ok(())
+    }
+
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
     fn refactor_in_double<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
     ) -> Result<()> {
-        let Some(mut prepared) = self.active.take() else { return Err(unassembled()) };
         if let Some(start) = &self.start {
             trial.copy_from(start)?;
         }
         restore_pressures(problem.body, problem.state)?;
         self.precision = Precision::Double;
-        let (session, body, like) = (problem.session, &*problem.body, problem.forces);
-        let rows = self.springs.rows(session, body, prepared.length)?;
-        self.complete(session, body, &mut prepared, rows, like)?;
-        self.active = Some(prepared);
-        Ok(())
+        self.refactor(problem)
     }
 }
 
@@ -513,7 +578,7 @@ fn nonlinear<const D: usize, const S: usize>(
         let nodes = body.contact_nodes().iter().map(|contact| contact.node).collect();
         newton.flow = Some(Flow::at_nodes(like, solver.unknowns(like), nodes)?);
     } else if body.flows() && solver.precision().is_some() {
-        flowing = Some(Box::new(FlowCorrections::new(like, settings)?));
+        flowing = Some(Box::new(FlowCorrections::new(like, settings, !body.flows_beside_viscosity())?));
     } else if body.flows() {
         newton.flow = Some(Flow::new(like)?);
     }

@@ -206,6 +206,11 @@ impl Stepper {
         self.solver.use_double_precision();
     }
 
+    /// Forgets what depends on earlier steps and is not saved, so that the next step is the first one of a restarted run, too.
+    pub fn forget_tangents(&mut self) {
+        self.solver.forget_tangents();
+    }
+
     /// The matrix of a first step of this length in s. Preconditioners are built for this length and powers of two times it.
     /// Collective.
     pub fn matrix<const D: usize, const S: usize>(

@@ -128,7 +128,7 @@ mod tests {
         Step { time: 1.0, length: 0.25, previous_length: 0.125 },
         Step { time: 1.5, length: 0.5, previous_length: 0.25 },
     ];
-    const ELASTICITY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+    const ELASTICITY: Elasticity = Elasticity::linear(1000.0, 0.4);
 
     /// What two steps leave, of cells whose runs are cut as `material` has it: forces, histories, energies, cells that flow.
     /// Each history has the bits of a cell that is alone.

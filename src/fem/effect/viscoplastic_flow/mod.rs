@@ -71,6 +71,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
             error: Some(strain),
             weakens: false,
             is_monotone: false,
+            is_viscous: false,
         }
     }
 

@@ -41,7 +41,7 @@ pub struct CreepFormula {
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 5e7)]
     pub reference_stress: f64,
     #[serde(skip)]
-    bounds: Derived<Vec<[f64; 3]>>,
+    bounds: Derived<Vec<Derived<[f64; 3]>>>,
 }
 
 impl<N> InPlaces<N> for CreepFormula {
@@ -77,31 +77,31 @@ impl Parameters for CreepFormula {
 }
 
 impl CreepFormula {
-    /// For each level the largest derivatives of the rate by the stress, of its decrease by the strain, and by the mean stress in either
-    /// direction, up to this stress.
-    fn bounds(&self) -> &[[f64; 3]] {
-        self.bounds.get(|| {
-            let strains = (Variable::E, Interval::new(0.0, REACH));
-            let with_mean = self.rate.uses(Variable::P);
-            let (mut low, mut most) = (0.0, [0.0_f64; 3]);
-            let level = |level: i32| {
-                let high = self.reference_stress * (f64::from(level) / PARTS).exp2();
-                // Wherever the mean stress is this large, the von Mises norm may be less.
-                let least = if with_mean { 0.0 } else { low };
-                let means = (Variable::P, Interval::new(-high, high));
-                let part = [(Variable::Q, Interval::new(least, high)), means, strains];
-                let sup = |by, sign: f64| {
-                    let of = move |known: &Enclosure| if sign > 0.0 { known.slope } else { -known.slope };
-                    self.rate.supremum([&part[..]], by, of).map_or(f64::INFINITY, |found| found.bound)
-                };
-                let by_strain = if self.rate.uses(Variable::E) { sup(Variable::E, -1.0) } else { 0.0 };
-                let by_mean = if with_mean { sup(Variable::P, 1.0).max(sup(Variable::P, -1.0)) } else { 0.0 };
-                most = [most[0].max(sup(Variable::Q, 1.0)), most[1].max(by_strain), most[2].max(by_mean)];
-                low = high;
-                most
-            };
-            LEVELS.map(level).collect()
-        })
+    /// The largest derivatives of the rate by the stress, of its decrease by the strain, and by the mean stress in either direction, up to
+    /// the stress of this level; found once, when the stresses of a step reach it.
+    fn bounds(&self, level: i32) -> [f64; 3] {
+        let all = self.bounds.get(|| LEVELS.map(|_| Derived::default()).collect());
+        let at = usize::try_from(level - LEVELS.start).ok().and_then(|at| all.get(at));
+        at.map_or([f64::INFINITY, 0.0, 0.0], |bounds| *bounds.get(|| self.find_bounds(level)))
+    }
+
+    fn find_bounds(&self, level: i32) -> [f64; 3] {
+        let high = self.reference_stress * (f64::from(level) / PARTS).exp2();
+        let part = [
+            (Variable::Q, Interval::new(0.0, high)),
+            (Variable::P, Interval::new(-high, high)),
+            (Variable::E, Interval::new(0.0, REACH)),
+        ];
+        let sup = |by, sign: f64| {
+            let of = move |known: &Enclosure| if sign > 0.0 { known.slope } else { -known.slope };
+            self.rate.supremum([&part[..]], by, of).map_or(f64::INFINITY, |found| found.bound.max(0.0))
+        };
+        let [by_strain, by_mean] = [Variable::E, Variable::P].map(|by| self.rate.uses(by));
+        [
+            sup(Variable::Q, 1.0),
+            if by_strain { sup(Variable::E, -1.0) } else { 0.0 },
+            if by_mean { sup(Variable::P, 1.0).max(sup(Variable::P, -1.0)) } else { 0.0 },
+        ]
     }
 
     fn first_fault(&self) -> Option<[String; 2]> {
@@ -217,7 +217,7 @@ impl Elastic<CreepFormula> {
     }
 }
 
-/// Bounds of derivatives are kept for stresses up to `2^(k / PARTS)` times the reference stress, for `k` in this range.
+/// Bounds of derivatives are found for stresses up to `2^(k / PARTS)` times the reference stress, for `k` in this range.
 const PARTS: f64 = 16.0;
 const LEVELS: std::ops::Range<i32> = -160..480;
 
@@ -275,9 +275,8 @@ impl Flow for Elastic<CreepFormula> {
     /// add up. The derivatives are enclosed. A change of the mean stress changes the flow, in the norm of the elastic energy by
     /// `sqrt(G 3 K) df/dm`.
     fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64 {
-        let level = (overstress.log2() * PARTS).ceil().max(f64::from(LEVELS.start)) as i32 - LEVELS.start;
-        let [by_stress, by_strain, by_mean] =
-            self.parameters.bounds().get(level as usize).copied().unwrap_or([f64::INFINITY, 0.0, 0.0]);
+        let level = (overstress.log2() * PARTS).ceil().max(f64::from(LEVELS.start)) as i32;
+        let [by_stress, by_strain, by_mean] = self.parameters.bounds(level);
         let Isotropic { volumetric, shear } = self.elasticity;
         let coupled = if by_mean == 0.0 { 0.0 } else { (0.5 * shear * (shear + 3.0 * volumetric)).sqrt() };
         1.5 * shear * by_stress + by_strain + coupled * by_mean
@@ -306,7 +305,7 @@ mod tests {
     use super::super::Norton;
     use super::*;
 
-    const BODY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.25 };
+    const BODY: Elasticity = Elasticity::linear(1000.0, 0.25);
 
     fn written(rate: &str) -> CreepFormula {
         let rate = Formula::parse(rate).expect("a formula");
@@ -363,7 +362,7 @@ mod tests {
 
     #[test]
     fn steep_rates_flow_as_their_law_says_in_plane_stress_too() {
-        let body = Elasticity { youngs_modulus: 20e9, poisson_ratio: 0.3 };
+        let body = Elasticity::linear(20e9, 0.3);
         for text in [
             "1e-3*(q/30e6)^40",
             "1e-3*sinh(q/20e6)",

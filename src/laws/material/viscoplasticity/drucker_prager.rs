@@ -214,7 +214,7 @@ mod tests {
     use crate::linear_algebra::tensor::add_scaled;
     use proptest::prelude::*;
 
-    const SOIL: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.3 };
+    const SOIL: Elasticity = Elasticity::linear(1000.0, 0.3);
 
     const LAW: DruckerPrager = DruckerPrager { relaxation: 100.0, friction_coefficient: 0.6, cohesion: 10.0 };
 

@@ -14,7 +14,7 @@ const YIELD_STRESS: f64 = 19.0;
 const ACCUMULATED: f64 = 0.01;
 
 fn elastic(poisson_ratio: f64) -> Elasticity {
-    Elasticity { youngs_modulus: 1000.0, poisson_ratio }
+    Elasticity::linear(1000.0, poisson_ratio)
 }
 
 /// Of the material for stresses of so many components.

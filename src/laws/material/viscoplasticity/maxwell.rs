@@ -45,7 +45,7 @@ impl Parameters for Maxwell {
     type Flow = Dashpots;
 
     fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Dashpots {
-        let Elasticity { youngs_modulus, poisson_ratio } = *elasticity;
+        let Elasticity { youngs_modulus, poisson_ratio, .. } = *elasticity;
         let bulk = youngs_modulus / (3.0 * (1.0 - 2.0 * poisson_ratio));
         Dashpots {
             elasticity: elasticity.tensor(hypothesis),
@@ -134,7 +134,7 @@ mod tests {
     use crate::linear_algebra::tensor::dot;
     use proptest::prelude::*;
 
-    const RUBBER: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+    const RUBBER: Elasticity = Elasticity::linear(1000.0, 0.4);
 
     fn law(hypothesis: Hypothesis, volumetric_relaxation_time: Option<f64>) -> Dashpots {
         Maxwell { relaxation_time: 0.5, volumetric_relaxation_time }.prepare(&RUBBER, hypothesis)

@@ -241,7 +241,7 @@ mod tests {
     use crate::{laws::material::Maxwell, linear_algebra::tensor::dot};
 
     /// 3 G is 1200 Pa.
-    const BODY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.25 };
+    const BODY: Elasticity = Elasticity::linear(1000.0, 0.25);
     const LAW: Norton = Norton {
         rate: 0.005,
         reference_stress: 10.0,

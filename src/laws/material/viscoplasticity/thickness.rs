@@ -171,7 +171,7 @@ mod tests {
     use super::*;
     use crate::laws::material::{DruckerPrager, Metric, Norton, Parameters, Perzyna};
 
-    const BODY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.3 };
+    const BODY: Elasticity = Elasticity::linear(1000.0, 0.3);
     const SOIL: DruckerPrager =
         DruckerPrager { relaxation: 100.0, friction_coefficient: 0.6, cohesion: 10.0 };
 

@@ -42,7 +42,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn law(hypothesis: Hypothesis, modulus: f64) -> Elastic<Perzyna> {
-        let elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.3 };
+        let elasticity = Elasticity::linear(1000.0, 0.3);
         let perzyna = Perzyna {
             relaxation: 100.0,
             yield_stress: 19.0,

@@ -48,7 +48,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn law(hypothesis: Hypothesis, (metric, exponent): (Metric, f64)) -> Elastic<Perzyna> {
-        let elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.3 };
+        let elasticity = Elasticity::linear(1000.0, 0.3);
         let perzyna = Perzyna {
             relaxation: 10.0,
             yield_stress: 19.0,

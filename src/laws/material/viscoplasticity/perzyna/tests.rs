@@ -2,7 +2,7 @@ use super::*;
 use proptest::prelude::*;
 use std::array;
 
-const PAPER: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+const PAPER: Elasticity = Elasticity::linear(1000.0, 0.4);
 const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
 
 fn law(metric: Metric, hypothesis: Hypothesis) -> Elastic<Perzyna> {
@@ -94,7 +94,7 @@ fn uniaxial_rates_just_beyond_yield_in_plane_stress_by_hand() {
         (Metric::Frobenius, 0.8),
         (Metric::Compliance, (4.0 - 2.0 * k) / (5.0 - 4.0 * k)),
     ] {
-        let elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: k };
+        let elasticity = Elasticity::linear(1000.0, k);
         let law =
             law(metric, Hypothesis::PlaneStress).parameters.prepare(&elasticity, Hypothesis::PlaneStress);
         let rate = law.strain_rate(&[19.0 + 1e-5, 0.0, 0.0])[0] / (1e-5 / 200.0);

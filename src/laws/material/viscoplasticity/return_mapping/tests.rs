@@ -8,7 +8,7 @@ use crate::{
 };
 use proptest::prelude::*;
 
-const BODY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.3 };
+const BODY: Elasticity = Elasticity::linear(1000.0, 0.3);
 const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
 const SOIL: DruckerPrager = DruckerPrager { relaxation: 100.0, friction_coefficient: 0.6, cohesion: 10.0 };
 
