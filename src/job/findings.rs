@@ -207,7 +207,7 @@ impl<'a> Table<'a> {
         dimension: usize,
     ) {
         if dimension == 2 && value.into().is_some_and(|value| value.uses(Variable::Z)) {
-            self.fault(key, "a 2D body has no coordinate z", "use t, x and y only");
+            self.fault(key, "a 2D body has no coordinate z", "write the expression without z");
         }
     }
 }

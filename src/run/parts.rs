@@ -3,11 +3,15 @@
 use crate::{
     error::{Error, Result},
     fem::space::facets,
-    job::Scalar,
-    linear_algebra::tensor::Vector,
-    mesh::Mesh,
+    job::{Job, Scalar},
+    laws::digits::Digits,
+    linear_algebra::tensor::{Vector, add_scaled, norm},
+    mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, session::Session},
 };
+
+/// Conditions are compared at this share of the way from the corners of a facet to its centre.
+const INSIDE: f64 = 1e-3;
 
 /// The facets of the boundaries of a table on this rank at whose centre the expression is not 0. Collective.
 pub(super) fn part_of<const D: usize>(
@@ -32,7 +36,72 @@ pub(super) fn part_of<const D: usize>(
     Ok(facets)
 }
 
+/// Warnings of conditions on the place of loads and supports that facets do not follow: these belong to a part as a whole. Collective, with
+/// the same warnings on all ranks.
+pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh<D>) -> Vec<String> {
+    let tractions = job.traction.iter().enumerate().map(|(at, t)| (format!("traction.{at}"), &t.on, &t.part));
+    let supports = job.support.iter().enumerate();
+    let on_areas = supports.filter(|(_, s)| s.stiffness.is_some() || s.damping.is_some() || s.absorbing);
+    let supports = on_areas.map(|(at, s)| (format!("support.{at}"), &s.on, &s.part));
+    let mut warnings = Vec::new();
+    for (table, on, part) in tractions.chain(supports) {
+        let Some(part) = part else { continue };
+        let areas: Vec<f64> = facets(mesh, on)
+            .into_iter()
+            .filter(|facet| is_cut(mesh, *facet, part))
+            .map(|facet| norm(&facet_normal(&mesh.facet_corners(facet))) * mesh.turn(&centre_of(mesh, facet)))
+            .collect();
+        let count = session.total(areas.len());
+        let [area] = session.sum([areas.iter().sum()]);
+        if count > 0 {
+            let (facets, unit) = (
+                if count == 1 { "facet" } else { "facets" },
+                if D == 2 && !mesh.is_revolved { "m" } else { "m^2" },
+            );
+            warnings.push(format!(
+                "{table}.where: the condition changes within {count} {facets} of {}, {} {unit} in all, which belong to the part if their \
+                 centre does: let facets end where it changes, or refine the mesh there",
+                on.join(", "),
+                Digits(area)
+            ));
+        }
+    }
+    warnings
+}
+
+/// Whether an expression holds at one corner of a facet and not at another one, just inside of the facet.
+fn is_cut<const D: usize>(mesh: &Mesh<D>, facet: u32, part: &Scalar) -> bool {
+    let (corners, centre) = (mesh.facet_corners(facet), centre_of(mesh, facet));
+    let holds = |corner: &Vector<D>| {
+        let inward: Vector<D> = std::array::from_fn(|i| centre[i] - corner[i]);
+        part.evaluate(0.0, &add_scaled(corner, INSIDE, &inward)) != 0.0
+    };
+    let first = holds(&corners[0]);
+    corners.iter().any(|corner| holds(corner) != first)
+}
+
 pub(super) fn centre_of<const D: usize>(mesh: &Mesh<D>, facet: u32) -> Vector<D> {
     let corners = mesh.facet_corners(facet);
     std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / D as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{fem::space::samples::row, job::Expression};
+
+    #[test]
+    fn only_conditions_that_change_within_a_facet_cut_it() {
+        let mut mesh: Mesh<2> = row();
+        let [a, b] = [mesh.cell(0)[0], mesh.cell(0)[1]];
+        mesh.facets = vec![[a, b]];
+        let [[x, _], [end, _]] = mesh.facet_corners(0);
+        let at = |share: f64| x + share * (end - x);
+        let cuts = |place: f64| {
+            let part = Expression::parse(&format!("x < {place}")).expect("an expression");
+            is_cut(&mesh, 0, &Scalar::Expression(part))
+        };
+        assert!(x != end && cuts(at(0.5)) && cuts(at(0.1)));
+        assert!(!cuts(at(0.0)) && !cuts(at(1.0)) && !cuts(at(2.0)), "at its ends or beside it");
+    }
 }

@@ -4,7 +4,7 @@ use super::{
     Inventory, bonds, build,
     estimate::MemoryEstimate,
     memory::require_for_run,
-    obstacles, pairs,
+    obstacles, pairs, parts,
     restored::{StartState, sides_before, start_file, transfer},
     sides::Circumstances,
     steps,
@@ -61,6 +61,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     refuse_free_bodies(session, &body, loaded)?;
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;
     warnings.extend(bonds::warnings(session, job, &body));
+    warnings.extend(parts::warnings(session, job, &body.mesh));
     warnings.extend(circumstances.warnings(&body.pairs));
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);

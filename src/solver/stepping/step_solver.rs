@@ -54,6 +54,12 @@ const STAGNANT: f64 = 4.0;
 /// Number of factors with derivatives at velocities of a step after which Newton's method solves it.
 const MOST_FACTORS: usize = 6;
 
+/// A body that only contact holds flies away if it moves by more than this multiple of its size in a step.
+const FAR: f64 = 1e3;
+const FLIGHT: &str =
+    "a body moves by more than a thousand times its size, so that rounding errors hide the forces on it";
+const NO_FLIGHT: &str = "check the loads and the gap";
+
 /// How accurately a step is solved, in N.
 #[derive(Debug, Clone, Copy)]
 struct Accuracy {
@@ -372,7 +378,13 @@ impl StepSolver {
                     }
                 }
             };
-            let failure = match session.agree(solved) {
+            let solved = match session.agree(solved) {
+                Ok(_) if self.springs.are_needed() && flies_away(problem, trial)? => {
+                    session.agree(Err(problem.failed(FLIGHT, NO_FLIGHT)))
+                }
+                solved => solved,
+            };
+            let failure = match solved {
                 Err(failure) if failure.is_failure() => failure,
                 Ok(solved) => {
                     // Where only an obstacle moves the body, its forces are those with which the step begins.
@@ -523,6 +535,17 @@ impl StepSolver {
         self.precision = Precision::Double;
         self.refactor(problem)
     }
+}
+
+/// Whether the mean motion in the step at these velocities is a flight. Collective.
+fn flies_away<const D: usize, const S: usize>(
+    problem: &StepProblem<'_, D, S>,
+    velocity: &DistributedVector,
+) -> Result<bool> {
+    let body = &*problem.body;
+    let Some(contact) = body.contacts.first() else { return Ok(false) };
+    let way = problem.step.length * velocity.norm()? / (body.mesh.total_nodes as f64).sqrt();
+    Ok(way > FAR * contact.body_size())
 }
 
 fn unassembled() -> Error {

@@ -79,6 +79,11 @@ impl<const D: usize> Contact<D> {
         Ok(())
     }
 
+    /// The longest side of the box around the body in m.
+    pub fn body_size(&self) -> f64 {
+        self.size
+    }
+
     /// How far a point moves along its normal in the step, in m, at these velocities.
     fn advance(&self, point: &Point<D>, vectors: Vectors, velocity: &[f64]) -> f64 {
         point.context.step_length * point.normal_component(vectors, velocity)
