@@ -14,6 +14,7 @@ mod failures;
 mod formulas;
 mod friction;
 mod graded;
+mod heat;
 mod indicator;
 mod iterations;
 mod landings;

@@ -105,6 +105,7 @@ impl Material {
             damping: self.damping,
             orthotropic: self.orthotropic,
             damage: self.damage,
+            heat: self.heat,
         }
     }
 }
@@ -161,6 +162,7 @@ mod tests {
             damping: None,
             viscoplasticity: None,
             damage: None,
+            heat: None,
         }
     }
 

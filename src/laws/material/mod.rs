@@ -9,6 +9,7 @@ mod by_material;
 mod damage;
 mod damping;
 mod elasticity;
+mod heat;
 mod isotropic;
 mod local;
 mod orthotropic;
@@ -25,6 +26,7 @@ pub use by_material::ByMaterial;
 pub use damage::Damage;
 pub use damping::Damping;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
+pub use heat::Heat;
 pub use isotropic::{Isotropic, LinearTensor};
 pub use local::Numbers;
 pub use orthotropic::Orthotropic;
@@ -71,6 +73,9 @@ pub struct Material<N = Scalar> {
     /// and never decreases. Absent: no damage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damage: Option<Damage>,
+    /// Heat, with the temperature as one more field; all materials of the body have it, or none. Absent: no temperature.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heat: Option<Heat>,
 }
 
 impl Material {
@@ -153,6 +158,7 @@ mod tests {
             damping: Some(Damping { mass, stiffness }),
             viscoplasticity: None,
             damage: None,
+            heat: None,
         }
     }
 

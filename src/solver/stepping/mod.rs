@@ -16,6 +16,7 @@ mod flow;
 mod flow_corrections;
 mod force_scale;
 mod frames;
+mod heat;
 mod implicit;
 mod integrator;
 mod lagged_euler;
