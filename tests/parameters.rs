@@ -210,7 +210,32 @@ fn numbers(root: &serde_json::Value, schema: &serde_json::Value, path: &str, key
 }
 
 /// Jobs with the keys of numbers that no job of the repository has.
-const RARE: [&str; 5] = [
+const RARE: [&str; 6] = [
+    r#"
+[mesh.rectangle]
+size = [1, 2]
+cells = [3, 4]
+[material]
+hypothesis = "plane_strain"
+density = 3
+elasticity = { youngs_modulus = 2, poisson_ratio = 0.25 }
+heat = { conductivity = 2, capacity = 3, expansion = 1e-5, reference = 293, dissipation_share = 0.9 }
+[[heat]]
+on = ["left"]
+where = 1
+flux = 5
+[[contact]]
+on = ["bottom"]
+friction_heat = 0.5
+normal.unilateral = {}
+friction.expression.coefficient = "0.3/(1 + temperature/100)"
+[initial]
+temperature = 293
+[time]
+end = 1
+step = 0.5
+scheme = "bdf2"
+"#,
     r#"
 [mesh.box]
 corner = [1, 2, 3]

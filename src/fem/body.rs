@@ -11,20 +11,22 @@ use crate::{
     fem::{
         coupling::{Coupling, Seen, add_between, seen_by_contacts},
         effect::{
-            Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
-            HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, Quantity,
-            RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect,
-            SurfaceForce, Tangents, Term, VISCOUS,
+            Contact, Curvature, ELASTIC, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form,
+            Heat, History, HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks,
+            Phases, Quantity, RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion,
+            SurfaceEffect, SurfaceForce, Tangents, Term, VISCOUS,
         },
         pairs::{Pair, shares},
-        space::{Batch, Cell, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, facet_points},
+        space::{
+            Batch, Cell, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, cell_rule, facet_points,
+        },
         state::State,
     },
     laws::material::{Anisotropic, Isotropic},
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
         simd::Pack,
-        tensor::{Mandel, Vector, add_scaled, larger},
+        tensor::{Mandel, Vector, add_scaled, dot, larger},
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -64,6 +66,8 @@ pub struct Body<const D: usize, const S: usize> {
     redistributed_drag: Option<RedistributedMass<D>>,
     /// The motion of supports, if some move.
     pub support_motion: Option<SupportMotion<D>>,
+    /// The temperature, if materials have heat, on all ranks alike.
+    pub heat: Option<Heat<D>>,
     /// The state at which laws are evaluated, converged or at the end of the step being taken.
     evaluation: Evaluation,
     /// The step being taken, if laws are evaluated at its end.
@@ -104,6 +108,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             redistributed_mass: None,
             redistributed_drag: None,
             support_motion: None,
+            heat: None,
             evaluation,
             step: Step::default(),
             evaluated: Vec::new(),
@@ -303,7 +308,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
             (self.evaluation, self.step) = (Evaluation::End(blend), step);
         }
         self.evaluated.clear();
-        let mut outcome = Outcome::default();
+        let mut of_flow = self.heat.as_mut().map(Heat::start_flow).unwrap_or_default();
+        let flow = (!of_flow.is_empty()).then_some(&mut of_flow[..]);
+        let mut outcome = Outcome { flow, ..Outcome::default() };
         let mut squares = self.elastic_support.add_start_forces(nodal.displacement, forces);
         if let (Some(mass), Evaluation::Start(blend)) = (&self.redistributed_mass, at) {
             mass.add_product(1.0 / blend.length, |at| nodal.velocity[at], forces);
@@ -332,7 +339,68 @@ impl<const D: usize, const S: usize> Body<D, S> {
             batch.scatter(mesh, forces);
         });
         self.fastest_flow = self.fastest_flow.max(outcome.fastest_flow);
-        (outcome.energy, squares)
+        let energy = outcome.energy;
+        if let Some(heat) = &mut self.heat {
+            heat.finish_flow(of_flow, 1.0);
+        }
+        (energy, squares)
+    }
+
+    /// Collects the heat that friction, viscosity and flow release in the step just committed, at the velocity where its equations hold.
+    /// Collective.
+    pub fn release_heat(&mut self, state: &State) -> Result<()> {
+        let Some(mut heat) = self.heat.take() else { return Ok(()) };
+        heat.start_release(&self.mesh);
+        let released = with_nodal(state, |nodal| {
+            self.add_heat_of_friction(nodal.velocity, &mut heat);
+            self.add_heat_of_viscosity(nodal, &mut heat);
+        });
+        let released = released.and_then(|()| heat.finish_release());
+        self.heat = Some(heat);
+        released
+    }
+
+    /// The heat of friction enters the nodes of the side with the law and, between bodies, those that they face, by their shares.
+    fn add_heat_of_friction(&self, velocity: &[f64], heat: &mut Heat<D>) {
+        let seen = self.seen_by_contacts(velocity);
+        for (number, contact) in self.contacts.iter().enumerate() {
+            let [own, other] = contact.shares_of_heat;
+            let pair = self.pairs.iter().find(|pair| pair.contact == number);
+            contact.visit_friction(&seen, |node, power| {
+                heat.add_friction(node, own * power);
+                let faced = pair.and_then(|pair| {
+                    let at = pair.nodes.binary_search_by_key(&(node as u32), |paired| paired.node).ok()?;
+                    Some(&pair.nodes[at])
+                });
+                let Some(faced) = faced else { return };
+                let share = |share: f64| share.max(0.0);
+                let sum: f64 = faced.faced().map(|(_, s)| share(*s)).sum();
+                for (master, s) in faced.faced().filter(|_| sum > 0.0) {
+                    if let Some(local) = self.mesh.local_node(*master) {
+                        heat.add_friction(local, other * power * share(*s) / sum);
+                    }
+                }
+            });
+        }
+    }
+
+    fn add_heat_of_viscosity(&self, nodal: Nodal<'_>, heat: &mut Heat<D>) {
+        let is_viscous = |effect: &dyn Effect<D, S>| {
+            matches!(effect.term(), Term::Viscosity(_)) || effect.phases(self.evaluation).is_viscous
+        };
+        let called = Called::filter(&self.effects, is_viscous);
+        if called.is_empty() {
+            return;
+        }
+        let needs = Needs { strain_rate: true, ..Needs::default() };
+        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            let effects = called.select(&self.effects);
+            effects.for_each(|effect| effect.add_stress(self.evaluation, self.step, batch));
+            for lane in 0..batch.count {
+                let density = dot(&batch.stress.lane(lane), &batch.strain_rate.lane(lane));
+                heat.add_viscosity(&self.mesh, batch.first_cell + lane, batch.cells.volume[lane] * density);
+            }
+        });
     }
 
     /// Energies of this rank's cells, contacts and surface after a committed step, and its largest stress and strain.
@@ -773,7 +841,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     pub fn strain(&self, state: &State) -> Result<Vec<Mandel<S>>> {
         let mut out = vec![[0.0; S]; self.mesh.cell_count()];
         let shares = self.point_shares();
-        let needs = Needs { strain: true, ..Needs::default() };
+        let needs = Needs { strain: true, whole_strain: true, ..Needs::default() };
         let counted = state.counted_displacement()?;
         with_nodal(state, |nodal| {
             let nodal = Nodal { displacement: &counted, previous_displacement: &counted, ..nodal };
@@ -834,6 +902,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.surface_effects.iter_mut().for_each(|effect| effect.visit_histories(visit));
         self.contacts.iter_mut().for_each(|contact| contact.visit_histories(visit));
         visit(&mut self.elastic_support);
+        if let Some(heat) = &mut self.heat {
+            heat.visit_histories(visit);
+        }
     }
 
     /// The converged histories of cells, as means over their points.
@@ -861,7 +932,45 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// The histories of nodes, likewise.
     pub fn all_node_histories(&self) -> impl Iterator<Item = History<'_>> {
         let stores = self.surface_stores().chain([&self.elastic_support as &dyn HistoryStore]);
+        let stores = stores.chain(self.heat.iter().flat_map(Heat::histories));
         one_for_each_quantity(stores.flat_map(both))
+    }
+
+    /// Makes what the ranks know of each other's histories that of the restored ones. Collective.
+    pub fn refresh_histories(&mut self) -> Result<()> {
+        self.heat.as_mut().map_or(Ok(()), Heat::refresh)?;
+        self.strain_by_temperature();
+        Ok(())
+    }
+
+    /// Lets cells expand at the start of a step to their strain at the temperature of this time; gives the work in J on their stresses, of
+    /// this rank.
+    pub fn expand(&mut self, state: &State) -> Result<f64> {
+        if !self.heat.as_ref().is_some_and(Heat::has_changed) {
+            return Ok(0.0);
+        }
+        let rest = Step { time: state.time, ..Step::default() };
+        let (before, _) = self.energy_beside(state, rest)?;
+        self.heat.iter_mut().for_each(Heat::expand);
+        self.strain_by_temperature();
+        let (after, _) = self.energy_beside(state, rest)?;
+        Ok(after[ELASTIC] - before[ELASTIC])
+    }
+
+    /// Gives cells their thermal strain, and laws of flow the temperature, both where some material has such a thing.
+    pub fn strain_by_temperature(&mut self) {
+        let Some(heat) = self.heat.as_ref().filter(|heat| heat.expands()) else { return };
+        let (mesh, points) = (&self.mesh, self.geometry.points());
+        let centre = [1.0 / (D + 1) as f64; 4];
+        let place = |point: usize| if points == 1 { &centre } else { &cell_rule::<D>()[point].0 };
+        if heat.strains() {
+            self.geometry.set_free_strains(|material, cell, point| {
+                heat.strain_at(mesh, (material, cell), place(point))
+            });
+        }
+        if heat.is_seen_by_flow() {
+            self.geometry.set_temperatures(|_, cell, point| heat.strained_at(mesh, cell, place(point)));
+        }
     }
 
     /// Restores the saved values of a quantity.
@@ -904,6 +1013,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
             names.push("friction");
         }
         names.extend(self.surface_effects.iter().map(|e| e.name()));
+        if self.heat.is_some() {
+            names.push("heat");
+        }
         names
     }
 

@@ -17,6 +17,11 @@ impl Job {
         std::iter::once(("material".to_owned(), &self.material)).chain(regions)
     }
 
+    /// Whether its materials have heat.
+    pub fn has_heat(&self) -> bool {
+        self.materials().any(|(_, material)| material.heat.is_some())
+    }
+
     /// The material of the cells of a region of the mesh.
     pub fn material_of(&self, region: &str) -> &Material {
         self.region.iter().find(|named| named.name == region).map_or(&self.material, |named| &named.material)
@@ -33,6 +38,7 @@ pub(super) fn check(job: &Job, table: &mut Table<'_>) {
     check_claims(job, table);
     table.each("traction", &job.traction, |traction, table| traction.check(table));
     check_density_and_elasticity(job, table);
+    check_heat(job, table);
     if let Some(initial) = &job.initial {
         initial.check(&mut table.table("initial"));
     }
@@ -71,6 +77,7 @@ pub(super) fn check_names(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>)
     check_regions(job, table, mesh);
     table.each("support", &job.support, |support, table| support.check_names(table, mesh));
     table.each("traction", &job.traction, |traction, table| traction.check_names(table, mesh));
+    table.each("heat", &job.heat, |heat, table| heat.check_names(table, mesh));
     table.each("contact", &job.contact, |contact, table| check_contact_names(contact, table, mesh));
     table.each("body_force", &job.body_force, |force, table| {
         table.check_vector("value", &force.value, mesh.dimension);
@@ -250,6 +257,61 @@ fn check_formulas_of_strain(job: &Job, table: &mut Table<'_>, has_initial_stress
     }
 }
 
+/// Heat is in all materials or in none, and has an initial temperature; without it nothing else has to do with temperature.
+fn check_heat(job: &Job, table: &mut Table<'_>) {
+    table.each("heat", &job.heat, |heat, table| heat.check(table));
+    let has_heat = |material: &Material| material.heat.is_some();
+    let initial = job.initial.as_ref();
+    let temperature = initial.and_then(|initial| initial.temperature.as_ref());
+    let flows = job.materials().filter(|(_, material)| {
+        !has_heat(material) && material.viscoplasticity.as_ref().is_some_and(|law| law.sees_temperature())
+    });
+    for (path, _) in flows {
+        let message = "the rate contains the temperature, which this material does not have";
+        let help =
+            format!("add {}, or delete `temperature` from the formula", header(&format!("{path}.heat")));
+        table.fault(&format!("{path}.viscoplasticity.expression.rate"), message, help);
+    }
+    for (number, contact) in job.contact.iter().enumerate().filter(|_| !job.has_heat()) {
+        let friction = contact.friction.as_ref().filter(|law| law.sees_temperature());
+        if let Some(law) = friction {
+            let message = "the coefficient contains the temperature, which this body does not have";
+            let help = "add [material.heat], or delete `temperature` from the formula";
+            table.fault(&format!("contact.{number}.{}", law.table()), message, help);
+        }
+        if contact.friction_heat.is_some() {
+            let message = "a share of the heat of friction requires a material with heat";
+            table.fault_at_key(
+                &format!("contact.{number}.friction_heat"),
+                message,
+                "add [material.heat], or delete it",
+            );
+        }
+    }
+    if !job.has_heat() {
+        let help = "add [material.heat], or delete it";
+        if !job.heat.is_empty() {
+            table.fault_at_key("heat", "heat at a boundary requires a material with heat", help);
+        }
+        if temperature.is_some() {
+            let message = "an initial temperature requires a material with heat";
+            table.fault_at_key("initial.temperature", message, help);
+        }
+        return;
+    }
+    let without = job.materials().filter(|(_, material)| material.resists() && !has_heat(material));
+    for (path, _) in without {
+        let message = format!("{} has no heat, which other materials have", header(&path));
+        let help =
+            format!("add {}: the temperature is a field of the whole body", header(&format!("{path}.heat")));
+        table.fault(&path, message, help);
+    }
+    if temperature.is_none() && initial.is_none_or(|initial| initial.from.is_none()) {
+        let key = if initial.is_some() { "initial" } else { "material.heat" };
+        table.fault(key, "a body with heat has no initial temperature", "add [initial] temperature = 293.0");
+    }
+}
+
 /// PETSc's solver for variational inequalities supports bounds only.
 fn check_method(job: &Job, table: &mut Table<'_>) {
     let has_bounds =
@@ -319,6 +381,7 @@ fn check_expected(job: &Job, table: &mut Table<'_>) {
 fn warn_of_inner_facets(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>) {
     let lists = job.support.iter().map(|support| &support.on);
     let lists = lists.chain(job.traction.iter().map(|traction| &traction.on));
+    let lists = lists.chain(job.heat.iter().map(|heat| &heat.on));
     let lists = lists.chain(job.contact.iter().map(|contact| &contact.on));
     let profiles = job.output.profile.iter().map(|profile| &profile.on);
     let named: Vec<&String> = lists.flatten().chain(profiles).collect();

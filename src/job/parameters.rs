@@ -12,7 +12,7 @@ const MOST: usize = 1000;
 /// Largest number of parameters that a message lists.
 const LISTED: usize = 20;
 /// Names that no parameter may have, beside those of expressions.
-const RESERVED: [&str; 6] = ["d", "g", "l", "p", "q", "v"];
+const RESERVED: [&str; 7] = ["d", "g", "l", "p", "q", "temperature", "v"];
 /// The largest number below which all whole numbers are exact.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 

@@ -145,6 +145,12 @@ impl<const D: usize> Mesh<D> {
         global as usize - self.first_node
     }
 
+    /// Local number of a node of this rank or a ghost, given its global number.
+    pub fn local_node(&self, global: u32) -> Option<usize> {
+        let own = (global as usize).checked_sub(self.first_node).filter(|node| *node < self.owned);
+        own.or_else(|| Some(self.owned + self.ghosts.binary_search(&global).ok()?))
+    }
+
     /// The rank that owns a node, given its global number.
     pub fn owner(&self, global: u32) -> usize {
         self.node_starts.partition_point(|&start| start <= global as usize) - 1

@@ -48,6 +48,11 @@ pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) ->
         let [inside, all] = on_axis(session, mesh, &part);
         session.agree(refusal(loaded, &format!("traction.{number}.on"), inside > 0 && inside == all))?;
     }
+    for (number, heat) in job.heat.iter().enumerate() {
+        let part = part_of(session, mesh, ("heat", &heat.on), heat.part.as_ref())?;
+        let [inside, all] = on_axis(session, mesh, &part);
+        session.agree(refusal(loaded, &format!("heat.{number}.on"), inside > 0 && inside == all))?;
+    }
     let gives_way =
         |support: &Support| support.stiffness.is_some() || support.damping.is_some() || support.absorbing;
     for (number, support) in job.support.iter().enumerate().filter(|(_, support)| gives_way(support)) {

@@ -10,8 +10,8 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, LoadedObstacle, Moment,
-            Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
+            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Heat, Load, LoadedObstacle,
+            Moment, Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
             surface_effects,
         },
         pairs::{Pair, PairedNode, nodes_of},
@@ -73,13 +73,18 @@ pub(super) fn body<const D: usize, const S: usize>(
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
     let mut body = Body::new(mesh, geometry, effects, held, evaluation(job.time.scheme));
-    body.material_tables = materials.tables;
+    body.material_tables.clone_from(&materials.tables);
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
     (body.support_motion, body.elastic_support) = (motion, elastic_support);
     if pairs.iter().any(|pair| pair.slides) {
         body.paired_displacement = Some(state.displacement.like()?);
     }
     (body.coupling, body.pairs) = (coupling, pairs);
+    if job.has_heat() {
+        let of_cell = |cell: usize| body.geometry.cell_at(cell).material();
+        body.heat = Some(heat(session, job, &body.mesh, (&materials.all, of_cell))?);
+        body.strain_by_temperature();
+    }
     if body.paired_displacement.is_some() {
         // As a restart does.
         body.form_pairs(session, &state.displacement)?;
@@ -122,6 +127,10 @@ fn contacts<const D: usize>(
         let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
         laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
         laws.wear = contact.wear;
+        laws.shares_of_heat = contact.shares_of_heat();
+        if pairs.iter().any(|pair| pair.contact == number && pair.exchange.is_some()) {
+            laws.shares_of_heat.reverse();
+        }
         if let Some(friction) = &contact.friction {
             session.agree(laws.add_friction(friction.clone(), mesh, held))?;
         }
@@ -354,6 +363,31 @@ fn load<const D: usize>(
     });
     let tractions = job.traction.iter().map(traction).collect::<Result<_, Agreed>>()?;
     Ok(Load { tractions, body_forces: job.body_force.clone(), gravity })
+}
+
+/// The temperature of a job at its start, and what passes heat at its boundary. Collective.
+fn heat<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    (materials, material_of): (&[Material<f64>], impl Fn(usize) -> usize),
+) -> Result<Heat<D>> {
+    let mut heat = session.agree(Heat::new(mesh, materials, material_of))?;
+    for given in &job.heat {
+        let facets = part_of(session, mesh, ("heat", &given.on), given.part.as_ref())?;
+        session.agree(heat.add_boundary(mesh, given.clone(), &facets))?;
+    }
+    if let Some(temperature) = job.initial.as_ref().and_then(|initial| initial.temperature.as_ref()) {
+        session.agree(heat.set(mesh, temperature))?;
+    }
+    session.agree(heat.refresh())?;
+    if job.time.scheme.states() > 1 {
+        heat.keep_powers();
+    }
+    if heat.strains() || heat.is_seen_by_flow() {
+        heat.expand();
+    }
+    Ok(heat)
 }
 
 /// Sets the initial values at owned nodes; held components keep the displacement and have no velocity.

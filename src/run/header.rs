@@ -92,7 +92,11 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         0 => String::new(),
         _ => format!("inclusion residual at most {:.1e}, ", summary.max_inclusion_residual),
     };
-    log.line(format!("checks     {inclusion}energy imbalance at most {:.1e}", summary.max_energy_imbalance));
+    let heat = summary.max_heat_imbalance.map_or(String::new(), |most| format!(", of heat {most:.1e}"));
+    log.line(format!(
+        "checks     {inclusion}energy imbalance at most {:.1e}{heat}",
+        summary.max_energy_imbalance
+    ));
     if summary.max_residual > job.solver.tolerance {
         log.line(format!(
             "residual   at most {:.1e} of the forces: rounding errors exceed the tolerance {:.0e}",

@@ -99,7 +99,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             resultants.open(&folder, step)?;
             probes.open(&folder, step)?;
             profiles.open(&folder, last_row)?;
-            History::open(&folder, step)
+            History::open(&folder, body.heat.is_some(), step)
         };
         let history = session.on_first(tables)?;
         let opened = if session.is_first() { extended(&folder) } else { Vec::new() };

@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Exit, Result},
     fem::{
         body::Body,
-        effect::{Moment, SUPPORT_REACTION},
+        effect::{Heat, Moment, STRAINED, SUPPORT_REACTION, TEMPERATURE},
         state::State,
     },
     io::output::{
@@ -156,6 +156,13 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         let here = session.agree(state.displacement.owned().map(|values| values.to_vec()))?;
         session.agree(checkpoint::count_from(&here, body, state))?;
     }
+    let is_cold = found.at_rest.iter().any(|name| name == TEMPERATURE.name(Moment::Last))
+        && initial.is_none_or(|initial| initial.temperature.is_none());
+    session.agree(if is_cold { Err(without_temperature(loaded, &file)) } else { Ok(()) })?;
+    if found.at_rest.iter().any(|name| name == STRAINED.name(Moment::Last)) {
+        body.heat.iter_mut().for_each(Heat::expand);
+        body.strain_by_temperature();
+    }
     found.at_rest.retain(|name| name != SUPPORT_REACTION.name(Moment::Last));
     let handover = take_over(session, &found.physics, body, state)?;
     let moved = moved_before(session, &found.physics, &body.mesh, &state.velocity)?;
@@ -188,6 +195,12 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         released => released,
     };
     Ok(Some(StartState { digest: found.digest, words, warning }))
+}
+
+fn without_temperature(loaded: &Loaded, file: &Path) -> Error {
+    let message =
+        format!("the state in {} has no temperature, which this body with heat has", file.display());
+    loaded.fault("initial.from", message, "add temperature = 293.0 beside `from`")
 }
 
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.

@@ -61,6 +61,12 @@ fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
         all.push(("a traction", format!("traction.{at}.value"), &traction.value));
         all.push(("a traction", format!("traction.{at}.pressure"), traction.pressure.as_slice()));
     }
+    for (at, heat) in job.heat.iter().enumerate() {
+        let expressions = heat.expressions();
+        all.extend(expressions.map(|(key, value)| {
+            ("heat at a boundary", format!("heat.{at}.{key}"), std::slice::from_ref(value))
+        }));
+    }
     for (at, force) in job.body_force.iter().enumerate() {
         all.push(("a body force", format!("body_force.{at}.value"), &force.value));
     }

@@ -87,6 +87,9 @@ pub struct Summary {
     pub max_residual: f64,
     /// Largest imbalance of energy in any step over the energy turned over.
     pub max_energy_imbalance: f64,
+    /// Largest imbalance of heat in any step over the heat turned over; present with heat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_heat_imbalance: Option<f64>,
     /// Energy that the time scheme has generated since time 0 over the energy that was supplied; 0 if it has dissipated energy.
     pub energy_of_scheme: f64,
     /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds; to be compared with

@@ -472,6 +472,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             max_inclusion_residual: totals.max_inclusion_residual,
             max_residual: totals.max_residual,
             max_energy_imbalance: totals.max_energy_imbalance,
+            max_heat_imbalance: body.heat.is_some().then_some(totals.max_heat_imbalance),
             energy_of_scheme: totals.energy_of_scheme(),
             max_slip_pressure: totals.max_slip_pressure,
             max_rate_share: totals.max_rate_share,

@@ -15,6 +15,7 @@ mod failures;
 mod formulas;
 mod friction;
 mod graded;
+mod heat;
 mod indicator;
 mod iterations;
 mod landings;

@@ -170,6 +170,26 @@ fn a_run_with_contact_memory_continues_to_the_last_bit_and_on_any_number_of_rank
     continue_on_other_ranks(remembering(), 2, &["memory_pressure"]);
 }
 
+/// A square with heat, through two of its boundaries.
+fn heated() -> Case {
+    let boundaries = "[{ on = ['left'], temperature = '300 + 5*sin(t)' }, \
+                      { on = ['top'], convection = { coefficient = '5 + t', ambient = 280 } }]";
+    saving()
+        .set("material.heat", "{ conductivity = 2, capacity = 3 }")
+        .set("initial.temperature", "'290 + x*y'")
+        .set("heat", boundaries)
+        .set("output.probe_also", "['temperature']")
+}
+
+#[test]
+fn a_run_with_heat_continues_to_the_last_bit_and_on_any_number_of_ranks() {
+    for ranks in [1, 2, 3] {
+        compare_with_straight(heated, ranks, "heat");
+    }
+    compare_with_straight(|| heated().set("mesh.order", "2"), 2, "heat of quadratic cells");
+    continue_on_other_ranks(heated(), 2, &["temperature"]);
+}
+
 #[test]
 fn a_restarted_run_with_an_obstacle_that_a_force_moves_is_the_straight_run_to_the_last_bit() {
     for scheme in ["'implicit_euler'", "'bdf2'", "'lagged_euler'", "'midpoint'"] {

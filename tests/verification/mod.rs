@@ -20,6 +20,7 @@ mod fast_flow;
 mod flowing_contact;
 mod free_bodies;
 mod half_models;
+mod heat;
 mod held_by_contact;
 mod inclusion;
 mod indefinite;

@@ -5,8 +5,8 @@ use crate::{
     fem::{
         coupling::{Coupling, add_between, seen_by_contacts},
         effect::{
-            Contact, ContactNode, Effect, Energy, Evaluation, Outcome, Step, SurfaceEffect, Tangents, Term,
-            contact_nodes,
+            Contact, ContactNode, Effect, Energy, Evaluation, Heat, Outcome, Step, SurfaceEffect, Tangents,
+            Term, VISCOPLASTIC, contact_nodes,
         },
         space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, nodal_forces, offsets},
     },
@@ -96,6 +96,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 effect.add_step_energy(evaluation, step, nodal, energy);
             }
         });
+        let mut of_flow = self.heat.as_mut().map(Heat::start_flow).unwrap_or_default();
         let (mut cells, _) = self.cells_and_contacts();
         let (called, needs) = cells.flowing();
         // Energies of damage need the stresses of the evaluation as well.
@@ -114,7 +115,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
             }
             let effects = cells.effects.iter();
             effects.for_each(|effect| effect.add_step_energy(evaluation, step, batch, energy));
+            if !of_flow.is_empty() {
+                cells.add_energy_of_flow(step, batch, &mut of_flow);
+            }
         });
+        if let Some(heat) = &mut self.heat {
+            // A step that is solved at its midpoint takes as much up in its second half.
+            let halves =
+                if matches!(evaluation, Evaluation::End(blend) if blend.extrapolates()) { 2.0 } else { 1.0 };
+            heat.finish_flow(of_flow, halves);
+        }
     }
 }
 
@@ -140,6 +150,22 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
         let needs = self.effects.iter().filter_map(|effect| effect.phases(self.evaluation).end);
         let called = Called::of(&*self.effects, self.evaluation, |p| p.end.is_some());
         (called, needs.reduce(Needs::or).unwrap_or_default())
+    }
+
+    /// Adds the energy in J that flow takes up in each cell of a batch in a solved step.
+    fn add_energy_of_flow(&self, step: Step, batch: &mut Batch<'_, D, S>, of_cells: &mut [f64]) {
+        let whole = batch.integrity.clone();
+        let flowing = self.effects.iter().filter(|effect| matches!(effect.term(), Term::Flow(_)));
+        for effect in flowing {
+            for lane in 0..batch.count {
+                batch.integrity = whole.clone();
+                batch.integrity.weaken(std::array::from_fn(|other| f64::from(u8::from(other == lane))));
+                let mut energy = Energy::default();
+                effect.add_step_energy(self.evaluation, step, batch, &mut energy);
+                of_cells[batch.first_cell + lane] += energy[VISCOPLASTIC];
+            }
+        }
+        batch.integrity = whole;
     }
 
     /// Lets the cells of a batch flow and be damaged at the end of a step.

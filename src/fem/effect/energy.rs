@@ -2,7 +2,7 @@
 
 use std::ops::{AddAssign, Index, IndexMut};
 
-/// The side of an energy in the balance of a step: `change of Stored + Dissipated = Work + Numerical`.
+/// The side of an energy in the balance of a step: `change of Stored + Dissipated = Work + Numerical`, and `HeatSpent = Heat`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Stored at the end of the step.
@@ -13,10 +13,24 @@ pub enum Role {
     Work,
     /// Terms of the time scheme in the step, known exactly. Files contain minus their sum: the numerical dissipation.
     Numerical,
+    /// Heat that the body has stored or lost in the step.
+    HeatSpent,
+    /// Heat that was released in the body or entered it in the step.
+    Heat,
+}
+
+impl Role {
+    /// Number of roles.
+    pub const COUNT: usize = 6;
+
+    /// Whether it is a side of the balance of heat.
+    pub const fn is_heat(self) -> bool {
+        matches!(self, Self::HeatSpent | Self::Heat)
+    }
 }
 
 /// Largest number of energies.
-const CAPACITY: usize = 16;
+const CAPACITY: usize = 24;
 
 /// The declaration of an energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -15,6 +15,7 @@ mod elastic_support;
 mod elasticity;
 mod energy;
 mod evolution;
+mod heat;
 mod history;
 mod inertia;
 mod initial_stress;
@@ -61,6 +62,10 @@ pub use damage::{DAMAGE, Damage};
 pub use elastic_support::{ElasticPoint, ElasticSupport, Resistances, SUPPORT_REACTION};
 pub use elasticity::{ELASTIC, Elasticity};
 pub use energy::{Energy, EnergyKind, NUMERICAL, Role};
+pub use heat::{
+    Conditions, ENTERED_HEAT, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT, STORED_HEAT, STRAINED, TEMPERATURE,
+    THERMAL_WORK,
+};
 pub use history::{History, HistoryStore};
 pub use inertia::{Inertia, KINETIC};
 pub use initial_stress::InitialStress;
@@ -80,6 +85,9 @@ pub use term::{ElasticLaw, ElasticTensor, FlowProperties, Form, Term};
 pub use viscoplastic_flow::{STRESS_OF_FLOW, VISCOPLASTIC, ViscoplasticFlow};
 pub use viscous_stress::{VISCOUS, ViscousStress};
 
+/// Number of energies before those of heat, which a run without heat does not write.
+pub const FIRST_OF_HEAT: usize = 14;
+
 /// All energies in the order of the columns of `history.csv`. New ones are added at the end.
 pub const ENERGIES: &[EnergyKind] = &[
     KINETIC,
@@ -96,6 +104,12 @@ pub const ENERGIES: &[EnergyKind] = &[
     OBSTACLE_KINETIC,
     OBSTACLE_WORK,
     OBSTACLE_NUMERICAL,
+    STORED_HEAT,
+    LOST_HEAT,
+    ENTERED_HEAT,
+    FRICTION_HEAT,
+    FLOW_HEAT,
+    THERMAL_WORK,
 ];
 
 const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at its declared position");

@@ -9,6 +9,8 @@ pub struct Outcome<'a> {
     pub fastest_flow: f64,
     /// Whether flow or damage changed the stress at the end of the step.
     pub has_flowed: bool,
+    /// Takes the energy in J that flow takes up in each cell in the step, where it is wanted.
+    pub flow: Option<&'a mut [f64]>,
     /// Takes the derivatives at the end of the step, where they are wanted.
     pub tangents: Option<&'a mut Tangents>,
 }

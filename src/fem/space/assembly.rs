@@ -189,7 +189,7 @@ pub fn assemble<const D: usize>(
     mut fill: impl FnMut(usize, Cell<'_, D>, &mut CellMatrix<D>),
 ) -> Result<BlockRows, Agreed> {
     let flags = held.flags();
-    let mut rows = LocalRows::pattern(mesh);
+    let mut rows = LocalRows::pattern(mesh, &mesh.midsides, D * D);
     let mut matrix = CellMatrix::new(mesh);
     let mut nodes = Vec::with_capacity(matrix.nodes());
     for (number, cell) in geometry.cells().enumerate() {
@@ -200,7 +200,7 @@ pub fn assemble<const D: usize>(
         held.restrict(&nodes, &mut matrix.blocks);
         for (a, &row) in nodes.iter().enumerate() {
             for (b, &column) in nodes.iter().enumerate() {
-                let target = rows.block::<D>(row, column);
+                let target = rows.block(row, column);
                 for i in 0..D {
                     for j in 0..D {
                         let (r, c) = (row as usize * D + i, column as usize * D + j);
@@ -215,23 +215,47 @@ pub fn assemble<const D: usize>(
     rows.merge(session, mesh)
 }
 
+/// Sums the matrices of a field of numbers at the corners of cells into the rows owned here; `fill` adds entries to that of a cell, given
+/// its local number. Nodes on edges have an empty row. Collective.
+pub fn assemble_numbers<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    fill: impl Fn(usize, &mut [[f64; 4]; 4]),
+) -> Result<BlockRows, Agreed> {
+    let mut rows = LocalRows::pattern(mesh, &[], 1);
+    for cell in 0..mesh.cell_count() {
+        let mut matrix = [[0.0; 4]; 4];
+        fill(cell, &mut matrix);
+        for (row, entries) in mesh.cell(cell).iter().zip(&matrix) {
+            for (column, entry) in mesh.cell(cell).iter().zip(entries) {
+                rows.block(*row, *column)[0] += entry;
+            }
+        }
+    }
+    rows.merge(session, mesh)
+}
+
 /// Block rows of all local nodes, owned and ghost, with local columns.
 struct LocalRows {
     offsets: Vec<usize>,
     columns: Vec<u32>,
     values: Vec<f64>,
+    /// Numbers of a block.
+    size: usize,
 }
 
 impl LocalRows {
-    fn pattern<const D: usize>(mesh: &Mesh<D>) -> Self {
+    /// The rows of the corners of cells and of these nodes on their edges: all of the mesh, or none, whose rows then have a diagonal entry
+    /// only.
+    fn pattern<const D: usize>(mesh: &Mesh<D>, midsides: &[u32], size: usize) -> Self {
         let mut starts = vec![0usize; mesh.nodes.len() + 1];
-        for &node in mesh.cells.iter().chain(&mesh.midsides) {
+        for &node in mesh.cells.iter().chain(midsides) {
             starts[node as usize + 1] += 1;
         }
         for node in 0..mesh.nodes.len() {
             starts[node + 1] += starts[node];
         }
-        let mut around = vec![0u32; mesh.cells.len() + mesh.midsides.len()];
+        let mut around = vec![0u32; mesh.cells.len() + midsides.len()];
         let mut next = starts.clone();
         let mut put = |nodes: &[u32], count: usize| {
             for (at, &node) in nodes.iter().enumerate() {
@@ -240,17 +264,22 @@ impl LocalRows {
             }
         };
         put(&mesh.cells, D + 1);
-        put(&mesh.midsides, D * (D + 1) / 2);
+        put(midsides, D * (D + 1) / 2);
         drop(next);
         let mut offsets = Vec::with_capacity(mesh.nodes.len() + 1);
         let mut columns = Vec::with_capacity(mesh.nodes.len() * (1 << (D + 1)));
         offsets.push(0);
         let mut row = Vec::new();
-        for range in starts.windows(2) {
+        for (node, range) in starts.windows(2).enumerate() {
             row.clear();
             for &cell in &around[range[0]..range[1]] {
                 row.extend_from_slice(mesh.cell(cell as usize));
-                row.extend_from_slice(mesh.cell_midsides(cell as usize));
+                if !midsides.is_empty() {
+                    row.extend_from_slice(mesh.cell_midsides(cell as usize));
+                }
+            }
+            if row.is_empty() {
+                row.push(node as u32);
             }
             row.sort_unstable();
             row.dedup();
@@ -258,20 +287,20 @@ impl LocalRows {
             offsets.push(columns.len());
         }
         columns.shrink_to_fit();
-        let values = vec![0.0; columns.len() * D * D];
-        Self { offsets, columns, values }
+        let values = vec![0.0; columns.len() * size];
+        Self { offsets, columns, values, size }
     }
 
     #[inline]
-    fn block<const D: usize>(&mut self, row: u32, column: u32) -> &mut [f64] {
+    fn block(&mut self, row: u32, column: u32) -> &mut [f64] {
         let range = self.offsets[row as usize]..self.offsets[row as usize + 1];
         let at = range.start + self.columns[range].partition_point(|&c| c < column);
-        &mut self.values[at * D * D..(at + 1) * D * D]
+        &mut self.values[at * self.size..(at + 1) * self.size]
     }
 
     /// Sends the rows of ghost nodes to their owners and merges what comes back into global rows.
     fn merge<const D: usize>(self, session: &Session, mesh: &Mesh<D>) -> Result<BlockRows, Agreed> {
-        let size = D * D;
+        let size = self.size;
         let mut pairs = vec![Vec::new(); session.ranks()];
         let mut blocks = vec![Vec::new(); session.ranks()];
         for ghost in mesh.owned..mesh.nodes.len() {

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     linear_algebra::{
         simd::{LANES, Pack, sum},
-        tensor::add_scaled,
+        tensor::{add_scaled, component},
     },
     mesh::Mesh,
 };
@@ -19,8 +19,10 @@ use multiversion::multiversion;
 /// The fields that a pass gathers for its effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Needs {
-    /// Strain of the displacement.
+    /// Strain of the displacement beyond that without stress.
     pub strain: bool,
+    /// Whether strains are whole ones, with that without stress.
+    pub whole_strain: bool,
     /// Strain of the displacement before the step.
     pub strain_before: bool,
     /// Strain of the velocity.
@@ -38,6 +40,7 @@ impl Needs {
     pub fn or(self, other: Self) -> Self {
         Self {
             strain: self.strain || other.strain,
+            whole_strain: self.whole_strain || other.whole_strain,
             strain_before: self.strain_before || other.strain_before,
             strain_rate: self.strain_rate || other.strain_rate,
             velocity: self.velocity || other.velocity,
@@ -112,7 +115,9 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     pub cells: &'g SimplexPack<D>,
     /// Hoop strains of unit displacements at the corners of the cells, in a body of revolution.
     hoop: Option<&'g Pack<3>>,
-    /// Strain of the displacement.
+    /// Temperatures in K of the cells at the start of the step, where laws depend on them.
+    pub temperature: Option<&'g [f64; LANES]>,
+    /// Strain of the displacement, as all strains beyond that without stress.
     pub strain: Pack<S>,
     /// Strain of the displacement before the step.
     pub strain_before: Pack<S>,
@@ -179,6 +184,7 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             shape: CellShape::Linear,
             cells: first,
             hoop: None,
+            temperature: None,
             strain: Pack::ABSENT,
             strain_before: Pack::ABSENT,
             strain_rate: Pack::ABSENT,
@@ -203,13 +209,29 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
                 batch.first_point = run.first * points + point * run.count;
                 batch.cells = geometry.pack(number, point);
                 batch.hoop = geometry.hoop(number, point);
+                batch.temperature = geometry.temperature(batch.number);
                 batch.integrity = Integrity::default();
                 if points == 1 {
                     gather(&mut batch, mesh, nodal, needs, geometry.packs.get(number + 1));
                 } else {
                     gather_at_point(&mut batch, mesh, nodal, needs);
                 }
+                if let Some(free) = geometry.free_strain(batch.number).filter(|_| !needs.whole_strain) {
+                    batch.subtract_free_strain(free, needs);
+                }
                 visit(&mut batch);
+            }
+        }
+    }
+
+    /// Leaves what strains are beyond those without stress, which are alike along all axes.
+    fn subtract_free_strain(&mut self, free: &[f64; LANES], needs: Needs) {
+        for (strain, _) in [(&mut self.strain, needs.strain), (&mut self.strain_before, needs.strain_before)]
+            .into_iter()
+            .filter(|(_, is_there)| *is_there)
+        {
+            for c in (0..S).filter(|c| component::<S>(*c).0 == component::<S>(*c).1) {
+                (0..LANES).for_each(|lane| strain.0[c][lane] -= free[lane]);
             }
         }
     }
@@ -427,6 +449,7 @@ mod tests {
 
     const ALL: Needs = Needs {
         strain: true,
+        whole_strain: false,
         strain_before: true,
         strain_rate: true,
         velocity: true,

@@ -146,6 +146,23 @@ impl<const D: usize> SimplexPack<D> {
     }
 }
 
+/// Writes a number for each cell, batch by batch.
+fn fill(
+    runs: &[CellRun],
+    points: usize,
+    batches: &mut Vec<[f64; LANES]>,
+    value: impl Fn(usize, usize, usize) -> f64,
+) {
+    batches.clear();
+    for run in runs {
+        for point in 0..points {
+            let mut of_batch = [0.0; LANES];
+            (0..run.count).for_each(|lane| of_batch[lane] = value(run.material, run.first + lane, point));
+            batches.push(of_batch);
+        }
+    }
+}
+
 /// The vectors `g_a` with `g_a . e_b = 1` if `a = b`, else 0.
 fn dual_basis<const D: usize>(edges: &[[f64; D]; D]) -> [[f64; D]; D] {
     let mut out = [[0.0; D]; D];
@@ -192,6 +209,10 @@ pub struct Geometry<const D: usize> {
     points: usize,
     /// Weights of the fine rule in each run; present where cells are curved or rings.
     fine_weights: Vec<[[f64; LANES]; MOST_POINTS]>,
+    /// The strains without stress for each batch; empty: none.
+    free_strains: Vec<[f64; LANES]>,
+    /// Temperatures in K for each batch; empty: no law depends on them.
+    temperatures: Vec<[f64; LANES]>,
 }
 
 /// What the integrals of products of shape functions of a pack of cells need.
@@ -319,7 +340,15 @@ impl<const D: usize> Geometry<D> {
                 if points == 1 { whole } else { Simplex { volume: share * whole.volume, ..whole } }
             };
             let packs = runs.iter().map(|run| pack_of(run, &simplex)).collect();
-            return Self { packs, runs, hoops: Vec::new(), points, fine_weights: Vec::new() };
+            return Self {
+                packs,
+                runs,
+                hoops: Vec::new(),
+                points,
+                fine_weights: Vec::new(),
+                free_strains: Vec::new(),
+                temperatures: Vec::new(),
+            };
         }
         let at = |cell: usize, place: &[f64; 4], weight: f64| {
             let nodes: Vec<Vector<D>> = mesh.cell_nodes(cell).map(|n| mesh.nodes[n as usize]).collect();
@@ -355,7 +384,7 @@ impl<const D: usize> Geometry<D> {
             }
             fine_weights.push(weights);
         }
-        Self { packs, runs, hoops, points, fine_weights }
+        Self { packs, runs, hoops, points, fine_weights, free_strains: Vec::new(), temperatures: Vec::new() }
     }
 
     /// Points in a cell, at which stresses live.
@@ -375,6 +404,31 @@ impl<const D: usize> Geometry<D> {
             + size_of_val(&self.runs[..])
             + size_of_val(&self.hoops[..])
             + size_of_val(&self.fine_weights[..])
+            + size_of_val(&self.free_strains[..])
+            + size_of_val(&self.temperatures[..])
+    }
+
+    /// Sets the strain that each cell has without stress, alike along all axes, given a cell's material, its local number and the number of
+    /// its point.
+    pub fn set_free_strains(&mut self, strain: impl Fn(usize, usize, usize) -> f64) {
+        fill(&self.runs, self.points, &mut self.free_strains, strain);
+    }
+
+    /// Sets the temperature in K of each cell, in the same way.
+    pub fn set_temperatures(&mut self, temperature: impl Fn(usize, usize, usize) -> f64) {
+        fill(&self.runs, self.points, &mut self.temperatures, temperature);
+    }
+
+    /// The temperatures in K of a batch, where laws depend on them.
+    #[inline(always)]
+    pub(super) fn temperature(&self, batch: usize) -> Option<&[f64; LANES]> {
+        self.temperatures.get(batch)
+    }
+
+    /// The strains without stress of a batch, if there are any.
+    #[inline(always)]
+    pub(super) fn free_strain(&self, batch: usize) -> Option<&[f64; LANES]> {
+        self.free_strains.get(batch)
     }
 
     /// The geometry of a run of cells at a point.

@@ -13,7 +13,7 @@ mod quadrature;
 pub mod samples;
 mod surface;
 
-pub use assembly::{CellMatrix, assemble};
+pub use assembly::{CellMatrix, assemble, assemble_numbers};
 pub use batch::{Batch, Inputs, Integrity, Needs, Nodal};
 pub use geometry::{Cell, CellRun, CellShape, Geometry, Simplex, SimplexPack};
 pub use held::{Held, Slanted};

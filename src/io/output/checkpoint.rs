@@ -258,6 +258,7 @@ pub fn restore<const D: usize, const S: usize>(
             body.restore_history(*quantity, *moment, values);
         }
     }
+    body.refresh_histories()?;
     let saved = [
         (&header.obstacles, &header.obstacle_resultants),
         (&header.obstacle_rotations, &header.obstacle_rotation_resultants),
@@ -355,6 +356,7 @@ pub fn transfer<const D: usize, const S: usize>(
             }
         }
     }
+    body.refresh_histories()?;
     let is_dropped = |name: &&String| !known.contains(&name.as_str()) && !name.starts_with("previous_");
     let mut dropped: Vec<String> = of_nodes.iter().chain(&of_cells).filter(is_dropped).cloned().collect();
     let has_stress =

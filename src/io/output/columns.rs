@@ -1,7 +1,7 @@
 //! The columns of the tables that a run writes, each declared once: their files, studies, `[check]` and reports read this list. Their
 //! meanings are in `docs/reference-outputs.md`, which a test compares with it.
 
-use crate::fem::effect::ENERGIES;
+use crate::fem::effect::{ENERGIES, FIRST_OF_HEAT};
 
 /// A column of numbers, or those of the components of a vector.
 #[derive(Debug, Clone, Copy)]
@@ -57,10 +57,10 @@ pub(crate) struct RunTable {
 /// Number of energies before the column of the imbalance in `history.csv`.
 pub(super) const BEFORE_IMBALANCE: usize = 6;
 
-const OF_ENERGIES: [Column; ENERGIES.len() + 1] = {
-    let mut columns = [Column::number("energy_imbalance", ""); ENERGIES.len() + 1];
+const OF_ENERGIES: [Column; FIRST_OF_HEAT + 1] = {
+    let mut columns = [Column::number("energy_imbalance", ""); FIRST_OF_HEAT + 1];
     let mut at = 0;
-    while at < ENERGIES.len() {
+    while at < FIRST_OF_HEAT {
         let place = if at < BEFORE_IMBALANCE { at } else { at + 1 };
         columns[place] = Column::number(ENERGIES[at].column, "J").in_plane("J/m");
         at += 1;
@@ -68,7 +68,17 @@ const OF_ENERGIES: [Column; ENERGIES.len() + 1] = {
     columns
 };
 
-/// One row per step.
+const OF_HEAT: [Column; ENERGIES.len() - FIRST_OF_HEAT + 1] = {
+    let mut columns = [Column::number("heat_imbalance", ""); ENERGIES.len() - FIRST_OF_HEAT + 1];
+    let mut at = FIRST_OF_HEAT;
+    while at < ENERGIES.len() {
+        columns[at - FIRST_OF_HEAT] = Column::number(ENERGIES[at].column, "J").in_plane("J/m");
+        at += 1;
+    }
+    columns
+};
+
+/// One row per step: steps, energies, with heat its balance.
 pub(crate) const HISTORY: RunTable = RunTable {
     file: "history.csv",
     word: "history",
@@ -84,6 +94,7 @@ pub(crate) const HISTORY: RunTable = RunTable {
             Column::number("inclusion_residual", ""),
         ],
         &OF_ENERGIES,
+        &OF_HEAT,
     ],
 };
 
@@ -134,6 +145,7 @@ pub(crate) const PROBES: RunTable = RunTable {
         &[Column::vector("sliding_velocity", "m/s")],
         &[Column::number("slip", "m")],
         &[Column::number("wear", "m")],
+        &[Column::number("temperature", "K")],
     ],
 };
 

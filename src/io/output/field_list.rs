@@ -63,6 +63,12 @@ fields! {
     /// See [`error_indicator`].
     ERROR_INDICATOR = error_indicator::FIELD,
         |at| error_indicator::compute(at)?;
+    /// Temperature at the nodes, linear along the edges of cells, of bodies with heat.
+    TEMPERATURE = OutputField::plain("temperature", Place::Node, Shape::Scalar, "K").with_picture("temperature", "temperature"),
+        |at| match &at.body.heat {
+            Some(heat) => Computed::of(heat.temperature_of_owned()),
+            None => return Ok(None),
+        };
     /// Contact traction at the nodes, where it is an unknown of steps.
     CONTACT_TRACTION = OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa"),
         |at| match further::contact_traction(at)? {

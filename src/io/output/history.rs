@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, Peaks, Role},
+    fem::effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, FIRST_OF_HEAT, Peaks, Role},
     linear_algebra::tensor::larger,
     solver::stepping::{StepLevel, StepOutcome},
 };
@@ -14,11 +14,19 @@ use serde::{Deserialize, Serialize};
 use std::{cmp::Ordering, path::Path};
 
 /// Energies in the order of the file.
-fn in_columns(totals: &Totals) -> [f64; ENERGIES.len() + 1] {
+fn in_columns(totals: &Totals) -> [f64; FIRST_OF_HEAT + 1] {
     std::array::from_fn(|at| match at.cmp(&BEFORE_IMBALANCE) {
         Ordering::Less => totals.energy[ENERGIES[at]],
         Ordering::Equal => totals.energy_imbalance,
         Ordering::Greater => totals.energy[ENERGIES[at - 1]],
+    })
+}
+
+/// Those of heat in the order of the file.
+fn heat_in_columns(totals: &Totals) -> [f64; ENERGIES.len() - FIRST_OF_HEAT + 1] {
+    std::array::from_fn(|at| match ENERGIES.get(FIRST_OF_HEAT + at) {
+        Some(kind) => totals.energy[*kind],
+        None => totals.heat_imbalance,
     })
 }
 
@@ -74,6 +82,10 @@ mod by_column {
     }
 }
 
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 /// Sums and maxima over the steps of a run; saved in checkpoints.
 ///
 /// Energies are in J (J/m in the plane).
@@ -88,6 +100,15 @@ pub struct Totals {
     pub supplied: f64,
     /// Largest of these energies, the scale of the imbalance.
     pub turnover: f64,
+    /// Largest of the energies of heat.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub heat_turnover: f64,
+    /// Imbalance of heat in the last step over its turnover.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub heat_imbalance: f64,
+    /// Largest of any step.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub max_heat_imbalance: f64,
     /// Imbalance of the last step over the turnover.
     pub energy_imbalance: f64,
     /// Largest imbalance of any step.
@@ -177,7 +198,7 @@ impl Totals {
     /// Adds a step.
     pub fn add(&mut self, outcome: &StepOutcome) {
         let energy = &outcome.energy;
-        let mut sides = [0.0; 4];
+        let mut sides = [0.0; Role::COUNT];
         for &kind in ENERGIES {
             let (role, now, total) = (kind.role, energy[kind], &mut self.energy[kind]);
             let side = &mut sides[role as usize];
@@ -187,17 +208,22 @@ impl Totals {
                     *side -= *total;
                     *total = now;
                 }
-                Role::Dissipated | Role::Work => *total += now,
+                Role::Dissipated | Role::Work | Role::HeatSpent | Role::Heat => *total += now,
                 Role::Numerical => *total -= now,
             }
-            if role != Role::Numerical {
+            if role.is_heat() {
+                self.heat_turnover = larger(self.heat_turnover, total.abs());
+            } else if role != Role::Numerical {
                 self.turnover = larger(self.turnover, total.abs());
             }
         }
-        let [stored, dissipated, work, numerical] = sides;
+        let [stored, dissipated, work, numerical, heat_spent, heat] = sides;
         let open = stored + dissipated - work - numerical;
         self.supplied += work.abs() + larger(-energy[CONTACT], 0.0);
-        self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
+        let share = |open: f64, turnover: f64| if turnover == 0.0 { 0.0 } else { open.abs() / turnover };
+        self.energy_imbalance = share(open, self.turnover);
+        self.heat_imbalance = share(heat_spent - heat, self.heat_turnover);
+        self.max_heat_imbalance = larger(self.max_heat_imbalance, self.heat_imbalance);
         self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
         self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
         self.max_residual = larger(self.max_residual, outcome.residual);
@@ -224,7 +250,9 @@ impl Totals {
     pub fn are_finite(&self) -> bool {
         let most = [
             self.turnover,
+            self.heat_turnover,
             self.max_energy_imbalance,
+            self.max_heat_imbalance,
             self.max_inclusion_residual,
             self.max_residual,
             self.peaks.von_mises,
@@ -252,15 +280,19 @@ fn of_scheme(energy: &Energy) -> f64 {
 
 /// The file, on rank 0.
 #[derive(Debug)]
-pub struct History(CsvFile);
+pub struct History {
+    file: CsvFile,
+    has_heat: bool,
+}
 
 impl History {
-    /// Creates the file, or continues it after this step.
-    pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
+    /// Creates the file, with columns of heat if there is any, or continues it after this step.
+    pub fn open(folder: &Path, has_heat: bool, goes_on_after: Option<u64>) -> Result<Self> {
         let path = folder.join(HISTORY.file);
         // All columns are the same in the plane and in space.
-        let header = HISTORY.header(3, &[true; 2]);
-        Ok(Self(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?))
+        let header = HISTORY.header(3, &[true, true, has_heat]);
+        let file = CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?;
+        Ok(Self { file, has_heat })
     }
 
     /// Writes the row of a step.
@@ -272,26 +304,29 @@ impl History {
         outcome: &StepOutcome,
         totals: &Totals,
     ) -> Result<()> {
-        self.0.row(format_args!(
-            "{step},{},{},{},{},{},{},{}",
+        let (comma, heat) = (if self.has_heat { "," } else { "" }, heat_in_columns(totals));
+        let heat = if self.has_heat { &heat[..] } else { &[] };
+        self.file.row(format_args!(
+            "{step},{},{},{},{},{},{},{}{comma}{}",
             Time(time),
             Number(length),
             outcome.newton_iterations,
             outcome.linear_iterations,
             outcome.active_changes,
             Number(outcome.inclusion_residual),
-            Numbers(&in_columns(totals))
+            Numbers(&in_columns(totals)),
+            Numbers(heat)
         ))
     }
 
     /// What the table that is continued lacks.
     pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
-        self.0.faults()
+        self.file.faults()
     }
 
     /// Flushes all rows to the file.
     pub fn flush(&mut self) -> Result<()> {
-        self.0.flush()
+        self.file.flush()
     }
 }
 
@@ -404,7 +439,7 @@ mod tests {
             "turnover": 9.0, "newton_iterations": 10, "pace": null }"#;
         let read: Totals = serde_json::from_str(older).expect("totals without damage and adhesion");
         let expected = [1.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        assert!(ENERGIES.iter().map(|&kind| read.energy[kind]).eq(expected), "{read:?}");
+        assert!(ENERGIES[..FIRST_OF_HEAT].iter().map(|&kind| read.energy[kind]).eq(expected), "{read:?}");
         assert_eq!((read.turnover, read.newton_iterations), (9.0, 10));
     }
 
@@ -419,7 +454,8 @@ mod tests {
             totals.add(&good);
             assert!(totals.are_finite());
             totals.add(&StepOutcome { energy, ..good });
-            assert!(!totals.are_finite() && !totals.max_energy_imbalance.is_finite(), "{energy:?}");
+            let most = [totals.max_energy_imbalance, totals.max_heat_imbalance];
+            assert!(!totals.are_finite() && !most.iter().all(|most| most.is_finite()), "{energy:?}");
             totals.add(&good);
             assert!(!totals.are_finite(), "{energy:?}");
         }

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Number of the quantities.
-const COUNT: usize = 14;
+const COUNT: usize = 15;
 
 /// The quantities, in the order of their columns in `probes.csv`, each with what it is made of.
 const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
@@ -43,6 +43,7 @@ const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
     (ProbedQuantity::SlidingVelocity, &[Source::Field(Position::SLIDING_VELOCITY)]),
     (ProbedQuantity::Slip, &[Source::OfNodes("slip", "a friction law that depends on the slip")]),
     (ProbedQuantity::Wear, &[Source::OfNodes("wear", "[contact.wear]")]),
+    (ProbedQuantity::Temperature, &[Source::Field(Position::TEMPERATURE)]),
 ];
 
 /// What a quantity is made of.
@@ -90,6 +91,7 @@ pub(crate) fn fault<const D: usize, const S: usize>(
                 let is_there = body.contacts.iter().any(|contact| !contact.needs_ghosts());
                 ("contact_traction", "a contact", is_there)
             }
+            Source::Field(Position::TEMPERATURE) => ("temperature", "[material.heat]", body.heat.is_some()),
             Source::Field(_) | Source::Acceleration => continue,
         };
         if !is_there {

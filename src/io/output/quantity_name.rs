@@ -43,7 +43,7 @@ impl<'a> TableQuantity<'a> {
 }
 
 /// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 24] = [
+const OF_SUMMARY: [&str; 25] = [
     "ranks",
     "dimension",
     "cells",
@@ -65,6 +65,7 @@ const OF_SUMMARY: [&str; 24] = [
     "max_inclusion_residual",
     "max_residual",
     "max_energy_imbalance",
+    "max_heat_imbalance",
     "max_slip_pressure",
     "max_rate_share",
     "peak_memory_bytes",
@@ -143,7 +144,7 @@ impl RunOf<'_> {
                 vec![true, has_gap, contacts.iter().any(|contact| contact.friction.is_some()), true]
             }
             "probe" => super::probed::groups(&self.job.output.probe_also),
-            _ => vec![true; 2],
+            _ => vec![true, true, self.job.has_heat()],
         }
     }
 

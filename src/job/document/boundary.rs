@@ -182,6 +182,11 @@ pub struct Initial {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("variables" = "x, y, z", "unit" = "m/s"), example = [0.0, 0.0])]
     pub velocity: Option<Vec<Scalar>>,
+    /// The temperature at time 0: a number, or an expression in the undeformed coordinates x, y, z; required with [material.heat]. With
+    /// `from` the temperature of that state takes its place, if it has one. Absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("variables" = "x, y, z", "unit" = "K"), example = 293.0)]
+    pub temperature: Option<Scalar>,
     /// The elastic stress at displacement zero of all materials with elasticity: the values at the centre of each linear cell, and at
     /// the three quadrature points (in 3D four) of each quadratic one. Viscoplastic flow relaxes it; with `from` the saved history of
     /// these materials takes its place. Absent: none.
@@ -390,6 +395,7 @@ impl Initial {
         for (key, vector) in self.vectors() {
             table.check_vector(key, vector, dimension);
         }
+        table.check_flat("temperature", self.temperature.as_ref(), dimension);
         let Some(InitialStress { xx, yy, zz, xy, yz, xz }) = &self.stress else { return };
         let absent: &[&str] = match (dimension, hypothesis) {
             (2, Some(Hypothesis::PlaneStress)) => &["zz", "yz", "xz"],

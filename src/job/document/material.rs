@@ -51,6 +51,9 @@ pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>,
     if material.is_damped_by_mass() && material.density.is_none() {
         table.fault("damping.mass", Damping::WITHOUT_DENSITY, format!("add {}", table.path("density")));
     }
+    let is_elastic = material.elasticity.is_some() || material.orthotropic.is_some();
+    let heat = material.heat.iter().flat_map(|heat| heat.faults([material.density.is_some(), is_elastic]));
+    heat.for_each(|fault| table.refuse(Some(fault.within("heat"))));
     let choice = material.viscosity.iter().flat_map(|law| law.faults_of_choice());
     choice.for_each(|fault| table.refuse(Some(fault.within("viscosity"))));
     table.refuse(material.constant().fault_of_flow());
@@ -64,6 +67,12 @@ fn check_elasticity_formula(material: &Material, table: &mut Table<'_>) {
         let formula = header(&table.path("elasticity.expression"));
         let message = format!("`{key}` requires linear elasticity, but {formula} is a formula of the strain");
         table.fault(key, message, format!("delete it, or {formula}"));
+    }
+    if material.heat.is_some_and(|heat| heat.expansion.is_some()) {
+        let formula = header(&table.path("elasticity.expression"));
+        let message =
+            format!("thermal strain requires linear elasticity, but {formula} is a formula of the strain");
+        table.fault("heat.expansion", message, format!("delete it and `reference`, or {formula}"));
     }
 }
 

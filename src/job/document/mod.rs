@@ -6,6 +6,7 @@
 
 mod boundary;
 mod contact;
+mod heat;
 mod material;
 mod mesh;
 mod output;
@@ -22,6 +23,7 @@ pub use boundary::{
     Traction,
 };
 pub(super) use contact::{check_contact, check_names as check_contact_names};
+pub use heat::{Convection, HeatBoundary};
 pub use material::Region;
 pub(super) use material::{check_in_body as check_material_in_body, check_material};
 pub use mesh::{
@@ -49,7 +51,7 @@ pub struct Job {
     /// Numbers with names, for example V = 0.05 and T = "2*pi/V". Wherever a key expects a number, it accepts an expression of them
     /// in quotes, such as end = "3*T" and cells = ["2*n", "n"]; expressions in t, x, y, z may contain them, too. A parameter may
     /// depend on others, in any order. A name is made of letters, digits and _ and does not start with a digit; the names of
-    /// functions, variables and constants are not available, and neither are d, g, l, p, q and v.
+    /// functions, variables and constants are not available, and neither are d, g, l, p, q, v and temperature.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Parameter>,
     /// The values that expressions of parameters give, as the job file has them.
@@ -74,6 +76,9 @@ pub struct Job {
     /// Gravity on all materials with a density. Absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<Gravity>,
+    /// Temperatures, heat fluxes and convection on boundaries; requires [material.heat]. No heat passes other boundaries.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub heat: Vec<HeatBoundary>,
     /// Boundaries that may touch an obstacle, and their contact laws.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contact: Vec<Contact>,

@@ -118,6 +118,8 @@ pub enum ProbedQuantity {
     Slip,
     /// The depth of wear in m.
     Wear,
+    /// The temperature in K.
+    Temperature,
 }
 
 /// The times of outputs.

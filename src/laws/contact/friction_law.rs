@@ -42,6 +42,8 @@ pub struct SlidingContext {
     pub time: f64,
     /// Undeformed place of the point in m; 0 where the body has no axis.
     pub place: [f64; 3],
+    /// Temperature of the body there at the start of the step in K; 0 in a body without heat.
+    pub temperature: f64,
     /// Whether the point faces nothing on which it could rub.
     pub is_bare: bool,
 }
@@ -56,6 +58,7 @@ impl SlidingContext {
         held: 0.0,
         time: 0.0,
         place: [0.0; 3],
+        temperature: 0.0,
         is_bare: false,
     };
 
@@ -129,6 +132,11 @@ pub trait FrictionBound {
     /// The coefficient at rest in time and place, for laws whose coefficient is a formula.
     fn in_time(&self) -> Option<Scalar> {
         None
+    }
+
+    /// Whether the bound depends on the temperature.
+    fn sees_temperature(&self) -> bool {
+        false
     }
 
     /// Whether the graph over the sliding velocity, per contact pressure, is the same at all points and times.
@@ -285,6 +293,7 @@ macro_rules! friction_laws {
                 steepest_decrease(at: SlidingContext) -> f64;
                 corner_velocity(at: SlidingContext) -> f64;
                 history() -> Option<FrictionHistory>;
+                sees_temperature() -> bool;
                 is_same_everywhere() -> bool;
                 in_time() -> Option<Scalar>;
                 context(histories: [f64; 2], blend: Blend) -> SlidingContext;

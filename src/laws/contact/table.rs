@@ -121,6 +121,11 @@ pub struct Contact {
     /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionLaw>,
+    /// Share of the heat of friction that enters the body, with [material.heat]; the rest enters the obstacle, or the body of `against`. No
+    /// heat is conducted from one body to the other. Absent: 1, between bodies 0.5.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0, max = 1), example = 0.5)]
+    pub friction_heat: Option<f64>,
     /// Wear: the body's surface recedes where it slides under pressure, so that the gap widens. The depth grows by `coefficient`
     /// times the contact pressure times the length of sliding relative to the obstacle (Archard's law); fields have it as `wear`.
     /// Requires a friction law and a normal law with a gap. Absent: no wear.
@@ -160,6 +165,14 @@ impl Contact {
             matches!(self.friction, None | Some(FrictionLaw::Tresca(_) | FrictionLaw::Coulomb(_)));
         let keeps_more = self.wear.is_some() || self.adhesion.is_some() || self.memory.is_some();
         is_constraint && has_bound && !keeps_more
+    }
+
+    /// The shares of the heat of friction that enter the body of `on` and, if there is one, that of `against`.
+    pub fn shares_of_heat(&self) -> [f64; 2] {
+        match (self.friction_heat, self.against.is_empty()) {
+            (share, true) => [share.unwrap_or(1.0), 0.0],
+            (share, false) => [share.unwrap_or(0.5), 1.0 - share.unwrap_or(0.5)],
+        }
     }
 
     /// The moment that turns the obstacle.

@@ -3,7 +3,7 @@
 use super::program::{Binary, Machine, Program, Table, Ternary, Unary, Variable, interpolate, points_before};
 
 /// The number of variables.
-pub(super) const COUNT: usize = Variable::G as usize + 1;
+pub(super) const COUNT: usize = Variable::Temperature as usize + 1;
 
 /// Values of the variables, in their order; 0 for those that have none.
 pub(super) type Arguments = [f64; COUNT];

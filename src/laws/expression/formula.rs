@@ -40,10 +40,10 @@ macro_rules! scopes {
 scopes! {
     /// Formulas of a normal velocity or a penetration.
     OfMotion: V D;
-    /// Formulas of a sliding velocity, a slip distance, a pressure, time and place.
-    OfSliding: V L P T X Y Z;
-    /// Formulas of the von Mises stress, the mean stress and the accumulated viscoplastic strain.
-    OfCreep: Q P E;
+    /// Formulas of a sliding velocity, a slip distance, a pressure, time, place and temperature.
+    OfSliding: V L P T X Y Z Temperature;
+    /// Formulas of the von Mises stress, the mean stress, the accumulated viscoplastic strain and the temperature.
+    OfCreep: Q P E Temperature;
     /// Formulas of the equivalent strain rate.
     OfRate: G;
     /// Formulas of the equivalent strain.

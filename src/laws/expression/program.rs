@@ -33,18 +33,32 @@ pub enum Variable {
     E,
     /// Equivalent strain rate in 1/s.
     G,
+    /// Temperature in K.
+    Temperature,
 }
 
 impl Variable {
     /// Those of expressions in time and place.
     pub const OF_TIME_AND_PLACE: &[Self] = &[Self::T, Self::X, Self::Y, Self::Z];
     /// All, in their order.
-    pub const ALL: &[Self] =
-        &[Self::T, Self::X, Self::Y, Self::Z, Self::V, Self::D, Self::L, Self::P, Self::Q, Self::E, Self::G];
+    pub const ALL: &[Self] = &[
+        Self::T,
+        Self::X,
+        Self::Y,
+        Self::Z,
+        Self::V,
+        Self::D,
+        Self::L,
+        Self::P,
+        Self::Q,
+        Self::E,
+        Self::G,
+        Self::Temperature,
+    ];
 
     /// Its name in expressions.
     pub fn name(self) -> &'static str {
-        ["t", "x", "y", "z", "v", "d", "l", "p", "q", "e", "g"][self as usize]
+        ["t", "x", "y", "z", "v", "d", "l", "p", "q", "e", "g", "temperature"][self as usize]
     }
 }
 

@@ -21,6 +21,11 @@ impl<T> ByMaterial<T> {
         self.0[material].as_ref()
     }
 
+    /// What follows from the law of each material, by its number; `None` without the law.
+    pub fn filter_map<U>(&self, of: impl Fn(&T) -> Option<U>) -> Vec<Option<U>> {
+        self.0.iter().map(|law| law.as_ref().and_then(&of)).collect()
+    }
+
     /// Whether every material has the law.
     pub fn is_everywhere(&self) -> bool {
         self.0.iter().all(Option::is_some)

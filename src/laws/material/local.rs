@@ -108,6 +108,7 @@ impl Material {
             damping: self.damping,
             orthotropic: self.orthotropic,
             damage: self.damage,
+            heat: self.heat,
         }
     }
 }
@@ -164,6 +165,7 @@ mod tests {
             damping: None,
             viscoplasticity: None,
             damage: None,
+            heat: None,
         }
     }
 

@@ -11,6 +11,7 @@ mod damping;
 mod elasticity;
 mod elasticity_formula;
 mod growth;
+mod heat;
 mod isotropic;
 mod local;
 mod orthotropic;
@@ -29,6 +30,7 @@ pub use damage::Damage;
 pub use damping::Damping;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
 pub use elasticity_formula::{ElasticityFormula, StrainElasticity};
+pub use heat::Heat;
 pub use isotropic::{Isotropic, LinearTensor};
 pub use local::Numbers;
 pub use orthotropic::Orthotropic;
@@ -75,6 +77,9 @@ pub struct Material<N = Scalar> {
     /// and never decreases. Absent: no damage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damage: Option<Damage>,
+    /// Heat, with the temperature as one more field; all materials of the body have it, or none. Absent: no temperature.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heat: Option<Heat>,
 }
 
 impl Material {
@@ -162,6 +167,7 @@ mod tests {
             damping: Some(Damping { mass, stiffness }),
             viscoplasticity: None,
             damage: None,
+            heat: None,
         }
     }
 

@@ -159,6 +159,27 @@ macro_rules! delegate {
     };
 }
 
+impl<N> Viscoplasticity<N> {
+    /// Whether the flow depends on the temperature.
+    pub fn sees_temperature(&self) -> bool {
+        matches!(self, Self::CreepFormula(law) if law.sees_temperature())
+    }
+}
+
+impl FlowLaw {
+    /// Whether the flow depends on the temperature.
+    pub fn sees_temperature(&self) -> bool {
+        matches!(self, Self::CreepFormula(law) if law.parameters.sees_temperature())
+    }
+
+    /// Sets the temperature in K at which a law that depends on it is evaluated.
+    pub fn set_temperature(&mut self, temperature: f64) {
+        if let Self::CreepFormula(law) = self {
+            law.set_temperature(temperature);
+        }
+    }
+}
+
 impl Flow for FlowLaw {
     delegate! {
         elasticity() -> &Isotropic;

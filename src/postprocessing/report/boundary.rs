@@ -529,6 +529,7 @@ mod tests {
             obstacle: None,
             obstacle_load: None,
             friction: None,
+            friction_heat: None,
             wear: None,
             adhesion: None,
             memory: None,

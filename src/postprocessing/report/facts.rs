@@ -30,10 +30,11 @@ const MEMBERS: [(&str, &str, &str); 13] = [
 ];
 
 /// Those after the figures of fields.
-const MORE_MEMBERS: [(&str, &str, &str); 15] = [
+const MORE_MEMBERS: [(&str, &str, &str); 16] = [
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_residual", "largest residual of the equations, as a share of the forces", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
+    ("max_heat_imbalance", "largest imbalance of heat", ""),
     ("max_slip_pressure", "largest contact pressure with weakening friction", "Pa"),
     ("max_rate_share", "largest strain or strain rate over the reference of its formula", ""),
     ("effects", "effects simulated", ""),

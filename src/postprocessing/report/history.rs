@@ -113,7 +113,7 @@ pub(super) fn resultants(table: &Table, [dimension, of_units]: [usize; 2]) -> Re
     Ok(out)
 }
 
-/// Energies, dissipations with work, and the error of their balance. `unit` is the unit of energies.
+/// Energies, dissipations with work, heat, and the error of their balance. `unit` is the unit of energies.
 pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
     let columns = |roles: &[Role]| -> Vec<&str> {
         ENERGIES.iter().filter(|kind| roles.contains(&kind.role)).map(|kind| kind.column).collect()
@@ -123,6 +123,7 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
     for (name, what, columns) in [
         ("energies", "energy", columns(&[Role::Stored])),
         ("dissipation", "work and dissipation since t = 0", spent),
+        ("heat", "heat since t = 0", columns(&[Role::HeatSpent, Role::Heat])),
     ] {
         draw(
             table,

@@ -47,6 +47,9 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     let (converged, start) = (state.displacement.local()?, start.local()?);
     let (converged, start) = (body.seen_by_contacts(&converged), body.seen_by_contacts(&start));
     for contact in &mut body.contacts {
+        if let Some(heat) = &body.heat {
+            contact.set_temperatures(heat.temperature());
+        }
         contact.prepare(step, blend, [&converged, &start])?;
     }
     restore_pressures(body, state)

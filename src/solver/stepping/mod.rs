@@ -17,6 +17,7 @@ mod flow;
 mod flow_corrections;
 mod force_scale;
 mod frames;
+mod heat;
 mod implicit;
 mod integrator;
 mod lagged_euler;

@@ -5,6 +5,7 @@ use super::{
     contacts::{commit_tractions, keep_closeness, prepare_contacts, refuse_passage},
     factor_cache::nearest_cached_length,
     force_scale::ForceScale,
+    heat::HeatStep,
     integrator::Integrator,
     lagged_euler::refuse_fast_flow,
     linear_solver::{Preconditioner, SolverSettings},
@@ -21,7 +22,8 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{
-            CONTACT, Contact, Energy, Form, Freedom, LoadedMotion, NUMERICAL, Role, Step, VISCOUS, WORK,
+            CONTACT, Contact, Energy, Form, Freedom, Heat, LoadedMotion, NUMERICAL, Role, Step, THERMAL_WORK,
+            VISCOUS, WORK,
         },
         resultants::BalancedMotion,
         state::State,
@@ -64,6 +66,10 @@ pub struct Stepper {
     right_hand_side: DistributedVector,
     moving_supports: Option<MovingSupports>,
     force_scale: ForceScale,
+    /// The temperature, of bodies with heat.
+    heat: Option<HeatStep>,
+    /// The work in J of thermal expansion at the start of the step, until it is accepted.
+    thermal_work: f64,
     trial: DistributedVector,
     /// The velocity of the converged state in the unknowns of a step, with contact between bodies.
     converged: Option<DistributedVector>,
@@ -137,6 +143,8 @@ impl Stepper {
             right_hand_side: state.velocity.like()?,
             moving_supports: MovingSupports::new(body, state)?,
             force_scale: ForceScale::new(body, &state.velocity)?,
+            heat: HeatStep::new(session, body)?,
+            thermal_work: 0.0,
             trial: state.velocity.like()?,
             converged: if body.coupling.is_some() { Some(state.velocity.like()?) } else { None },
             is_finished: false,
@@ -273,6 +281,10 @@ impl Stepper {
         let range = StepRange::of(self.scheme, step);
         self.attempted = Some(self.attempted.map_or(range, |attempted| attempted.or(range)));
         self.follow_sliding(session, body, state)?;
+        if body.heat.as_ref().is_some_and(Heat::expands) {
+            let work = session.agree(body.expand(state))?;
+            self.thermal_work += session.sum([work])[0];
+        }
         self.prepare_matrix(session, body, step)?;
         self.is_finished = false;
         let start = Instant::now();
@@ -441,6 +453,9 @@ impl Stepper {
         keep_closeness(body, state)?;
         body.commit();
         drop(stage);
+        if self.heat.is_some() {
+            session.agree(body.release_heat(state))?;
+        }
         let balancing = Instant::now();
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
@@ -466,6 +481,13 @@ impl Stepper {
         outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
         outcome.energy[NUMERICAL] += std::mem::take(&mut self.energy_of_pairing);
+        outcome.energy[THERMAL_WORK] += std::mem::take(&mut self.thermal_work);
+        if let Some(heat) = &mut self.heat {
+            let (solving, averages) = (Instant::now(), self.integrator.averages_powers());
+            outcome.energy +=
+                heat.advance(session, body, step, averages)?.map_values(|values| session.sum(values));
+            self.clock.solve += solving.elapsed();
+        }
         Ok(())
     }
 

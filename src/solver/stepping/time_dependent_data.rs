@@ -58,6 +58,9 @@ impl<const D: usize> TimeDependentData<D> {
         for value in body.support_motion.iter().flat_map(|motion| motion.expressions()) {
             add("a support", std::slice::from_ref(value), true);
         }
+        for value in body.heat.iter().flat_map(|heat| heat.expressions()) {
+            add("heat at a boundary", std::slice::from_ref(value), true);
+        }
         for contact in &body.contacts {
             let motions = contact.obstacle.iter().flat_map(|obstacle| obstacle.motions()).flatten();
             let forces = motions.map(|motion| motion.force());

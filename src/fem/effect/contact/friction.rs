@@ -147,8 +147,15 @@ impl<const D: usize> Friction<D> {
         let Self { law, points, .. } = self;
         self.context = SlidingContext { time, ..law.context(law.first_histories(), blend) };
         for point in points {
-            let place = point.context.place;
-            point.context = SlidingContext { time, place, ..law.context(point.history, blend) };
+            let SlidingContext { place, temperature, .. } = point.context;
+            point.context = SlidingContext { time, place, temperature, ..law.context(point.history, blend) };
+        }
+    }
+
+    /// Sets the temperatures of the points in K from those of the local nodes.
+    pub(super) fn set_temperatures(&mut self, temperatures: &[f64]) {
+        for point in &mut self.points {
+            point.context.temperature = temperatures[point.node()];
         }
     }
 
@@ -416,6 +423,13 @@ impl<const D: usize> Friction<D> {
     pub(super) fn power(&self, velocity: &[f64]) -> f64 {
         let sliding = self.sliding(Body, velocity);
         sliding.map(|(p, sliding)| p.weight * dot(&p.whole_traction(), &sliding)).sum()
+    }
+
+    /// Visits the powers in W that friction dissipates at the nodes of its points at these velocities.
+    pub(super) fn visit_powers(&self, velocity: &[f64], mut visit: impl FnMut(usize, f64)) {
+        for (point, sliding) in self.sliding(Body, velocity) {
+            visit(point.node(), point.weight * dot(&point.whole_traction(), &sliding));
+        }
     }
 
     /// Power in W of the obstacle's friction on the body, and of supports against friction, at these velocities.

@@ -104,6 +104,8 @@ pub struct Contact<const D: usize> {
     arms: Vec<Vector<D>>,
     /// Wear of the surface.
     pub wear: Option<Wear>,
+    /// The shares of the heat of friction that enter the body at its nodes and, if there is one, the other body.
+    pub shares_of_heat: [f64; 2],
     /// How near body and obstacle have come in the steps so far, on this rank.
     pub closeness: Closeness,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
@@ -191,6 +193,7 @@ impl<const D: usize> Contact<D> {
             follows: true,
             arms: Vec::new(),
             wear: None,
+            shares_of_heat: [1.0, 0.0],
             closeness: Closeness::default(),
             scale,
             rate: Rate::euler(0.0, 1.0),

@@ -19,6 +19,8 @@ use multiversion::multiversion;
 /// What advances the history of a batch.
 struct Advance<'a, const D: usize, const S: usize> {
     law: &'a FlowLaw,
+    /// Another copy of a law that depends on the temperature, with the temperatures in K of the cells.
+    warm: Option<(&'a mut FlowLaw, &'a [f64; LANES])>,
     step: Step,
     cells: &'a SimplexPack<D>,
     strain: &'a Pack<S>,
@@ -29,16 +31,16 @@ struct Advance<'a, const D: usize, const S: usize> {
     growths: &'a mut [f64; LANES],
 }
 
-/// Advances the history and adds it to the stress. Gives the energies that the flow takes up and that the scheme adds, and the
-/// largest overstress under power laws.
+/// Advances the history and adds it to the stress. Gives the energies that the flow takes up in each cell, and that the scheme adds, and
+/// the largest overstress under power laws.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn advance<const D: usize, const S: usize>(
     given: Advance<'_, D, S>,
     converged: &Pack<S>,
     trial: &mut Pack<S>,
     stress: &mut Pack<S>,
-) -> [f64; 3] {
-    let Advance { law, step, cells, strain, rate, integrity, accumulated, growths } = given;
+) -> ([f64; LANES], [f64; 2]) {
+    let Advance { law, warm, step, cells, strain, rate, integrity, accumulated, growths } = given;
     let elasticity = *law.elasticity();
     let lagged = Pack::from_lanes(|lane| {
         let strain = add_scaled(&strain.lane(lane), -step.previous_length, &rate.lane(lane));
@@ -53,10 +55,19 @@ fn advance<const D: usize, const S: usize>(
             overstress = overstress.max(law.overstress(&driving.lane(lane), accumulated[lane]));
         }
     }
-    let Some(flow) = law.rates(driving, accumulated, growths) else {
+    let flow = match warm {
+        None => law.rates(driving, accumulated, growths),
+        Some((law, temperatures)) => Some(Pack::from_lanes(|lane| {
+            law.set_temperature(temperatures[lane]);
+            let (rate, growth) = law.rate(&driving.lane(lane), accumulated[lane]);
+            growths[lane] = growth;
+            rate
+        })),
+    };
+    let Some(flow) = flow else {
         *trial = *converged;
         *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), share[lane], &converged.lane(lane)));
-        return [0.0, 0.0, overstress];
+        return ([0.0; LANES], [0.0, overstress]);
     };
     let [mut dissipated, mut numerical] = [[0.0; LANES]; 2];
     for lane in 0..LANES {
@@ -71,7 +82,7 @@ fn advance<const D: usize, const S: usize>(
         numerical[lane] =
             weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
     }
-    [sum(&dissipated), sum(&numerical), overstress]
+    (dissipated, [sum(&numerical), overstress])
 }
 
 impl<const S: usize> ViscoplasticFlow<S> {
@@ -86,8 +97,10 @@ impl<const S: usize> ViscoplasticFlow<S> {
         let Some((converged, trial)) = self.stress.both_mut(batch.number) else { return };
         let mut accumulated = self.accumulated.as_mut().and_then(|history| history.both_mut(batch.number));
         let mut growths = [0.0; LANES];
+        let warm = self.warm[batch.material].as_mut().zip(batch.temperature);
         let given = Advance {
             law,
+            warm,
             step,
             cells: batch.cells,
             strain: &batch.strain,
@@ -96,13 +109,17 @@ impl<const S: usize> ViscoplasticFlow<S> {
             accumulated: accumulated.as_ref().map_or(&[0.0; LANES], |(Pack([before]), _)| before),
             growths: &mut growths,
         };
-        let [dissipated, numerical, overstress] = advance(given, converged, trial, &mut batch.stress);
+        let (dissipated, [numerical, overstress]) = advance(given, converged, trial, &mut batch.stress);
         if let Some((Pack([before]), Pack([after]))) = &mut accumulated {
             for lane in 0..LANES {
                 after[lane] = before[lane] + step.length * growths[lane];
             }
         }
-        outcome.energy[VISCOPLASTIC] += dissipated;
+        outcome.energy[VISCOPLASTIC] += sum(&dissipated);
+        if let Some(flow) = &mut outcome.flow {
+            let cells = &mut flow[batch.first_cell..][..batch.count];
+            cells.iter_mut().zip(dissipated).for_each(|(sum, energy)| *sum += energy);
+        }
         outcome.energy[NUMERICAL] += numerical;
         if overstress > 0.0 {
             outcome.fastest_flow = outcome.fastest_flow.max(law.fastest_rate::<S>(overstress));

@@ -38,8 +38,16 @@ impl<const S: usize> ViscoplasticFlow<S> {
         }
         let (elastic, yielding) = elastic_stresses(law, &batch.strain, &converged, &before);
         let Blend { length, earlier, .. } = blend;
+        let mut warm = self.warm[batch.material].as_mut().zip(batch.temperature);
         for lane in (0..batch.count).filter(|&lane| yielding[lane]) {
             let (elastic, before) = (elastic.lane(lane), before[lane]);
+            let law = match &mut warm {
+                Some((law, temperatures)) => {
+                    law.set_temperature(temperatures[lane]);
+                    &**law
+                }
+                None => law,
+            };
             let change = if earlier == 0.0 { [0.0; S] } else { self.stress.last_change(batch.number, lane) };
             let mut tangent = [[0.0; S]; S];
             let wanted = outcome.tangents.is_some().then_some(&mut tangent);

@@ -22,6 +22,8 @@ pub const STRESS_OF_FLOW: Quantity = quantity!("viscoplastic_history");
 #[derive(Debug)]
 pub struct ViscoplasticFlow<const S: usize> {
     laws: ByMaterial<FlowLaw>,
+    /// For each material another copy of its law that depends on the temperature, which is evaluated cell by cell.
+    warm: Vec<Option<FlowLaw>>,
     properties: FlowProperties,
     stress: CellHistory<S>,
     accumulated: Option<CellHistory<1>>,
@@ -50,7 +52,8 @@ impl<const S: usize> ViscoplasticFlow<S> {
             has_power_law: laws.laws().any(FlowLaw::is_power_law),
             has_symmetric_tangent: laws.laws().all(FlowLaw::has_symmetric_tangent::<S>),
         };
-        Self { laws, properties, stress, accumulated }
+        let warm = laws.filter_map(|law| law.sees_temperature().then(|| law.clone()));
+        Self { laws, warm, properties, stress, accumulated }
     }
 }
 

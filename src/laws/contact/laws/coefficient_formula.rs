@@ -1,6 +1,7 @@
-//! A friction coefficient that is written in the job as a formula of sliding velocity, slip distance, pressure, time and place.
+//! A friction coefficient that is written in the job as a formula of sliding velocity, slip distance, pressure, time, place and
+//! temperature.
 //!
-//! The bound is `mu(v, l, p, t, x) p` with the positive part `p` of the contact pressure. The slip distance `l` at the end of a step of
+//! The bound is `mu(v, l, p, t, x, T) p` with the positive part `p` of the contact pressure. The slip distance `l` at the end of a step of
 //! length `k` is `l0 + k v`, as in [`DistanceWeakening`](super::DistanceWeakening), so that within a step it is a law of the sliding
 //! velocity. Its steepest decrease is bounded by enclosures of the derivatives of the formula for all values of its variables, and thus
 //! proven.
@@ -19,11 +20,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct CoefficientFormula {
     /// Friction coefficient as a formula of the sliding velocity v in m/s, the slip distance l of a point since the start of the run in m,
-    /// the contact pressure p in Pa, the time t in s and the undeformed coordinates x, y, z in m. It must not be negative for any v, l, p
-    /// and t from 0 on and any place, and not jump with v, l or p. A bound, the coefficient times p, that grows by much more than 1 Pa for
+    /// the contact pressure p in Pa, the time t in s, the undeformed coordinates x, y, z in m and, with [material.heat], the temperature of
+    /// the body at the start of a step in K. It must not be negative for any v, l, p, t and temperature from 0 on and any place, and not jump with v, l or p. A bound, the coefficient times p, that grows by much more than 1 Pa for
     /// each Pa from p = 0 on, such as 300/(p + 1e-3), makes steps fail where contact opens: for a constant bound use `tresca`. Where it
     /// contains l, field files and checkpoints contain the slip as `slip`.
-    #[schemars(example = &"0.3 + 0.2*exp(-v/0.1)")]
+    #[schemars(example = &"0.3 + 0.2*exp(-v/0.1)", example = &"0.4/(1 + max(temperature - 300, 0)/200)")]
     pub coefficient: Formula<OfSliding>,
     #[serde(skip)]
     facts: Derived<Facts>,
@@ -44,7 +45,7 @@ struct Facts {
 const ROUNDING: f64 = 1e-12;
 
 /// The ranges of the variables.
-fn ranges() -> [(Variable, Interval); 7] {
+fn ranges() -> [(Variable, Interval); 8] {
     let (from_zero, all) = (Interval::new(0.0, REACH), Interval::new(-REACH, REACH));
     [
         (Variable::V, from_zero),
@@ -54,6 +55,7 @@ fn ranges() -> [(Variable, Interval); 7] {
         (Variable::X, all),
         (Variable::Y, all),
         (Variable::Z, all),
+        (Variable::Temperature, from_zero),
     ]
 }
 
@@ -81,7 +83,7 @@ impl CoefficientFormula {
         })
     }
 
-    fn arguments(&self, speed: f64, pressure: f64, at: SlidingContext) -> [(Variable, f64); 7] {
+    fn arguments(&self, speed: f64, pressure: f64, at: SlidingContext) -> [(Variable, f64); 8] {
         let [x, y, z] = at.place;
         [
             (Variable::V, speed),
@@ -91,6 +93,7 @@ impl CoefficientFormula {
             (Variable::X, x),
             (Variable::Y, y),
             (Variable::Z, z),
+            (Variable::Temperature, at.temperature),
         ]
     }
 
@@ -140,7 +143,7 @@ impl CoefficientFormula {
                 let near = if place.is_empty() { String::new() } else { format!(" near {place}") };
                 Some([
                     format!("the coefficient may be negative{near}"),
-                    "for every v, l, p and t from 0 on and every place, also outside of the body, it must not be: write max(..., 0) around it, \
+                    "for every v, l, p, t and temperature from 0 on and every place, also outside of the body, it must not be: write max(..., 0) around it, \
                      and 1/(1 + v) in place of 1 - v/(1 + v)"
                         .into(),
                 ])
@@ -152,7 +155,7 @@ impl CoefficientFormula {
 
     fn explain(&self, unproven: Unproven) -> [String; 2] {
         let (Unproven::Undefined(place) | Unproven::Pieces(place)) = unproven;
-        let help = "for every v, l, p and t from 0 on and every place, also outside of the body, it must have one: bound the arguments of \
+        let help = "for every v, l, p, t and temperature from 0 on and every place, also outside of the body, it must have one: bound the arguments of \
                     roots, logarithms and powers, as in sqrt(max(x, 0)), and keep denominators away from 0";
         [format!("the coefficient has no value near {}", self.coefficient.at(&place)), help.into()]
     }
@@ -203,8 +206,20 @@ impl FrictionBound for CoefficientFormula {
         Some(self.coefficient.as_scalar())
     }
 
+    fn sees_temperature(&self) -> bool {
+        self.coefficient.uses(Variable::Temperature)
+    }
+
     fn is_same_everywhere(&self) -> bool {
-        let other = [Variable::L, Variable::P, Variable::T, Variable::X, Variable::Y, Variable::Z];
+        let other = [
+            Variable::L,
+            Variable::P,
+            Variable::T,
+            Variable::X,
+            Variable::Y,
+            Variable::Z,
+            Variable::Temperature,
+        ];
         !other.iter().any(|variable| self.coefficient.uses(*variable))
     }
 
@@ -309,6 +324,19 @@ mod tests {
         assert!((found.traction - bound(10.0)).abs() < 1e-12, "{found:?}");
         let by_pressure = (bound(10.0 + 1e-5) - bound(10.0 - 1e-5)) / 2e-5;
         assert!((found.coefficient - by_pressure).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn a_coefficient_fades_with_the_temperature() {
+        let law = written("0.4/(1 + max(temperature - 300, 0)/200)");
+        assert!(law.own_faults().is_empty() && law.sees_temperature() && !law.is_same_everywhere());
+        for (temperature, coefficient) in [(250.0, 0.4), (500.0, 0.2), (900.0, 0.1)] {
+            let at = SlidingContext { temperature, ..SlidingContext::default() };
+            assert!((law.bound(0.3, 10.0, at) - 10.0 * coefficient).abs() < 1e-14);
+        }
+        assert!(!written("0.3").sees_temperature());
+        let negative = written("0.4 - temperature/1000").own_faults();
+        assert!(negative[0].message.contains("may be negative near temperature = "), "{negative:?}");
     }
 
     #[test]

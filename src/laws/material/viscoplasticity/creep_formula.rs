@@ -32,14 +32,18 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct CreepFormula {
     /// Rate of the equivalent creep strain as a formula of the von Mises norm q of the stress in Pa, the mean stress p in Pa, positive in
-    /// tension, and the equivalent creep strain e. It is zero at q = 0, must not decrease with q nor increase with e, and must not jump.
-    /// In plane stress it must not depend on p.
-    #[schemars(extend("unit" = "1/s"), example = &"1e-3*sinh(q/20e6)^4")]
+    /// tension, the equivalent creep strain e and, with [material.heat], the temperature at the start of a step in K. It is zero at q = 0,
+    /// must not decrease with q nor increase with e, and must not jump with them, at any temperature from 0 on. In plane stress it must not
+    /// depend on p.
+    #[schemars(extend("unit" = "1/s"), example = &"1e-3*sinh(q/20e6)^4", example = &"1e9*(q/20e6)^4*exp(-24e3/max(temperature, 1))")]
     pub rate: Formula<OfCreep>,
     /// Von Mises norm of the stress, and size of a mean stress that the rate contains, up to which explicit_step_bound holds with scheme
     /// lagged_euler; implicit schemes do not use it.
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 5e7)]
     pub reference_stress: f64,
+    /// The temperature in K at which the law is evaluated.
+    #[serde(skip)]
+    temperature: f64,
     #[serde(skip)]
     bounds: Derived<Vec<Derived<[f64; 3]>>>,
 }
@@ -91,6 +95,7 @@ impl CreepFormula {
             (Variable::Q, Interval::new(0.0, high)),
             (Variable::P, Interval::new(-high, high)),
             (Variable::E, Interval::new(0.0, REACH)),
+            (Variable::Temperature, Interval::new(0.0, REACH)),
         ];
         let sup = |by, sign: f64| {
             let of = move |known: &Enclosure| if sign > 0.0 { known.slope } else { -known.slope };
@@ -107,8 +112,10 @@ impl CreepFormula {
     fn first_fault(&self) -> Option<[String; 2]> {
         let from_zero = Interval::new(0.0, REACH);
         let mean = (Variable::P, Interval::new(-REACH, REACH));
+        let [strain, temperature] =
+            [Variable::E, Variable::Temperature].map(|variable| (variable, from_zero));
         let (all, unloaded) =
-            ([(Variable::Q, from_zero), mean, (Variable::E, from_zero)], [mean, (Variable::E, from_zero)]);
+            ([(Variable::Q, from_zero), mean, strain, temperature], [mean, strain, temperature]);
         for variable in [Variable::Q, Variable::P, Variable::E] {
             let name = variable.name();
             if self.rate.jumps_along(variable) {
@@ -152,7 +159,7 @@ impl CreepFormula {
                 }
                 Ok(_) => {}
                 Err(Unproven::Undefined(place) | Unproven::Pieces(place)) => {
-                    let help = "it must have one for every p, and every q and e from 0 on; e is the creep strain, Euler's number is exp(1)";
+                    let help = "it must have one for every p, and every q, e and temperature from 0 on; e is the creep strain, Euler's number is exp(1)";
                     return Some([
                         format!("the rate has no value near {}", self.rate.at(&place)),
                         help.into(),
@@ -165,18 +172,35 @@ impl CreepFormula {
 
     /// Rate in 1/s, and its derivatives by the von Mises norm, the mean stress and the accumulated strain.
     fn at(&self, norm: f64, [mean, accumulated]: [f64; 2]) -> [f64; 4] {
-        let at = arguments(norm, [mean, accumulated]);
+        let at = self.arguments(norm, [mean, accumulated]);
         let [rate, by_norm] = self.rate.differentiate(&at, Variable::Q);
         let by = |variable| {
             if self.rate.uses(variable) { self.rate.differentiate(&at, variable)[1] } else { 0.0 }
         };
         [rate, by_norm, by(Variable::P), by(Variable::E)]
     }
+
+    /// The arguments of a rate: von Mises norm, mean stress and accumulated strain, and the temperature.
+    fn arguments(&self, norm: f64, [mean, accumulated]: [f64; 2]) -> [(Variable, f64); 4] {
+        [
+            (Variable::Q, norm),
+            (Variable::P, mean),
+            (Variable::E, accumulated),
+            (Variable::Temperature, self.temperature),
+        ]
+    }
+
+    /// Whether the rate depends on the temperature.
+    pub fn sees_temperature(&self) -> bool {
+        self.rate.uses(Variable::Temperature)
+    }
 }
 
-/// The arguments of a rate: von Mises norm, mean stress and accumulated strain.
-fn arguments(norm: f64, [mean, accumulated]: [f64; 2]) -> [(Variable, f64); 3] {
-    [(Variable::Q, norm), (Variable::P, mean), (Variable::E, accumulated)]
+impl Elastic<CreepFormula> {
+    /// Sets the temperature in K at which the law is evaluated.
+    pub fn set_temperature(&mut self, temperature: f64) {
+        self.parameters.temperature = temperature;
+    }
 }
 
 /// The mean of the three normal stresses.
@@ -229,7 +253,7 @@ impl Flow for Elastic<CreepFormula> {
 
     fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
         let mean = mean_of(s);
-        let rate = |norm| self.parameters.rate.value(&arguments(norm, [mean, accumulated]));
+        let rate = |norm| self.parameters.rate.value(&self.parameters.arguments(norm, [mean, accumulated]));
         rate_along_deviator(s, rate)
     }
 
@@ -309,7 +333,7 @@ mod tests {
 
     fn written(rate: &str) -> CreepFormula {
         let rate = Formula::parse(rate).expect("a formula");
-        CreepFormula { rate, reference_stress: 10.0, bounds: Derived::default() }
+        CreepFormula { rate, reference_stress: 10.0, temperature: 0.0, bounds: Derived::default() }
     }
 
     fn check<const S: usize>(hypothesis: Hypothesis) {
@@ -443,6 +467,24 @@ mod tests {
         }
         check::<4>(Hypothesis::PlaneStrain, [30.0, -12.0, 9.0, 21.0]);
         check::<6>(Hypothesis::Space, [30.0, -12.0, 9.0, 21.0, -6.0, 15.0]);
+    }
+
+    #[test]
+    fn creep_is_as_fast_as_the_temperature_has_it() {
+        let formula = written("1e-3*(q/20)^2*max(temperature - 300, 0)/100");
+        assert!(formula.fault().is_none() && formula.sees_temperature() && !written("q").sees_temperature());
+        let mut law = formula.prepare(&BODY, Hypothesis::Space);
+        for (temperature, factor) in [(250.0, 0.0), (400.0, 1.0), (500.0, 2.0)] {
+            law.set_temperature(temperature);
+            let (_, rate) = law.rate(&[60.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0);
+            assert!((rate - 9e-3 * factor).abs() < 1e-15, "{rate}");
+            let end = law.flow_to_end(&[60.0, 0.0, 0.0, 0.0, 0.0, 0.0], 2.0, 0.0, None);
+            let growth = end.map_or(0.0, |(_, growth)| growth);
+            let q = 60.0 - 1200.0 * growth;
+            assert!((growth - 2e-3 * factor * (q / 20.0).powi(2)).abs() < 1e-13, "{growth}");
+        }
+        let fault = written("1e-3*q + 1e-9*temperature").fault().expect("refused");
+        assert!(fault.message.contains("not zero without stress near q = 0, temperature = "), "{fault:?}");
     }
 
     #[test]

@@ -1,0 +1,622 @@
+//! Heat: the temperature of a body, its capacity and conduction, and what passes heat at its boundary.
+//!
+//! The temperature is linear in cells, with its values at their corners, also where displacements are quadratic. With the capacity `C`,
+//! lumped at the corners, the conduction `K` and the convection `H` of the boundary,
+//!
+//! ```text
+//! (C / k + K + H) (T_n - T_{n-1}) = Q / k + F + H (T_a - T_{n-1}) - K T_{n-1}
+//! ```
+//!
+//! for a step of the length `k` in which the heat `Q` is released in the body and the power `F` enters it: implicit Euler, stable for any
+//! step. Lumped matrices keep the temperature between those that surround it where no angle of a cell is obtuse.
+
+use super::{EnergyKind, History, HistoryStore, Moment, Quantity, Role, quantity};
+use crate::{
+    error::{Error, Result},
+    fem::space::{Simplex, assemble_numbers},
+    job::{HeatBoundary, Scalar},
+    laws::material::{self, Material},
+    linear_algebra::{
+        petsc::{BlockRows, DistributedVector},
+        tensor::{Vector, dot, norm},
+    },
+    mesh::{
+        Mesh,
+        shape::{centroid, edges_of_cell, facet_normal},
+    },
+    parallel::{agreement::Agreed, session::Session},
+};
+use std::collections::BTreeMap;
+
+/// Heat that the body has stored since the start of the run.
+pub const STORED_HEAT: EnergyKind = EnergyKind::new(14, Role::HeatSpent, "stored_heat");
+/// Heat of friction that has entered the body.
+pub const FRICTION_HEAT: EnergyKind = EnergyKind::new(17, Role::Heat, "friction_heat");
+/// Heat of viscosity and viscoplastic flow.
+pub const FLOW_HEAT: EnergyKind = EnergyKind::new(18, Role::Heat, "flow_heat");
+/// Work of thermal expansion on the stresses of the body.
+pub const THERMAL_WORK: EnergyKind = EnergyKind::new(19, Role::Work, "thermal_work");
+/// Heat that has left through the boundary.
+pub const LOST_HEAT: EnergyKind = EnergyKind::new(15, Role::HeatSpent, "lost_heat");
+/// Heat that has entered through the boundary.
+pub const ENTERED_HEAT: EnergyKind = EnergyKind::new(16, Role::Heat, "entered_heat");
+
+/// The temperature in K at the nodes.
+pub const TEMPERATURE: Quantity = quantity!("temperature");
+/// The temperature in K by which the body is strained.
+pub const STRAINED: Quantity = quantity!("strain_temperature");
+
+/// The temperature of a body.
+#[derive(Debug)]
+pub struct Heat<const D: usize> {
+    /// In K at the local nodes, with ghosts up to date.
+    temperature: NodalField,
+    /// The temperature in K by which the body is strained, and which its flow sees, that at the start of the last step, if some material
+    /// does.
+    strained: Option<NodalField>,
+    /// Powers in W of friction and of viscosity at the owned nodes at the end of the last step, where schemes average them.
+    powers: Vec<NodalField>,
+    owned: usize,
+    /// Whether some rank has nodes on edges.
+    has_middles: bool,
+    /// Capacity in J/K of the owned nodes; 0 at nodes on edges.
+    capacity: Vec<f64>,
+    /// Whether the flow of some material depends on the temperature.
+    is_seen_by_flow: bool,
+    /// The heat of each material.
+    laws: Vec<Option<material::Heat>>,
+    /// Conductivity in W/(m K) of the cells.
+    conductivity: Vec<f64>,
+    /// The share of the dissipation of each cell that becomes heat.
+    dissipation_share: Vec<f64>,
+    /// What flow takes up in each cell in the step just solved, in J; empty if no cell flows.
+    flow: Vec<f64>,
+    /// What is released in the step just committed.
+    released: Released,
+    boundaries: Vec<Boundary>,
+    /// The owned nodes whose temperature is given, each with the boundary that gives it.
+    held: Vec<(u32, u32)>,
+    /// Local nodes on edges, each with the ends of its edge.
+    middles: Vec<[u32; 3]>,
+    /// Work space for the exchange between ranks.
+    exchange: DistributedVector,
+}
+
+/// Numbers at the owned nodes, and with ghosts at the local ones, that are kept from one step to the next.
+#[derive(Debug)]
+struct NodalField {
+    quantity: Quantity,
+    owned: usize,
+    values: Vec<f64>,
+}
+
+/// What is released in a step, at the local nodes, then at the owned ones.
+#[derive(Debug, Default)]
+struct Released {
+    /// Power in W of friction at the end of the step.
+    friction: Vec<f64>,
+    /// Power in W of viscosity at the end of the step.
+    viscosity: Vec<f64>,
+    /// Heat in J of viscoplastic flow in the step.
+    flow: Vec<f64>,
+}
+
+/// Nodes at which heat passes.
+#[derive(Debug)]
+struct Boundary {
+    given: HeatBoundary,
+    /// Owned nodes, each with its share of the boundary in m^(D-1).
+    nodes: Vec<(u32, f64)>,
+}
+
+/// What passes heat at the boundary at a time.
+#[derive(Debug, Default)]
+pub struct Conditions {
+    /// Power in W that enters at the owned nodes, of convection that of a body of 0 K.
+    pub power: Vec<f64>,
+    /// Convection in W/K at the owned nodes.
+    pub film: Vec<f64>,
+    /// Temperatures in K of the nodes where they are given, in the order of [`Heat::held_nodes`].
+    pub held: Vec<f64>,
+}
+
+impl<const D: usize> Heat<D> {
+    /// The temperature of cells of these materials, given their numbers, whose boundaries are insulated; 0 K. Collective.
+    pub fn new(
+        mesh: &Mesh<D>,
+        materials: &[Material<f64>],
+        material_of: impl Fn(usize) -> usize,
+    ) -> Result<Self> {
+        let mut exchange = DistributedVector::ghosted(1, mesh.owned, &mesh.ghosts)?;
+        let mut conductivity = Vec::with_capacity(mesh.cell_count());
+        let (mut dissipation_share, mut flows) = (Vec::with_capacity(mesh.cell_count()), false);
+        {
+            let mut capacity = exchange.local_mut()?;
+            for cell in 0..mesh.cell_count() {
+                let material = &materials[material_of(cell)];
+                let of_volume =
+                    material.heat.and_then(|heat| heat.capacity_of(material.density)).unwrap_or(0.0);
+                conductivity.push(material.heat.map_or(0.0, |heat| heat.conductivity));
+                dissipation_share.push(material.heat.map_or(0.0, |heat| heat.dissipation_share));
+                flows |= material.viscoplasticity.is_some();
+                let (simplex, shares) = cell_of(mesh, cell);
+                let whole = of_volume * simplex.volume;
+                let corners = mesh.cell(cell).iter().zip(shares);
+                corners.for_each(|(&node, share)| capacity[node as usize] += share * whole);
+            }
+        }
+        exchange.add_ghosts_to_owners()?;
+        let capacity = exchange.owned()?.to_vec();
+        let edges = (0..mesh.cell_count()).flat_map(|cell| {
+            let middles = mesh.cell_midsides(cell).iter().zip(edges_of_cell::<D>());
+            middles.map(move |(&middle, ends)| {
+                let [a, b] = ends.map(|end| mesh.cell(cell)[end]);
+                [middle, a, b]
+            })
+        });
+        let mut middles: Vec<[u32; 3]> = edges.collect();
+        middles.sort_unstable_by_key(|[middle, ..]| *middle);
+        middles.dedup_by_key(|[middle, ..]| *middle);
+        Ok(Self {
+            temperature: NodalField {
+                quantity: TEMPERATURE,
+                owned: mesh.owned,
+                values: vec![0.0; mesh.nodes.len()],
+            },
+            strained: None,
+            powers: Vec::new(),
+            owned: mesh.owned,
+            has_middles: mesh.corner_nodes < mesh.total_nodes,
+            capacity,
+            is_seen_by_flow: materials
+                .iter()
+                .any(|material| material.viscoplasticity.as_ref().is_some_and(|law| law.sees_temperature())),
+            laws: materials.iter().map(|material| material.heat).collect(),
+            conductivity,
+            dissipation_share,
+            flow: if flows { vec![0.0; mesh.cell_count()] } else { Vec::new() },
+            released: Released::default(),
+            boundaries: Vec::new(),
+            held: Vec::new(),
+            middles,
+            exchange,
+        })
+    }
+
+    /// Lets heat pass these facets of this rank. Collective.
+    pub fn add_boundary(&mut self, mesh: &Mesh<D>, given: HeatBoundary, facets: &[u32]) -> Result<()> {
+        let mut nodes = Vec::new();
+        let is_held = given.temperature.is_some();
+        self.gather(|weights| {
+            for &facet in facets {
+                for (node, weight) in mesh.facets[facet as usize].iter().zip(shares_of_facet(mesh, facet)) {
+                    // A temperature is given also where the boundary has no area, on the axis of a body of revolution.
+                    weights[*node as usize] += if is_held { 1.0 } else { weight };
+                }
+            }
+        })?;
+        let weights = self.exchange.owned()?;
+        nodes.extend((0..).zip(weights.iter().copied()).filter(|(_, weight)| *weight > 0.0));
+        drop(weights);
+        let number = self.boundaries.len() as u32;
+        if is_held {
+            let known: BTreeMap<u32, u32> = self.held.iter().copied().collect();
+            self.held.extend(
+                nodes.iter().filter(|(node, _)| !known.contains_key(node)).map(|(node, _)| (*node, number)),
+            );
+            self.held.sort_unstable();
+        }
+        self.boundaries.push(Boundary { given, nodes });
+        Ok(())
+    }
+
+    /// Sets the temperature of the owned nodes by their places in m. Collective.
+    pub fn set(&mut self, mesh: &Mesh<D>, temperature: &Scalar) -> Result<()> {
+        for (value, place) in self.temperature.values.iter_mut().zip(&mesh.nodes[..self.owned]) {
+            *value = temperature.evaluate(0.0, place);
+            if !value.is_finite() {
+                return Err(Error::Refused(format!(
+                    "initial.temperature is {value} at {place:?} m; correct the expression"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes temperatures on edges and of ghosts those of the owned corners. Collective.
+    pub fn refresh(&mut self) -> Result<()> {
+        self.update_ghosts()?;
+        if let Some(strained) = &mut self.strained {
+            self.exchange.owned_mut()?.copy_from_slice(strained.of_owned());
+            self.exchange.update_ghosts()?;
+            strained.values.copy_from_slice(&self.exchange.local()?);
+        }
+        if !self.has_middles {
+            return Ok(());
+        }
+        for &[middle, a, b] in &self.middles {
+            let values = &mut self.temperature.values;
+            values[middle as usize] = 0.5 * (values[a as usize] + values[b as usize]);
+        }
+        // Ghosts on edges need not belong to a cell of this rank.
+        self.update_ghosts()
+    }
+
+    fn update_ghosts(&mut self) -> Result<()> {
+        self.exchange.owned_mut()?.copy_from_slice(self.temperature.of_owned());
+        self.exchange.update_ghosts()?;
+        self.temperature.values.copy_from_slice(&self.exchange.local()?);
+        Ok(())
+    }
+
+    /// The temperature in K at the local nodes, with ghosts.
+    pub fn temperature(&self) -> &[f64] {
+        &self.temperature.values
+    }
+
+    /// The temperature in K at the owned nodes.
+    pub fn temperature_of_owned(&self) -> &[f64] {
+        self.temperature.of_owned()
+    }
+
+    /// The capacity in J/K of the owned nodes; 0 at nodes on edges.
+    pub fn capacity(&self) -> &[f64] {
+        &self.capacity
+    }
+
+    /// The owned nodes whose temperature is given, ascending, each with the number of the boundary that gives it.
+    pub fn held_nodes(&self) -> &[(u32, u32)] {
+        &self.held
+    }
+
+    /// Whether the convection depends on time.
+    pub fn has_varying_film(&self) -> bool {
+        let coefficients = self.boundaries.iter().filter_map(|boundary| boundary.given.convection.as_ref());
+        coefficients.into_iter().any(|convection| convection.coefficient.depends_on_time())
+    }
+
+    /// The expressions at its boundaries.
+    pub fn expressions(&self) -> impl Iterator<Item = &Scalar> {
+        self.boundaries.iter().flat_map(|boundary| boundary.given.expressions()).map(|(_, value)| value)
+    }
+
+    /// Adds these changes of the owned nodes in K. Collective.
+    pub fn add(&mut self, changes: &[f64]) -> Result<()> {
+        self.temperature.values.iter_mut().zip(changes).for_each(|(value, change)| *value += change);
+        self.refresh()
+    }
+
+    /// The matrix of conduction in W/K, in which some local nodes are coupled to nothing, with empty rows of nodes on edges. Collective.
+    pub fn conduction(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        is_known: impl Fn(u32) -> bool,
+    ) -> Result<BlockRows, Agreed> {
+        assemble_numbers(session, mesh, |cell, matrix| {
+            let (simplex, _) = cell_of(mesh, cell);
+            let (factor, nodes) = (self.conductivity[cell] * simplex.volume, mesh.cell(cell));
+            for a in 0..=D {
+                for b in (0..=D).filter(|&b| a == b || !(is_known(nodes[a]) || is_known(nodes[b]))) {
+                    matrix[a][b] += factor * dot(&simplex.gradient(a), &simplex.gradient(b));
+                }
+            }
+        })
+    }
+
+    /// The power in W that conduction takes from each node of a field of temperatures with ghosts: of the owned nodes, in `out`. Collective.
+    pub fn conduct(&mut self, mesh: &Mesh<D>, field: &[f64], out: &mut Vec<f64>) -> Result<()> {
+        let conductivity = std::mem::take(&mut self.conductivity);
+        let gathered = self.gather(|powers| {
+            for (cell, conductivity) in conductivity.iter().enumerate() {
+                let (simplex, _) = cell_of(mesh, cell);
+                let nodes = mesh.cell(cell);
+                // Differences, so that no rounding errors conduct heat in a body of one temperature.
+                let mut gradient = [0.0; D];
+                for a in 1..=D {
+                    let change = field[nodes[a] as usize] - field[nodes[0] as usize];
+                    (0..D).for_each(|i| gradient[i] += change * simplex.gradients[a - 1][i]);
+                }
+                let factor = conductivity * simplex.volume;
+                for (a, node) in nodes.iter().enumerate() {
+                    powers[*node as usize] += factor * dot(&simplex.gradient(a), &gradient);
+                }
+            }
+        });
+        self.conductivity = conductivity;
+        gathered?;
+        out.clear();
+        out.extend_from_slice(&self.exchange.owned()?);
+        Ok(())
+    }
+
+    /// What passes heat at the boundary at this time in s.
+    pub fn write_conditions(&self, mesh: &Mesh<D>, time: f64, out: &mut Conditions) -> Result<()> {
+        for values in [&mut out.power, &mut out.film] {
+            values.clear();
+            values.resize(self.owned, 0.0);
+        }
+        for (number, Boundary { given, nodes }) in self.boundaries.iter().enumerate() {
+            let value = |value: &Scalar, what: &str, node: u32| {
+                let place: &Vector<D> = &mesh.nodes[node as usize];
+                let number_there = value.evaluate(time, place);
+                let is_sound = number_there.is_finite() && (what != COEFFICIENT || number_there >= 0.0);
+                let fault = || {
+                    Error::Failed(format!(
+                        "heat.{number}: the {what} is {number_there} at t = {time} s, position {place:?} m; correct the expression in \
+                         the job"
+                    ))
+                };
+                is_sound.then_some(number_there).ok_or_else(fault)
+            };
+            if let Some(flux) = &given.flux {
+                for &(node, weight) in nodes {
+                    out.power[node as usize] += weight * value(flux, "flux", node)?;
+                }
+            }
+            if let Some(convection) = &given.convection {
+                for &(node, weight) in nodes {
+                    let film = weight * value(&convection.coefficient, COEFFICIENT, node)?;
+                    out.film[node as usize] += film;
+                    out.power[node as usize] +=
+                        film * value(&convection.ambient, "ambient temperature", node)?;
+                }
+            }
+        }
+        out.held.clear();
+        for &(node, number) in &self.held {
+            let Some(temperature) = &self.boundaries[number as usize].given.temperature else { continue };
+            let place = &mesh.nodes[node as usize];
+            let value = temperature.evaluate(time, place);
+            if !value.is_finite() {
+                return Err(Error::Failed(format!(
+                    "heat.{number}: the temperature is {value} at t = {time} s, position {place:?} m; correct the expression in the job"
+                )));
+            }
+            out.held.push(value);
+        }
+        Ok(())
+    }
+
+    /// What is kept from one step to the next.
+    pub fn histories(&self) -> impl Iterator<Item = &dyn HistoryStore> {
+        std::iter::once(&self.temperature)
+            .chain(&self.strained)
+            .chain(&self.powers)
+            .map(|field| field as &dyn HistoryStore)
+    }
+
+    /// Visits the same.
+    pub fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        visit(&mut self.temperature);
+        self.strained.iter_mut().for_each(|field| visit(field));
+        self.powers.iter_mut().for_each(|field| visit(field));
+    }
+
+    /// Keeps the powers at the end of steps, for schemes that average them.
+    pub fn keep_powers(&mut self) {
+        let field = |quantity| NodalField { quantity, owned: self.owned, values: vec![0.0; self.owned] };
+        self.powers = vec![field(quantity!("friction_heat_power")), field(quantity!("viscous_heat_power"))];
+    }
+
+    /// Lets the temperature strain the body: now, and from the start of each step on.
+    pub fn expand(&mut self) {
+        let Self { strained, temperature, owned, .. } = self;
+        let field = || NodalField { quantity: STRAINED, owned: *owned, values: Vec::new() };
+        strained.get_or_insert_with(field).values.clone_from(&temperature.values);
+    }
+
+    /// Whether some material expands.
+    pub fn strains(&self) -> bool {
+        self.laws.iter().flatten().any(|law| law.expansion.is_some())
+    }
+
+    /// Whether the flow of some material depends on the temperature.
+    pub fn is_seen_by_flow(&self) -> bool {
+        self.is_seen_by_flow
+    }
+
+    /// Whether the temperature strains the body, or its flow depends on it.
+    pub fn expands(&self) -> bool {
+        self.strained.is_some()
+    }
+
+    /// Whether it does so by another temperature than that of now, on this rank.
+    pub fn has_changed(&self) -> bool {
+        self.strained.as_ref().is_some_and(|strained| strained.values != self.temperature.values)
+    }
+
+    /// The thermal strain of a cell of this material and number, at a place in barycentric coordinates.
+    pub fn strain_at(&self, mesh: &Mesh<D>, (material, cell): (usize, usize), place: &[f64]) -> f64 {
+        self.laws[material].map_or(0.0, |law| law.strain(self.strained_at(mesh, cell, place)))
+    }
+
+    /// The temperature in K by which a cell of this number is strained, at a place in barycentric coordinates.
+    pub fn strained_at(&self, mesh: &Mesh<D>, cell: usize, place: &[f64]) -> f64 {
+        let values = &self.strained.as_ref().unwrap_or(&self.temperature).values;
+        mesh.cell(cell).iter().zip(place).map(|(node, share)| share * values[*node as usize]).sum()
+    }
+
+    /// Work space for what flow takes up in each cell in a step, in J: zeros, or empty if no cell flows.
+    pub fn start_flow(&mut self) -> Vec<f64> {
+        let mut flow = std::mem::take(&mut self.flow);
+        flow.fill(0.0);
+        flow
+    }
+
+    /// Takes back what was written there, times a factor.
+    pub fn finish_flow(&mut self, mut flow: Vec<f64>, factor: f64) {
+        flow.iter_mut().for_each(|energy| *energy *= factor);
+        self.flow = flow;
+    }
+
+    /// Takes the heat of flow of the step just committed, and lets powers be added to it. Collective are only the calls that end with
+    /// [`finish_release`](Self::finish_release).
+    pub fn start_release(&mut self, mesh: &Mesh<D>) {
+        let Released { friction, viscosity, flow } = &mut self.released;
+        for values in [&mut *friction, &mut *viscosity, &mut *flow] {
+            values.clear();
+            values.resize(mesh.nodes.len(), 0.0);
+        }
+        let cells = self.flow.iter().zip(&self.dissipation_share).enumerate();
+        for (cell, (energy, share)) in cells.filter(|(_, (energy, _))| **energy != 0.0) {
+            add_to_corners(mesh, cell, share * energy, flow);
+        }
+    }
+
+    /// Adds a power of friction in W at a local node.
+    pub fn add_friction(&mut self, node: usize, power: f64) {
+        self.released.friction[node] += power;
+    }
+
+    /// Adds a power of viscosity in W in a cell.
+    pub fn add_viscosity(&mut self, mesh: &Mesh<D>, cell: usize, power: f64) {
+        let share = self.dissipation_share[cell];
+        add_to_corners(mesh, cell, share * power, &mut self.released.viscosity);
+    }
+
+    /// Sums what was added over the ranks, at the owned corners of cells. Collective.
+    pub fn finish_release(&mut self) -> Result<()> {
+        let mut released = std::mem::take(&mut self.released);
+        for (values, is_at_nodes) in
+            [(&mut released.friction, true), (&mut released.viscosity, false), (&mut released.flow, false)]
+        {
+            self.gather(|sums| sums.copy_from_slice(values))?;
+            if self.has_middles && is_at_nodes {
+                self.share_middles(values)?;
+            }
+            values.clear();
+            values.extend_from_slice(&self.exchange.owned()?);
+        }
+        self.released = released;
+        Ok(())
+    }
+
+    /// Passes what owned nodes on edges have in the exchange on to the ends of their edges. `values` is work space. Collective.
+    fn share_middles(&mut self, values: &mut [f64]) -> Result<()> {
+        let owned = self.owned;
+        values.fill(0.0);
+        values[..owned].copy_from_slice(&self.exchange.owned()?);
+        for &[middle, a, b] in self.middles.iter().filter(|[middle, ..]| (*middle as usize) < owned) {
+            let half = 0.5 * std::mem::take(&mut values[middle as usize]);
+            values[a as usize] += half;
+            values[b as usize] += half;
+        }
+        self.gather(|sums| sums.copy_from_slice(values))
+    }
+
+    /// The heat in J that was released at the owned nodes in the step just committed of this length in s, added to `sum`, and that of
+    /// friction and of flow on this rank. Under a formula of second order powers are means over the step.
+    pub fn released(&mut self, length: f64, averages: bool, sum: &mut [f64]) -> [f64; 2] {
+        let Released { friction, viscosity, flow } = &self.released;
+        let mut totals = [0.0; 2];
+        for (kind, power) in [friction, viscosity].into_iter().enumerate() {
+            let before = self.powers.get(kind).filter(|_| averages).map(|field| &field.values);
+            for (node, (sum, power)) in sum.iter_mut().zip(power).enumerate() {
+                let mean = before.map_or(*power, |before| 0.5 * (before[node] + power));
+                *sum += length * mean;
+                totals[kind] += length * mean;
+            }
+        }
+        for (sum, heat) in sum.iter_mut().zip(flow) {
+            *sum += heat;
+            totals[1] += heat;
+        }
+        for (field, power) in self.powers.iter_mut().zip([friction, viscosity]) {
+            field.values.copy_from_slice(power);
+        }
+        totals
+    }
+
+    /// Sums contributions to the local nodes, which `add` writes, at the owned nodes of the exchange. Collective.
+    fn gather(&mut self, add: impl FnOnce(&mut [f64])) -> Result<()> {
+        {
+            let mut values = self.exchange.local_mut()?;
+            values.fill(0.0);
+            add(&mut values);
+        }
+        self.exchange.add_ghosts_to_owners()
+    }
+}
+
+/// The words for a coefficient of heat transfer, which is not negative.
+const COEFFICIENT: &str = "coefficient of heat transfer";
+
+impl NodalField {
+    fn of_owned(&self) -> &[f64] {
+        &self.values[..self.owned]
+    }
+}
+
+impl HistoryStore for NodalField {
+    fn values(&self, moment: Moment) -> Option<History<'_>> {
+        let values = moment.of(self.of_owned(), None)?.iter().copied().enumerate();
+        Some(History::of_nodes((self.quantity, moment), self.owned, values))
+    }
+
+    fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
+        if quantity == self.quantity && moment == Moment::Last {
+            self.values[..self.owned].copy_from_slice(values);
+        }
+    }
+}
+
+/// The linear cell of the corners of a cell, of a body of revolution with the volume of its ring, and the shares of the volume that the
+/// functions of the corners have.
+fn cell_of<const D: usize>(mesh: &Mesh<D>, cell: usize) -> (Simplex<D>, [f64; 4]) {
+    let corners = &mesh.corners(cell)[..=D];
+    let simplex = Simplex::new(corners);
+    if !mesh.is_revolved {
+        return (simplex, [1.0 / (D + 1) as f64; 4]);
+    }
+    let sum: f64 = corners.iter().map(|corner| corner[0]).sum();
+    let shares = std::array::from_fn(|a| corners.get(a).map_or(0.0, |corner| 0.25 * (1.0 + corner[0] / sum)));
+    (Simplex { volume: mesh.turn(&centroid(corners)) * simplex.volume, ..simplex }, shares)
+}
+
+/// Adds a part of a cell to its corners.
+fn add_to_corners<const D: usize>(mesh: &Mesh<D>, cell: usize, whole: f64, sums: &mut [f64]) {
+    let (_, shares) = cell_of(mesh, cell);
+    mesh.cell(cell).iter().zip(shares).for_each(|(node, share)| sums[*node as usize] += share * whole);
+}
+
+/// The shares in m^(D-1) that the corners of a facet have of it.
+fn shares_of_facet<const D: usize>(mesh: &Mesh<D>, facet: u32) -> [f64; D] {
+    let corners = mesh.facet_corners(facet);
+    let share = norm(&facet_normal(&corners)) / D as f64;
+    let turn = |at: usize| mesh.turn(&corners[at]);
+    std::array::from_fn(
+        |at| if mesh.is_revolved { share * (2.0 * turn(at) + turn(1 - at)) / 3.0 } else { share },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::space::samples::{revolved, row};
+
+    #[test]
+    fn shares_of_a_ring_are_those_of_its_volume_and_its_faces() {
+        let mut mesh: Mesh<2> = revolved(row());
+        mesh.facets = (0..mesh.cell_count()).map(|cell| [mesh.cell(cell)[0], mesh.cell(cell)[1]]).collect();
+        for cell in 0..mesh.cell_count() {
+            let (ring, shares) = cell_of(&mesh, cell);
+            assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+            // The moment of the section about the axis: exact for a function that is linear.
+            let corners = &mesh.corners(cell)[..3];
+            let area = Simplex::new(corners).volume;
+            let squares: f64 = corners.iter().map(|c| c[0] * c[0]).sum();
+            let sum: f64 = corners.iter().map(|c| c[0]).sum();
+            let expected = std::f64::consts::TAU * area * (squares + sum * sum) / 12.0;
+            let found: f64 = corners.iter().zip(shares).map(|(c, share)| ring.volume * share * c[0]).sum();
+            assert!((found - expected).abs() < 1e-13 * expected.abs(), "{found} {expected}");
+        }
+        for facet in 0..mesh.facets.len() as u32 {
+            let [a, b] = mesh.facet_corners(facet);
+            let length = norm(&[b[0] - a[0], b[1] - a[1]]);
+            let total: f64 = shares_of_facet(&mesh, facet).iter().sum();
+            let expected = std::f64::consts::PI * length * (a[0] + b[0]);
+            assert!((total - expected).abs() <= 1e-13 * expected, "{total} {expected}");
+        }
+    }
+}

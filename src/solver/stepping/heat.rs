@@ -1,0 +1,230 @@
+//! The step of the temperature, after that of the motion: see [`Heat`] for its equations.
+
+use crate::{
+    error::{Error, Result},
+    fem::{
+        body::Body,
+        effect::{Conditions, ENTERED_HEAT, Energy, FLOW_HEAT, FRICTION_HEAT, LOST_HEAT, STORED_HEAT, Step},
+    },
+    linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix},
+    parallel::session::Session,
+};
+
+/// The residual of a solved step as a share of the powers that change the temperature.
+const TOLERANCE: f64 = 1e-13;
+/// Iterations after which a solve fails.
+const ITERATIONS: usize = 10_000;
+/// The largest conduction within a step over the capacity at which the diagonal is a good preconditioner.
+const SHORT: f64 = 100.0;
+
+/// The solver of the temperature at the end of steps.
+#[derive(Debug)]
+pub(super) struct HeatStep {
+    /// Conduction in W/K of the owned nodes whose temperature is not given; others are coupled to nothing.
+    conduction: BlockRows,
+    /// The positions of the diagonal entries.
+    diagonal: Vec<usize>,
+    /// Whether the temperature of each owned node is given, or is that of an edge.
+    is_known: Vec<bool>,
+    solver: Option<Ksp>,
+    /// The length in s of the step for which the solver is prepared.
+    length: f64,
+    /// Whether the temperature of some node is given, on all ranks alike.
+    is_held: bool,
+    /// Whether convection depends on time.
+    film_varies: bool,
+    conditions: Conditions,
+    right_hand_side: DistributedVector,
+    change: DistributedVector,
+    /// Temperatures of local nodes, and powers of owned nodes.
+    field: Vec<f64>,
+    conducted: Vec<f64>,
+    /// Heat in J that is released at the owned nodes in the step.
+    released: Vec<f64>,
+}
+
+impl HeatStep {
+    /// The solver for a body, if it has heat. Collective.
+    pub(super) fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+    ) -> Result<Option<Self>> {
+        let Some(heat) = &body.heat else { return Ok(None) };
+        let mesh = &body.mesh;
+        let mut known = DistributedVector::ghosted(1, mesh.owned, &mesh.ghosts)?;
+        {
+            let mut flags = known.owned_mut()?;
+            flags
+                .iter_mut()
+                .zip(heat.capacity())
+                .for_each(|(flag, c)| *flag = f64::from(u8::from(*c == 0.0)));
+            heat.held_nodes().iter().for_each(|(node, _)| flags[*node as usize] = 1.0);
+        }
+        known.update_ghosts()?;
+        let flags = known.local()?;
+        let mut conduction = heat.conduction(session, mesh, |node| flags[node as usize] > 0.0)?;
+        let mut diagonal = Vec::with_capacity(mesh.owned);
+        for row in 0..mesh.owned {
+            let range = conduction.offsets[row]..conduction.offsets[row + 1];
+            let own = mesh.global_node(row as u32);
+            for at in range.filter(|at| conduction.columns[*at] == own) {
+                diagonal.push(at);
+                // What is known is solved for as well, uncoupled.
+                if conduction.values[at] == 0.0 {
+                    conduction.values[at] = 1.0;
+                }
+            }
+        }
+        let is_known = flags[..mesh.owned].iter().map(|flag| *flag > 0.0).collect();
+        drop(flags);
+        Ok(Some(Self {
+            conduction,
+            diagonal,
+            is_known,
+            solver: None,
+            length: 0.0,
+            is_held: session.total(heat.held_nodes().len()) > 0,
+            film_varies: heat.has_varying_film(),
+            conditions: Conditions::default(),
+            right_hand_side: known.like()?,
+            change: known.like()?,
+            field: Vec::new(),
+            conducted: Vec::new(),
+            released: Vec::new(),
+        }))
+    }
+
+    /// Advances the temperature by the step just committed, over which powers of heat are constant or averages; gives the energies of heat of
+    /// this rank. Collective.
+    pub(super) fn advance<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        step: Step,
+        averages: bool,
+    ) -> Result<Energy> {
+        let Body { mesh, heat: Some(heat), .. } = body else { return Ok(Energy::default()) };
+        session.agree(heat.write_conditions(mesh, step.time, &mut self.conditions))?;
+        self.prepare(session, heat.capacity(), step.length)?;
+        self.released.clear();
+        self.released.resize(mesh.owned, 0.0);
+        let [friction, flow] = heat.released(step.length, averages, &mut self.released);
+        // The field with the given temperatures, and its conduction.
+        self.field.clear();
+        self.field.extend_from_slice(heat.temperature());
+        for (&(node, _), value) in heat.held_nodes().iter().zip(&self.conditions.held) {
+            self.field[node as usize] = *value;
+        }
+        if self.is_held {
+            self.change.owned_mut()?.copy_from_slice(&self.field[..mesh.owned]);
+            self.change.update_ghosts()?;
+            self.field.copy_from_slice(&self.change.local()?);
+        }
+        heat.conduct(mesh, &self.field, &mut self.conducted)?;
+        let Conditions { power, film, .. } = &self.conditions;
+        {
+            let mut forces = self.right_hand_side.owned_mut()?;
+            let before = heat.temperature();
+            for (node, force) in forces.iter_mut().enumerate() {
+                *force = if self.is_known[node] {
+                    self.conduction.values[self.diagonal[node]] * (self.field[node] - before[node])
+                } else {
+                    self.released[node] / step.length + power[node]
+                        - film[node] * before[node]
+                        - self.conducted[node]
+                };
+            }
+        }
+        self.solve()?;
+        if !self.is_held {
+            self.balance(session, heat.capacity(), step.length)?;
+        }
+        let Conditions { power, film, .. } = &self.conditions;
+        let changes = self.change.owned()?;
+        heat.add(&changes)?;
+        self.field.clear();
+        self.field.extend_from_slice(heat.temperature());
+        heat.conduct(mesh, &self.field, &mut self.conducted)?;
+        // What enters at each node; where the temperature is given, what balances the rest.
+        let after = heat.temperature();
+        let entered = &mut self.field;
+        entered.clear();
+        entered.extend(
+            power.iter().zip(film).zip(after).map(|((power, film), t)| step.length * (power - film * t)),
+        );
+        for &(node, _) in heat.held_nodes() {
+            let node = node as usize;
+            let taken = heat.capacity()[node] * changes[node] - self.released[node];
+            entered[node] = taken + step.length * self.conducted[node];
+        }
+        let mut energy = Energy::default();
+        let stored = heat.capacity().iter().zip(changes.iter());
+        energy[STORED_HEAT] = stored.map(|(capacity, change)| capacity * change).sum();
+        (energy[FRICTION_HEAT], energy[FLOW_HEAT]) = (friction, flow);
+        energy[ENTERED_HEAT] = entered.iter().map(|heat| heat.max(0.0)).sum();
+        energy[LOST_HEAT] = entered.iter().map(|heat| (-heat).max(0.0)).sum();
+        Ok(energy)
+    }
+
+    /// Prepares the matrix of a step of this length in s, unless it is. Collective.
+    fn prepare(&mut self, session: &Session, capacity: &[f64], length: f64) -> Result<()> {
+        if self.solver.is_some() && self.length == length && !self.film_varies {
+            return Ok(());
+        }
+        let Self { conduction, diagonal, is_known, conditions, .. } = self;
+        let mut rows = conduction.clone();
+        let mut most = 0.0f64;
+        for (node, &at) in diagonal.iter().enumerate() {
+            if !is_known[node] {
+                let others = rows.values[at] + conditions.film[node];
+                most = most.max(others * length / capacity[node]);
+                rows.values[at] = others + capacity[node] / length;
+            }
+        }
+        let [most] = session.largest([most]);
+        let matrix = session.agree(Matrix::symmetric(1, &rows))?;
+        let mut solver = Ksp::new("heat_")?;
+        solver.set_method("cg")?;
+        solver.set_preconditioner(if most < SHORT { "jacobi" } else { "gamg" }, None)?;
+        solver.set_tolerances(TOLERANCE, 0.0, ITERATIONS)?;
+        solver.apply_options()?;
+        solver.set_matrices(&matrix, &matrix)?;
+        session.agree(solver.set_up())?;
+        (self.solver, self.length) = (Some(solver), length);
+        Ok(())
+    }
+
+    /// Shifts the solution evenly so that it takes up all heat: conduction, which passes heat on only, hides the rounding of this part where
+    /// it is strong. Collective.
+    fn balance(&mut self, session: &Session, capacity: &[f64], length: f64) -> Result<()> {
+        let (forces, mut changes) = (self.right_hand_side.owned()?, self.change.owned_mut()?);
+        let taken_per_kelvin = |node: usize| capacity[node] / length + self.conditions.film[node];
+        let [mut left, mut whole] = [0.0; 2];
+        for node in (0..capacity.len()).filter(|node| !self.is_known[*node]) {
+            left += forces[node] - taken_per_kelvin(node) * changes[node];
+            whole += taken_per_kelvin(node);
+        }
+        let [left, whole] = session.sum([left, whole]);
+        for node in (0..capacity.len()).filter(|node| !self.is_known[*node]) {
+            changes[node] += left / whole;
+        }
+        Ok(())
+    }
+
+    fn solve(&mut self) -> Result<()> {
+        let Some(solver) = &mut self.solver else { return Ok(()) };
+        if self.right_hand_side.norm()? == 0.0 {
+            return self.change.fill(0.0);
+        }
+        let outcome = solver.solve(&self.right_hand_side, &mut self.change)?;
+        if outcome.converged() {
+            return Ok(());
+        }
+        Err(Error::Failed(format!(
+            "the temperature at the end of the step was not found: {} after {} iterations; check that conductivity and heat capacity, \
+             in SI units, have sensible values",
+            outcome.description(),
+            outcome.iterations
+        )))
+    }
+}

@@ -1,0 +1,140 @@
+//! Runs of bodies with heat: files, stages, messages.
+
+use crate::{case::Case, hdf5_file::NumberFile};
+
+const HEAT: &str = "{ conductivity = 2, capacity = 3 }";
+const INSULATOR: &str = "{ conductivity = 1e-9, capacity = 3, dissipation_share = 0 }";
+
+fn square() -> Case {
+    Case::square(6).set("time.end", "0.25").set("checkpoint.every", "2")
+}
+
+fn heated() -> Case {
+    square()
+        .set("material.heat", HEAT)
+        .set("initial.temperature", "'290 + 10*x*y'")
+        .set("heat", "[{ on = ['left'], temperature = 300 }, { on = ['top'], flux = '50*t' }]")
+        .set("output.probe_also", "['temperature']")
+}
+
+#[test]
+fn heat_leaves_the_motion_as_it_is_and_is_written_where_it_is_called_for() {
+    let (plain, with) = (square().run_and_keep(2), heated().run_and_keep(2));
+    let (plain, with) = (plain.results(), with.results());
+    let [plain_rows, rows] = [&plain, &with].map(|results| results.table("history.csv"));
+    for column in &plain_rows.columns {
+        assert_eq!(plain_rows.words(column), rows.words(column), "{column}");
+    }
+    assert_eq!(rows.columns[plain_rows.columns.len()..].first().map(String::as_str), Some("stored_heat"));
+    assert_eq!(plain.text("resultants.csv"), with.text("resultants.csv"));
+    for (results, there) in [(&with, true), (&plain, false)] {
+        let summary = results.summary();
+        let effects = summary["effects"].as_array().expect("a list");
+        assert_eq!(effects.iter().any(|name| name == "heat"), there, "{summary}");
+        assert_eq!(summary["inventory"]["history_bytes"]["temperature"].is_null(), !there);
+        assert_eq!(summary["max_heat_imbalance"].is_null(), !there);
+        let fields = NumberFile::open(&results.path("fields.vtkhdf")).names("Fields");
+        assert_eq!(fields.iter().any(|name| name == "temperature"), there, "{fields:?}");
+        let checkpoint = NumberFile::open(&results.path("checkpoint-4.h5"));
+        assert_eq!(checkpoint.checkpoint_tables().iter().any(|(name, _)| name == "temperature"), there);
+    }
+    assert!(with.number("max_heat_imbalance") < 1e-10);
+    // The same on one rank.
+    let one = heated().run_and_keep(1);
+    let (one, two) = (one.results().table("probes.csv"), with.table("probes.csv"));
+    for (a, b) in one.numbers("temperature").iter().zip(two.numbers("temperature")) {
+        assert!((a - b).abs() < 1e-9 && *a > 285.0, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_stage_goes_on_from_the_temperature_of_the_state_it_starts_from() {
+    let first = heated().run_and_keep(1);
+    let state = first.results().path("checkpoint-4.h5");
+    let last = first.results().table("probes.csv").last("temperature");
+    let stage = || {
+        let from = format!("'{}'", state.display());
+        square().set("initial", &format!("{{ from = {from} }}")).set("output.probe_also", "['temperature']")
+    };
+    let insulated =
+        stage().set("material.heat", INSULATOR).set("contact.0.friction_heat", "0").run_and_keep(2);
+    let kept = insulated.results().table("probes.csv").last("temperature");
+    assert!((kept - last).abs() < 1e-6, "{kept} {last}");
+    // A state without temperature.
+    let cold = square().run_and_keep(1);
+    let from = format!("{{ from = '{}' }}", cold.results().path("checkpoint-4.h5").display());
+    let refused = square().set("initial", &from).set("material.heat", HEAT);
+    refused
+        .run_with(2, &[])
+        .expect(2)
+        .says("has no temperature")
+        .says("add temperature = 293.0 beside `from`");
+}
+
+/// Two blocks that slide along each other, insulated and so conductive that each has one temperature.
+fn pair(share: &str, side: &str, sliding: &str) -> Case {
+    let text = "
+        mesh.rectangle = [{ name = 'lower', size = [1.0, 0.5], cells = [5, 3] },
+                          { name = 'upper', corner = [0.25, 0.5], size = [0.5, 0.25], cells = [4, 2] }]
+        material.hypothesis = 'plane_strain'
+        material.elasticity = { youngs_modulus = 1e9, poisson_ratio = 0.3 }
+        material.heat = { conductivity = 1e6, volumetric_capacity = 300 }
+        support = [{ on = ['lower.bottom'], fix = 'all' }, { on = ['upper.top'], fix = ['x'], velocity = [0.1] }]
+        traction = [{ on = ['upper.top'], pressure = 1000 }]
+        contact = [{ on = ['upper.bottom'], against = ['lower.top'], normal.unilateral = {}, friction.coulomb.coefficient = 0.4 }]
+        initial.temperature = 300
+        time = { end = 1.0, step = 0.05, scheme = 'bdf2' }
+        output.probe = [{ name = 'lower', point = [0.1, 0.1] }, { name = 'upper', point = [0.5, 0.7] }]
+        output.probe_also = ['temperature']";
+    let joined = text.split('\n').map(str::trim).collect::<Vec<_>>().join("\n").replace(",\n", ", ");
+    let case = Case::written_as(&joined).set("contact.0.side", side).set("contact.0.sliding", sliding);
+    if share.is_empty() { case } else { case.set("contact.0.friction_heat", share) }
+}
+
+#[test]
+fn the_heat_of_friction_between_bodies_is_divided_by_the_share() {
+    // 0.4 * 1000 Pa * 0.5 m * 0.1 m; the capacities are 150 and 37.5 J/(m K).
+    for (share, of_upper, side, sliding, ranks) in [
+        ("", 0.5, "'on'", "'small'", 1),
+        ("0.2", 0.2, "'on'", "'finite'", 2),
+        ("0.2", 0.2, "'against'", "'finite'", 3),
+    ] {
+        let case = pair(share, side, sliding).run_and_keep(ranks);
+        let results = case.results();
+        let rows = results.table("history.csv");
+        let [heat, lost] = ["friction_heat", "contact_dissipation"].map(|column| rows.last(column));
+        assert!((heat - lost).abs() < 1e-6 * lost && (lost - 20.0).abs() < 0.05, "{side}: {heat} {lost}");
+        assert!(results.number("max_heat_imbalance") < 1e-10);
+        let probes = results.table("probes.csv");
+        for (name, capacity, share) in [("upper", 37.5, of_upper), ("lower", 150.0, 1.0 - of_upper)] {
+            let rise = probes.only("probe", name).last("temperature") - 300.0;
+            let expected = share * heat / capacity;
+            assert!((rise - expected).abs() < 1e-3 * expected, "{name} {side} {sliding}: {rise} {expected}");
+        }
+    }
+}
+
+#[test]
+fn steps_that_are_rejected_leave_no_heat_behind() {
+    let adaptive = || {
+        Case::of("sliding_block")
+            .without("check")
+            .set("material.heat", HEAT)
+            .set("initial.temperature", "300")
+            .set("time.adaptive", "{ tolerance = 1e-5, smallest_step = 1e-6, largest_step = 0.01 }")
+            .set("time.scheme", "'bdf2'")
+    };
+    let case = adaptive().run_and_keep(2);
+    let results = case.results();
+    assert!(results.number("rejected_steps") > 0.0, "{}", results.summary());
+    let rows = results.table("history.csv");
+    let [friction, flow, stored] =
+        ["friction_heat", "flow_heat", "stored_heat"].map(|column| rows.last(column));
+    let [contact, viscous] = ["contact_dissipation", "viscous_dissipation"].map(|column| rows.last(column));
+    assert!(
+        friction > 0.0 && (stored - friction - flow).abs() < 1e-10 * stored,
+        "{friction} {flow} {stored}"
+    );
+    assert!((flow - viscous).abs() < 1e-10 * viscous.abs().max(friction), "{flow} {viscous}");
+    assert!((friction - contact).abs() < 1e-7 * contact, "{friction} {contact}");
+}
