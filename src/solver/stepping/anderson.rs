@@ -6,34 +6,33 @@
 
 use crate::{error::Result, linear_algebra::petsc::DistributedVector};
 
+/// Largest number of differences.
+const MOST: usize = 4;
 /// Pivots of scaled normal equations below this one are rounding errors.
 const LEAST_PIVOT: f64 = 1e-12;
 
 /// The last corrections.
 pub(super) struct Anderson {
-    /// Largest number of differences.
-    depth: usize,
     /// `g` and `f` of the last correction, if there was one.
     last: [DistributedVector; 2],
     has_last: bool,
-    /// Differences of both, the newest first; those beyond `count` are work space.
+    /// Differences of both, the newest first; those beyond `count` are free.
     differences: Vec<[DistributedVector; 2]>,
     count: usize,
     /// Products of the differences of `f`.
-    products: Vec<Vec<f64>>,
+    products: [[f64; MOST]; MOST],
 }
 
 impl Anderson {
-    /// For vectors like this one, and differences of this number of corrections.
+    /// For vectors like this one, and differences of this number of corrections, at most 4.
     pub(super) fn new(like: &DistributedVector, depth: usize) -> Result<Self> {
-        let last = [like.like()?, like.like()?];
+        let two = || Ok([like.like()?, like.like()?]);
         Ok(Self {
-            depth,
-            last,
+            last: two()?,
             has_last: false,
-            differences: Vec::new(),
+            differences: (0..depth.min(MOST)).map(|_| two()).collect::<Result<_>>()?,
             count: 0,
-            products: vec![vec![0.0; depth]; depth],
+            products: [[0.0; MOST]; MOST],
         })
     }
 
@@ -52,8 +51,9 @@ impl Anderson {
         next.copy_from(found)?;
         if self.has_last {
             self.keep_difference([found, change])?;
-            for (number, share) in self.shares(change)?.into_iter().enumerate() {
-                next.add_scaled(-share, &self.differences[number][0])?;
+            let shares = self.shares(change)?;
+            for (share, [found, _]) in shares.iter().zip(&self.differences[..self.count]) {
+                next.add_scaled(-share, found)?;
             }
         }
         self.has_last = true;
@@ -63,10 +63,7 @@ impl Anderson {
 
     /// Puts the difference from the last correction first. Collective.
     fn keep_difference(&mut self, now: [&DistributedVector; 2]) -> Result<()> {
-        if self.differences.len() < self.depth && self.count == self.differences.len() {
-            self.differences.push([now[0].like()?, now[0].like()?]);
-        }
-        self.count = (self.count + 1).min(self.depth);
+        self.count = (self.count + 1).min(self.differences.len());
         self.differences[..self.count].rotate_right(1);
         for (difference, (now, last)) in self.differences[0].iter_mut().zip(now.into_iter().zip(&self.last)) {
             difference.copy_from(now)?;
@@ -85,57 +82,68 @@ impl Anderson {
     }
 
     /// The shares `c` of the differences, the newest first. Collective.
-    fn shares(&self, change: &DistributedVector) -> Result<Vec<f64>> {
-        let right = self.differences[..self.count].iter().map(|[_, of_change]| of_change.dot(change));
-        Ok(least_squares(&self.products, &right.collect::<Result<Vec<f64>>>()?))
+    fn shares(&self, change: &DistributedVector) -> Result<[f64; MOST]> {
+        let mut right = [0.0; MOST];
+        for (right, [_, of_change]) in right.iter_mut().zip(&self.differences[..self.count]) {
+            *right = of_change.dot(change)?;
+        }
+        Ok(least_squares(&self.products, &right, self.count))
     }
 }
 
-/// The solution of normal equations by a factor of the scaled matrix, with as many of the first unknowns as are independent; the others are
-/// left out.
-fn least_squares(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
-    let scale: Vec<f64> = (0..right.len()).map(|i| matrix[i][i].sqrt().recip()).collect();
-    let mut lower: Vec<Vec<f64>> = Vec::new();
-    let mut solution: Vec<f64> = Vec::new();
-    for i in 0..right.len() {
-        let mut row: Vec<f64> = Vec::with_capacity(i + 1);
+/// The solution of `count` normal equations by a factor of the scaled matrix, with as many of the first unknowns as are independent; the
+/// others are 0.
+fn least_squares(matrix: &[[f64; MOST]; MOST], right: &[f64; MOST], count: usize) -> [f64; MOST] {
+    let scale: [f64; MOST] = std::array::from_fn(|i| matrix[i][i].sqrt().recip());
+    let mut lower = [[0.0; MOST]; MOST];
+    let mut solution = [0.0; MOST];
+    let mut solved = 0;
+    for i in 0..count {
         for j in 0..i {
-            let known: f64 = (0..j).map(|k| row[k] * lower[j][k]).sum();
-            row.push((scale[i] * matrix[i][j] * scale[j] - known) / lower[j][j]);
+            let known: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+            lower[i][j] = (scale[i] * matrix[i][j] * scale[j] - known) / lower[j][j];
         }
-        let pivot = 1.0 - row.iter().map(|entry| entry * entry).sum::<f64>();
+        let pivot = 1.0 - lower[i][..i].iter().map(|entry| entry * entry).sum::<f64>();
         if pivot.is_nan() || pivot < LEAST_PIVOT || !scale[i].is_finite() {
             break;
         }
-        let pivot = pivot.sqrt();
-        let known: f64 = row.iter().zip(&solution).map(|(entry, value)| entry * value).sum();
-        solution.push((scale[i] * right[i] - known) / pivot);
-        row.push(pivot);
-        lower.push(row);
+        lower[i][i] = pivot.sqrt();
+        let known: f64 = lower[i][..i].iter().zip(&solution).map(|(entry, value)| entry * value).sum();
+        solution[i] = (scale[i] * right[i] - known) / lower[i][i];
+        solved = i + 1;
     }
-    for i in (0..solution.len()).rev() {
-        let known: f64 = (i + 1..solution.len()).map(|k| lower[k][i] * solution[k]).sum();
+    for i in (0..solved).rev() {
+        let known: f64 = (i + 1..solved).map(|k| lower[k][i] * solution[k]).sum();
         solution[i] = (solution[i] - known) / lower[i][i];
     }
-    solution.iter().zip(&scale).map(|(value, scale)| value * scale).collect()
+    std::array::from_fn(|i| if i < solved { solution[i] * scale[i] } else { 0.0 })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn padded<const N: usize>(entries: [[f64; N]; N], right: [f64; N]) -> [f64; MOST] {
+        let mut matrix = [[0.0; MOST]; MOST];
+        let mut all = [0.0; MOST];
+        for i in 0..N {
+            matrix[i][..N].copy_from_slice(&entries[i]);
+            all[i] = right[i];
+        }
+        least_squares(&matrix, &all, N)
+    }
+
     #[test]
     fn normal_equations_by_hand() {
         // Columns (2, 0, 0) and (1, 1, 0) of (3, 4, 5): 3 = 2 a + b, 4 = b.
-        let matrix = [vec![4.0, 2.0], vec![2.0, 2.0]];
-        let found = least_squares(&matrix, &[6.0, 7.0]);
+        let found = padded([[4.0, 2.0], [2.0, 2.0]], [6.0, 7.0]);
         assert!((found[0] + 0.5).abs() < 1e-14 && (found[1] - 4.0).abs() < 1e-14, "{found:?}");
     }
 
     #[test]
     fn differences_that_depend_on_newer_ones_are_left_out() {
-        let matrix = [vec![4.0, 4.0, 0.0], vec![4.0, 4.0, 0.0], vec![0.0, 0.0, 1.0]];
-        assert_eq!(least_squares(&matrix, &[2.0, 2.0, 1.0]), [0.5]);
-        assert!(least_squares(&[vec![0.0]], &[0.0]).is_empty());
+        let found = padded([[4.0, 4.0, 0.0], [4.0, 4.0, 0.0], [0.0, 0.0, 1.0]], [2.0, 2.0, 1.0]);
+        assert_eq!(found, [0.5, 0.0, 0.0, 0.0]);
+        assert_eq!(padded([[0.0]], [0.0]), [0.0; MOST]);
     }
 }

@@ -37,7 +37,7 @@ const SLOW: f64 = 0.2;
 
 /// Number of corrections after which a factor with derivatives at the velocity reached takes the place of one without, or with those of an
 /// earlier step: it costs less than a few corrections, and two of them then suffice.
-const MAX_WITH_TANGENTS: usize = 4;
+const MAX_WITH_TANGENTS: usize = 6;
 /// Such corrections may leave a larger residual than those before, up to this multiple.
 const LARGEST_GROWTH: f64 = 10.0;
 /// Numbers of differences along which forces are extrapolated.
