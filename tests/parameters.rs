@@ -210,7 +210,20 @@ fn numbers(root: &serde_json::Value, schema: &serde_json::Value, path: &str, key
 }
 
 /// Jobs with the keys of numbers that no job of the repository has.
-const RARE: [&str; 6] = [
+const RARE: [&str; 7] = [
+    r#"
+[mesh.box]
+size = [1, 1, 1]
+cells = [2, 2, 2]
+[material.elasticity]
+youngs_modulus = 2
+poisson_ratio = 0.25
+expression = { shear_factor = 3, reference_strain = 6 }
+[time]
+end = 1
+step = 0.25
+scheme = "implicit_euler"
+"#,
     r#"
 [mesh.rectangle]
 size = [1, 2]

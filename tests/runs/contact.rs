@@ -768,7 +768,7 @@ fn a_block_under_large_stresses_falls_on_a_plane_under_a_small_load() {
         let ring = ring.set("initial.stress", "{xx = -5e4, yy = -2e4}");
         assert_carries(&ring, whole_turn, &format!("axisymmetric, order {order}"));
     }
-    // So do large motions to which Newton's method strays.
+    // If Newton's method strays to a flight, the step fails.
     let graph = "{displacement_graph = {points = [[0.0, 0.0], [0.001, 1.2e5], [0.002, 2e5]], slope_after = 2e8, gap = 4e-3}}";
     let strays = case("1")
         .set("material.hypothesis", "'axisymmetric'")
@@ -779,5 +779,5 @@ fn a_block_under_large_stresses_falls_on_a_plane_under_a_small_load() {
         .set("contact.0.normal", graph)
         .set("contact.0.friction.coulomb.coefficient", "0.0")
         .set("time", "{end = 1.5625e-4, step = 1.5625e-4, scheme = 'implicit_euler'}");
-    assert_carries(&strays, 504.0 * std::f64::consts::PI * 2.0, "displacement_graph");
+    strays.run_with(1, &[]).expect(1).says("a body moves by more than a thousand times its size");
 }

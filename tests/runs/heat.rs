@@ -138,3 +138,18 @@ fn steps_that_are_rejected_leave_no_heat_behind() {
     assert!((flow - viscous).abs() < 1e-10 * viscous.abs().max(friction), "{flow} {viscous}");
     assert!((friction - contact).abs() < 1e-7 * contact, "{friction} {contact}");
 }
+
+#[test]
+fn elastic_stress_that_is_a_formula_releases_no_heat() {
+    let softening = "{ youngs_modulus = 1000, poisson_ratio = 0.3, expression = { shear_factor = '1/(1 + e)', reference_strain = 1 } }";
+    let kept = heated()
+        .without("material.viscoplasticity")
+        .without("material.viscosity")
+        .set("material.hypothesis", "'plane_strain'")
+        .set("material.elasticity", softening)
+        .set("contact.0.redistribute_mass", "true")
+        .set("time.scheme", "'midpoint'")
+        .run_and_keep(1);
+    let heats = kept.results().table("history.csv").numbers("flow_heat");
+    assert!(heats.iter().all(|heat| *heat == 0.0), "{heats:?}");
+}
