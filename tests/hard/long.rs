@@ -15,7 +15,7 @@ fn steps() -> usize {
 /// Stored plus dissipated energy minus supplied energy, relative to the supplied energy.
 fn missing(results: &Results) -> f64 {
     let history = results.table("history.csv");
-    let energies = ENERGIES.iter().filter(|kind| kind.role != Role::Work);
+    let energies = ENERGIES.iter().filter(|kind| kind.role != Role::Work && !kind.role.is_heat());
     let kept: f64 = energies.map(|kind| history.last(kind.column)).sum();
     (kept - history.last("external_work")).abs()
         / history.numbers("viscous_dissipation").last().expect("a step")
