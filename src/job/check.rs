@@ -255,6 +255,44 @@ fn check_formulas_of_strain(job: &Job, table: &mut Table<'_>, has_initial_stress
         );
         table.fault("output.error_indicator", message, format!("delete it, or {formula}"));
     }
+    let formulas =
+        job.materials().filter_map(|(_, material)| material.elasticity.as_ref()?.expression.as_ref());
+    let at_rest: Vec<f64> =
+        formulas.map(|formula| formula.at_rest()).filter(|factor| *factor != 1.0).collect();
+    let absorbing = job.support.iter().position(|support| support.absorbing);
+    if let (Some(number), Some(factor)) = (absorbing, at_rest.first()) {
+        let message = format!(
+            "an absorbing support has the wave speeds of youngs_modulus and poisson_ratio, but {formula} multiplies the shear modulus by \
+             {factor} without strain"
+        );
+        let help =
+            "let shear_factor be 1 at e = 0, and youngs_modulus and poisson_ratio those of small strains";
+        table.fault_at_key(&format!("support.{number}.absorbing"), message, help);
+    }
+}
+
+/// Flow heats the body by what it dissipates, and is as fast as the temperature has it, where this is known.
+fn check_heat_of_flow(job: &Job, table: &mut Table<'_>) {
+    for (path, material) in job.materials() {
+        let Some(law) = &material.viscoplasticity else { continue };
+        let heats = material.heat.is_some_and(|heat| heat.dissipation_share > 0.0);
+        if heats && law.with_yield_stress(0.0).has_back_stress() {
+            let message = "kinematic hardening stores part of the work of flow and gives it back, which is not told from heat";
+            let help = format!(
+                "set dissipation_share = 0 in {}, or delete `kinematic_modulus`",
+                header(&format!("{path}.heat"))
+            );
+            table.fault(&format!("{path}.heat"), message, help);
+        }
+        if law.sees_temperature() && !job.time.scheme.is_implicit() {
+            let message = format!(
+                "no bound of the step is known with scheme \"{}\" for {}, which depends on the temperature",
+                job.time.scheme.name(),
+                header(&format!("{path}.viscoplasticity.expression"))
+            );
+            table.fault("time.scheme", message, "use \"implicit_euler\", \"bdf2\" or \"midpoint\"");
+        }
+    }
 }
 
 /// Heat is in all materials or in none, and has an initial temperature; without it nothing else has to do with temperature.
@@ -299,6 +337,17 @@ fn check_heat(job: &Job, table: &mut Table<'_>) {
         }
         return;
     }
+    for (number, contact) in job.contact.iter().enumerate() {
+        if contact.friction_heat.is_some() && contact.friction.is_none() {
+            let message = "a share of the heat of friction requires friction";
+            table.fault_at_key(
+                &format!("contact.{number}.friction_heat"),
+                message,
+                "add [contact.friction], or delete it",
+            );
+        }
+    }
+    check_heat_of_flow(job, table);
     let without = job.materials().filter(|(_, material)| material.resists() && !has_heat(material));
     for (path, _) in without {
         let message = format!("{} has no heat, which other materials have", header(&path));

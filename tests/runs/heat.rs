@@ -153,3 +153,21 @@ fn elastic_stress_that_is_a_formula_releases_no_heat() {
     let heats = kept.results().table("history.csv").numbers("flow_heat");
     assert!(heats.iter().all(|heat| *heat == 0.0), "{heats:?}");
 }
+
+#[test]
+fn temperatures_below_zero_kelvin_are_refused_where_they_are_given_and_where_they_come_about() {
+    let celsius = heated().set("initial.temperature", "-10");
+    celsius
+        .run_with(2, &[])
+        .expect(2)
+        .says("initial.temperature is -10 at")
+        .says("temperatures are in K, not below 0");
+    let given = heated().set("heat.0.temperature", "'200 - 1000*t'");
+    given.run_with(2, &[]).expect(1).says("heat.0: the temperature is").says("temperatures are in K");
+    let drained = heated().set("heat.1.flux", "-1e5");
+    drained
+        .run_with(1, &[])
+        .expect(1)
+        .says("the temperature at the end of the step is -")
+        .says("check the fluxes");
+}

@@ -214,9 +214,9 @@ impl<const D: usize> Heat<D> {
     pub fn set(&mut self, mesh: &Mesh<D>, temperature: &Scalar) -> Result<()> {
         for (value, place) in self.temperature.values.iter_mut().zip(&mesh.nodes[..self.owned]) {
             *value = temperature.evaluate(0.0, place);
-            if !value.is_finite() {
+            if !is_temperature(*value) {
                 return Err(Error::Refused(format!(
-                    "initial.temperature is {value} at {place:?} m; correct the expression"
+                    "initial.temperature is {value} at {place:?} m: temperatures are in K, not below 0; correct the expression"
                 )));
             }
         }
@@ -286,6 +286,18 @@ impl<const D: usize> Heat<D> {
         self.refresh()
     }
 
+    /// Refuses temperatures of the owned nodes that are none.
+    pub fn check(&self, mesh: &Mesh<D>) -> Result<()> {
+        let all = self.temperature_of_owned().iter().zip(&mesh.nodes);
+        match all.into_iter().find(|(value, _)| !is_temperature(**value)) {
+            None => Ok(()),
+            Some((value, place)) => Err(Error::Failed(format!(
+                "the temperature at the end of the step is {value} K at {place:?} m; check the fluxes of [[heat]], or use shorter steps or \
+                 cells without obtuse angles"
+            ))),
+        }
+    }
+
     /// The matrix of conduction in W/K, in which some local nodes are coupled to nothing, with empty rows of nodes on edges. Collective.
     pub fn conduction(
         &self,
@@ -340,18 +352,18 @@ impl<const D: usize> Heat<D> {
             let value = |value: &Scalar, what: &str, node: u32| {
                 let place: &Vector<D> = &mesh.nodes[node as usize];
                 let number_there = value.evaluate(time, place);
-                let is_sound = number_there.is_finite() && (what != COEFFICIENT || number_there >= 0.0);
+                let is_sound = number_there.is_finite() && (what == FLUX || number_there >= 0.0);
                 let fault = || {
                     Error::Failed(format!(
-                        "heat.{number}: the {what} is {number_there} at t = {time} s, position {place:?} m; correct the expression in \
-                         the job"
+                        "heat.{number}: the {what} is {number_there} at t = {time} s, position {place:?} m; only a flux may be \
+                         negative: correct the expression in the job"
                     ))
                 };
                 is_sound.then_some(number_there).ok_or_else(fault)
             };
             if let Some(flux) = &given.flux {
                 for &(node, weight) in nodes {
-                    out.power[node as usize] += weight * value(flux, "flux", node)?;
+                    out.power[node as usize] += weight * value(flux, FLUX, node)?;
                 }
             }
             if let Some(convection) = &given.convection {
@@ -368,9 +380,10 @@ impl<const D: usize> Heat<D> {
             let Some(temperature) = &self.boundaries[number as usize].given.temperature else { continue };
             let place = &mesh.nodes[node as usize];
             let value = temperature.evaluate(time, place);
-            if !value.is_finite() {
+            if !is_temperature(value) {
                 return Err(Error::Failed(format!(
-                    "heat.{number}: the temperature is {value} at t = {time} s, position {place:?} m; correct the expression in the job"
+                    "heat.{number}: the temperature is {value} at t = {time} s, position {place:?} m: temperatures are in K, not below \
+                     0; correct the expression in the job"
                 )));
             }
             out.held.push(value);
@@ -541,6 +554,12 @@ impl<const D: usize> Heat<D> {
 
 /// The words for a coefficient of heat transfer, which is not negative.
 const COEFFICIENT: &str = "coefficient of heat transfer";
+const FLUX: &str = "flux";
+
+/// Whether a number is a temperature in K.
+fn is_temperature(number: f64) -> bool {
+    number >= 0.0 && number.is_finite()
+}
 
 impl NodalField {
     fn of_owned(&self) -> &[f64] {

@@ -56,6 +56,11 @@ impl ElasticityFormula {
         self.growth().fault(self.least())
     }
 
+    /// The shear modulus without strain over that of the linear elasticity.
+    pub fn at_rest(&self) -> f64 {
+        self.shear_factor.value(&[(Variable::E, 0.0)])
+    }
+
     /// The law of a material whose linear elasticity has these moduli.
     pub fn law(&self, elasticity: Isotropic) -> StrainElasticity {
         let stored = self.stored.get(|| Arc::new(Stored::new(&self.shear_factor, self.reference_strain)));
