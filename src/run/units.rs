@@ -89,7 +89,10 @@ pub(super) fn bodies<const D: usize, const S: usize>(
             let mut strain = [0.0; S];
             strain[0] = 1.0;
             let hypothesis = job.material.hypothesis.unwrap_or(Hypothesis::Space);
-            elasticity.tensor(hypothesis).apply(&strain)[0]
+            let tensor = elasticity.tensor(hypothesis);
+            // A formula of the shear modulus leaves the bulk modulus as it is.
+            let factor = elasticity.expression.as_ref().map_or(1.0, |formula| formula.at_rest());
+            tensor.apply(&strain)[0] + (factor - 1.0) * tensor.shear * 2.0 / 3.0
         });
         let speed = if density > 0.0 { (waves / density).sqrt() } else { 0.0 };
         let most = [density, modulus, speed];

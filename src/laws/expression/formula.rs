@@ -157,7 +157,8 @@ impl<S: Scope> Formula<S> {
         let used = S::VARIABLES.iter().filter(|variable| self.uses(**variable));
         let named =
             used.map(|variable| format!("{} = {}", variable.name(), short(place[*variable as usize])));
-        named.collect::<Vec<_>>().join(", ")
+        let named: Vec<_> = named.collect();
+        if named.is_empty() { format!("any {}", S::VARIABLES[0].name()) } else { named.join(", ") }
     }
 }
 

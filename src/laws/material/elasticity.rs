@@ -51,7 +51,7 @@ pub struct Elasticity<N = f64> {
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]
     pub poisson_ratio: f64,
     /// A formula of the strain by which the shear modulus is multiplied; the bulk modulus stays. Under implicit schemes, in plane strain,
-    /// bodies of revolution and 3D; without viscoplasticity, damage, damping by the stiffness and initial stress. Absent: elasticity is
+    /// bodies of revolution and 3D; without viscoplasticity, damage, damping by the stiffness, initial stress and thermal strain. Absent: elasticity is
     /// linear.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expression: Option<ElasticityFormula>,
