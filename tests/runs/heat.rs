@@ -56,8 +56,7 @@ fn a_stage_goes_on_from_the_temperature_of_the_state_it_starts_from() {
         let from = format!("'{}'", state.display());
         square().set("initial", &format!("{{ from = {from} }}")).set("output.probe_also", "['temperature']")
     };
-    let insulated =
-        stage().set("material.heat", INSULATOR).set("contact.0.friction_heat", "0").run_and_keep(2);
+    let insulated = stage().set("material.heat", INSULATOR).run_and_keep(2);
     let kept = insulated.results().table("probes.csv").last("temperature");
     assert!((kept - last).abs() < 1e-6, "{kept} {last}");
     // A state without temperature.
