@@ -3,6 +3,7 @@
 pub(crate) mod digits;
 pub(crate) mod lines;
 pub mod nearest;
+pub mod quadrature;
 pub mod expression;
 pub mod law;
 pub mod contact;

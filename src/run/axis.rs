@@ -4,7 +4,7 @@ use super::parts::part_of;
 use crate::{
     error::Result,
     fem::space::{facets, longest_side},
-    job::{Loaded, Support},
+    job::Loaded,
     linear_algebra::tensor::larger,
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -53,9 +53,7 @@ pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) ->
         let [inside, all] = on_axis(session, mesh, &part);
         session.agree(refusal(loaded, &format!("heat.{number}.on"), inside > 0 && inside == all))?;
     }
-    let gives_way =
-        |support: &Support| support.stiffness.is_some() || support.damping.is_some() || support.absorbing;
-    for (number, support) in job.support.iter().enumerate().filter(|(_, support)| gives_way(support)) {
+    for (number, support) in job.support.iter().enumerate().filter(|(_, support)| support.gives_way()) {
         let part = part_of(session, mesh, ("support", &support.on), support.part.as_ref())?;
         let [inside, all] = on_axis(session, mesh, &part);
         session.agree(refusal(loaded, &format!("support.{number}.on"), inside > 0 && inside == all))?;

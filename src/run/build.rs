@@ -73,7 +73,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
     let mut body = Body::new(mesh, geometry, effects, held, evaluation(job.time.scheme));
-    body.material_tables.clone_from(&materials.tables);
+    body.material_tables = materials.tables;
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
     (body.support_motion, body.elastic_support) = (motion, elastic_support);
     if pairs.iter().any(|pair| pair.slides) {

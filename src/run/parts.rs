@@ -41,7 +41,7 @@ pub(super) fn part_of<const D: usize>(
 pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh<D>) -> Vec<String> {
     let tractions = job.traction.iter().enumerate().map(|(at, t)| (format!("traction.{at}"), &t.on, &t.part));
     let supports = job.support.iter().enumerate();
-    let on_areas = supports.filter(|(_, s)| s.stiffness.is_some() || s.damping.is_some() || s.absorbing);
+    let on_areas = supports.filter(|(_, support)| support.gives_way());
     let supports = on_areas.map(|(at, s)| (format!("support.{at}"), &s.on, &s.part));
     let mut warnings = Vec::new();
     for (table, on, part) in tractions.chain(supports) {
@@ -49,7 +49,7 @@ pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh
         let areas: Vec<f64> = facets(mesh, on)
             .into_iter()
             .filter(|facet| is_cut(mesh, *facet, part))
-            .map(|facet| norm(&facet_normal(&mesh.facet_corners(facet))) * mesh.turn(&centre_of(mesh, facet)))
+            .map(|facet| area_of(mesh, facet))
             .collect();
         let count = session.total(areas.len());
         let [area] = session.sum([areas.iter().sum()]);
@@ -78,6 +78,11 @@ fn is_cut<const D: usize>(mesh: &Mesh<D>, facet: u32, part: &Scalar) -> bool {
     };
     let first = holds(&corners[0]);
     corners.iter().any(|corner| holds(corner) != first)
+}
+
+/// The area of a facet in m^(D-1), of a body of revolution in m^2.
+pub(super) fn area_of<const D: usize>(mesh: &Mesh<D>, facet: u32) -> f64 {
+    norm(&facet_normal(&mesh.facet_corners(facet))) * mesh.turn(&centre_of(mesh, facet))
 }
 
 pub(super) fn centre_of<const D: usize>(mesh: &Mesh<D>, facet: u32) -> Vector<D> {

@@ -1,13 +1,12 @@
 //! Sizes by which wrong units of a job are seen: of each body its extent, mass, waves and loads.
 
-use super::{materials::Materials, parts::centre_of};
+use super::{materials::Materials, parts::area_of};
 use crate::{
     error::Result,
     fem::body::Body,
     job::Job,
     laws::{digits::Digits, material::Hypothesis},
     linear_algebra::tensor::{larger, norm},
-    mesh::shape::facet_normal,
     parallel::{agreement::Agreed, session::Session},
 };
 use serde::Serialize;
@@ -101,8 +100,7 @@ pub(super) fn bodies<const D: usize, const S: usize>(
     for facet in body.load.tractions.iter().flat_map(|traction| &traction.facets) {
         let nodes = mesh.facets[*facet as usize];
         if let Some(sum) = sums.get_mut(of_node[nodes[0] as usize]) {
-            let corners = nodes.map(|node| mesh.nodes[node as usize]);
-            sum.loaded_area += norm(&facet_normal(&corners)) * mesh.turn(&centre_of(mesh, *facet));
+            sum.loaded_area += area_of(mesh, *facet);
         }
     }
     let loads = session.agree(loads(body, job.time.end, (&of_node, sums.len())))?;

@@ -225,12 +225,9 @@ impl<const D: usize> Heat<D> {
 
     /// Makes temperatures on edges and of ghosts those of the owned corners. Collective.
     pub fn refresh(&mut self) -> Result<()> {
-        self.update_ghosts()?;
-        if let Some(strained) = &mut self.strained {
-            self.exchange.owned_mut()?.copy_from_slice(strained.of_owned());
-            self.exchange.update_ghosts()?;
-            strained.values.copy_from_slice(&self.exchange.local()?);
-        }
+        let Self { temperature, strained, exchange, .. } = self;
+        temperature.update_ghosts(exchange)?;
+        strained.iter_mut().try_for_each(|field| field.update_ghosts(exchange))?;
         if !self.has_middles {
             return Ok(());
         }
@@ -239,14 +236,7 @@ impl<const D: usize> Heat<D> {
             values[middle as usize] = 0.5 * (values[a as usize] + values[b as usize]);
         }
         // Ghosts on edges need not belong to a cell of this rank.
-        self.update_ghosts()
-    }
-
-    fn update_ghosts(&mut self) -> Result<()> {
-        self.exchange.owned_mut()?.copy_from_slice(self.temperature.of_owned());
-        self.exchange.update_ghosts()?;
-        self.temperature.values.copy_from_slice(&self.exchange.local()?);
-        Ok(())
+        self.temperature.update_ghosts(&mut self.exchange)
     }
 
     /// The temperature in K at the local nodes, with ghosts.
@@ -286,10 +276,10 @@ impl<const D: usize> Heat<D> {
         self.refresh()
     }
 
-    /// Refuses temperatures of the owned nodes that are none.
-    pub fn check(&self, mesh: &Mesh<D>) -> Result<()> {
-        let all = self.temperature_of_owned().iter().zip(&mesh.nodes);
-        match all.into_iter().find(|(value, _)| !is_temperature(**value)) {
+    /// Refuses changes in K of the owned nodes that lead to what is no temperature.
+    pub fn check(&self, mesh: &Mesh<D>, changes: &[f64]) -> Result<()> {
+        let after = self.temperature_of_owned().iter().zip(changes).map(|(value, change)| value + change);
+        match after.zip(&mesh.nodes).find(|(value, _)| !is_temperature(*value)) {
             None => Ok(()),
             Some((value, place)) => Err(Error::Failed(format!(
                 "the temperature at the end of the step is {value} K at {place:?} m; check the fluxes of [[heat]], or use shorter steps or \
@@ -352,7 +342,7 @@ impl<const D: usize> Heat<D> {
             let value = |value: &Scalar, what: &str, node: u32| {
                 let place: &Vector<D> = &mesh.nodes[node as usize];
                 let number_there = value.evaluate(time, place);
-                let is_sound = number_there.is_finite() && (what == FLUX || number_there >= 0.0);
+                let is_sound = is_temperature(number_there) || (what == FLUX && number_there.is_finite());
                 let fault = || {
                     Error::Failed(format!(
                         "heat.{number}: the {what} is {number_there} at t = {time} s, position {place:?} m; only a flux may be \
@@ -564,6 +554,14 @@ fn is_temperature(number: f64) -> bool {
 impl NodalField {
     fn of_owned(&self) -> &[f64] {
         &self.values[..self.owned]
+    }
+
+    /// Makes the values of ghosts those of their owners. Collective.
+    fn update_ghosts(&mut self, exchange: &mut DistributedVector) -> Result<()> {
+        exchange.owned_mut()?.copy_from_slice(self.of_owned());
+        exchange.update_ghosts()?;
+        self.values.copy_from_slice(&exchange.local()?);
+        Ok(())
     }
 }
 

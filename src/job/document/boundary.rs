@@ -269,6 +269,11 @@ impl Support {
         motions.into_iter().filter_map(|(key, values)| Some((key, values.as_deref()?)))
     }
 
+    /// Whether it gives way: springs and dashpots act on its area.
+    pub fn gives_way(&self) -> bool {
+        self.stiffness.is_some() || self.damping.is_some() || self.absorbing
+    }
+
     /// A support either determines components or gives way.
     pub(in crate::job) fn check(&self, table: &mut Table<'_>) {
         table.refuse_repeats("on", "boundary");

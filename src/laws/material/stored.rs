@@ -1,16 +1,10 @@
 //! The energy that a stress stores whose modulus is a formula of the strain, as an integral.
 
-use crate::laws::expression::{Formula, Interval, REACH, Scope, Variable};
+use crate::laws::{
+    expression::{Formula, Interval, REACH, Scope, Variable},
+    quadrature::means,
+};
 
-/// Places and weights of Gauss's rule with ten points between -1 and 1 (M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions,
-/// table 25.4), on one side.
-const RULE: [[f64; 2]; 5] = [
-    [0.148_874_338_981_631_2, 0.295_524_224_714_752_87],
-    [0.433_395_394_129_247_2, 0.269_266_719_309_996_35],
-    [0.679_409_568_299_024_4, 0.219_086_362_515_982_04],
-    [0.865_063_366_688_984_5, 0.149_451_349_150_580_6],
-    [0.973_906_528_517_171_7, 0.066_671_344_308_688_14],
-];
 /// The powers of two times the scale of the strain between which integrals are kept.
 const POWERS: std::ops::Range<i32> = -40..20;
 /// A piece is halved until its integral changes by less than this share, but not more often than this.
@@ -78,7 +72,7 @@ impl Stored {
             return formula.value(&[(Variable::E, 0.0)]);
         }
         if self.piece(from) == self.piece(to) {
-            return gauss(formula, [from, to]) / sum;
+            return 2.0 * mean(formula, [from, to]) / sum;
         }
         2.0 * self.between(formula, [from, to]) / (sum * (to - from))
     }
@@ -86,14 +80,12 @@ impl Stored {
 
 /// The integral of `s f(s)` by Gauss's rule.
 fn integral<S: Scope>(formula: &Formula<S>, [from, to]: [f64; 2]) -> f64 {
-    0.5 * (to - from) * gauss(formula, [from, to])
+    (to - from) * mean(formula, [from, to])
 }
 
-/// Twice the mean of `s f(s)` by Gauss's rule.
-fn gauss<S: Scope>(formula: &Formula<S>, [from, to]: [f64; 2]) -> f64 {
-    let (centre, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let at = |strain: f64| strain * formula.value(&[(Variable::E, strain)]);
-    RULE.iter().map(|[place, weight]| weight * (at(centre - half * place) + at(centre + half * place))).sum()
+/// The mean of `s f(s)` by Gauss's rule.
+fn mean<S: Scope>(formula: &Formula<S>, range: [f64; 2]) -> f64 {
+    means(|strain| strain * formula.value(&[(Variable::E, strain)]), range)[0]
 }
 
 #[cfg(test)]

@@ -141,8 +141,8 @@ impl HeatStep {
         }
         let Conditions { power, film, .. } = &self.conditions;
         let changes = self.change.owned()?;
+        session.agree(heat.check(mesh, &changes))?;
         heat.add(&changes)?;
-        session.agree(heat.check(mesh))?;
         self.field.clear();
         self.field.extend_from_slice(heat.temperature());
         heat.conduct(mesh, &self.field, &mut self.conducted)?;

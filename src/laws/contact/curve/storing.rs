@@ -4,15 +4,7 @@ use super::Curve;
 use crate::laws::contact::normal_law::{NodeContext, Response};
 use crate::laws::contact::penetration_law::StoringGraph;
 use crate::laws::expression::REACH;
-
-/// Points of the quadrature of Gauss and Legendre on [-1, 1] and their weights; those at the negative points are the same.
-const GAUSS: [[f64; 2]; 5] = [
-    [0.148_874_338_981_631_22, 0.295_524_224_714_752_87],
-    [0.433_395_394_129_247_2, 0.269_266_719_309_996_35],
-    [0.679_409_568_299_024_4, 0.219_086_362_515_982_04],
-    [0.865_063_366_688_984_5, 0.149_451_349_150_580_6],
-    [0.973_906_528_517_171_7, 0.066_671_344_308_688_14],
-];
+use crate::laws::quadrature::means;
 
 /// Integrals are exact up to this share of that of the absolute value, about the rounding of values.
 const EXACT: f64 = 1e-13;
@@ -26,12 +18,8 @@ const DEPTH: usize = 10;
 
 /// The integral of a smooth function from `a` to `b`, and that of its absolute value, by ten points.
 fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
-    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let sum = GAUSS.iter().fold([0.0; 2], |[sum, size], [at, weight]| {
-        let values = [function(middle - half * at), function(middle + half * at)];
-        [sum + weight * (values[0] + values[1]), size + weight * (values[0].abs() + values[1].abs())]
-    });
-    [sum[0] * half, sum[1] * half.abs()]
+    let [mean, size] = means(function, [a, b]);
+    [mean * (b - a), size * (b - a).abs()]
 }
 
 /// The integral of a smooth function from `a` to `b`, as a part of a sum of the size `scale`.
