@@ -1,5 +1,8 @@
 //! Newton's method for the contact equations of one step.
 
+mod acceptance;
+mod yielding;
+
 use super::{
     StepOutcome,
     bounded::Bounded,
@@ -15,14 +18,8 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::{
-        body::Body,
-        effect::{COUNTS, Contact, PointCount},
-    },
-    linear_algebra::{
-        petsc::{DistributedVector, Snes, has_option},
-        tensor::larger,
-    },
+    fem::{body::Body, effect::Contact},
+    linear_algebra::petsc::{DistributedVector, Snes, has_option},
     parallel::session::Session,
 };
 
@@ -70,26 +67,10 @@ const WITH_OBSTACLES: [f64; 2] = [1e-6, 0.03];
 /// The same for all linear solves of a descent: near its end each direction then squares the error.
 const DESCENT_REDUCTION: f64 = 1e-6;
 
-/// The velocities per traction by which friction points yield relative to the compliance of the body: the first, the ratio of each to the
-/// last, and the largest one that is worth trying, and the last.
-const FIRST_RATIO: f64 = 100.0;
-const RATIO_FACTOR: f64 = 0.01;
-const LARGEST_RATIO_FACTOR: f64 = 0.9;
-const LAST_RATIO: f64 = 1e-3;
-/// The tolerance of these solutions relative to that of the step.
-const YIELDING_TOLERANCE: f64 = 1e5;
-
-/// Where nodes stand for little of the surface, their pressures need smaller residuals: the ratio of one tolerance to that before, and how
-/// often it is applied.
-const SHARPER: f64 = 1e-2;
-const MOST_SHARPER: i32 = 2;
-
 /// Fixed-point iterations after which an attempt fails.
 const MAX_FIXED_POINT_ITERATIONS: usize = 200;
 
 const NO_MINIMUM: &str = "no minimum of the energy was found";
-
-const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance is the largest accepted value";
 
 impl Newton {
     /// Newton's method for unknowns with the layout of `like`.
@@ -120,8 +101,8 @@ impl Newton {
         })
     }
 
-    /// Solves equations from their start value: tries one fallback after the other, then checks that velocities and pressures lie on
-    /// the contact graphs. Collective.
+    /// Solves equations from their start value: tries one fallback after the other, each again while obstacles touch or part unexpectedly
+    /// or friction decreases too fast, then checks that velocities and pressures lie on the contact graphs. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -144,9 +125,25 @@ impl Newton {
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let mut failure = String::new();
         for fallback in conditions.fallbacks() {
-            match self.attempt_with_parameters(problem, &mut equations, fallback)? {
-                Some(reason) => failure = reason,
-                None => return self.finish(problem, &mut equations, fallback.search),
+            loop {
+                self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
+                if fallback.search == Search::Yielding {
+                    self.solve_yielding(problem, &mut equations)?;
+                }
+                match self.solve_with_bounds(problem, &mut equations, fallback)? {
+                    None if self.suits_friction(problem) => {
+                        return self.finish(problem, &mut equations, fallback.search);
+                    }
+                    // From this solution, with parameters for the pressures there.
+                    None => {}
+                    Some(reason) => {
+                        failure = reason;
+                        self.go_back(problem, &mut equations)?;
+                        if !self.follow_obstacles(problem, &equations)? {
+                            break;
+                        }
+                    }
+                }
             }
         }
         Err(problem.explain(&failure, conditions.softens))
@@ -175,36 +172,25 @@ impl Newton {
         equations.krylov.set_tolerances(reduction, tolerance, LINEAR_ITERATIONS)
     }
 
-    /// Tries one fallback, again while obstacles touch or part unexpectedly, or while pressures rise so much that friction decreases
-    /// faster than the parameters of its graphs permit; returns the reason for failure, if it fails. Collective.
-    fn attempt_with_parameters<const D: usize, const S: usize>(
+    /// Whether pressures have risen so little that no friction decreases faster with the sliding speed than the parameters of its graphs
+    /// permit. Collective.
+    fn suits_friction<const D: usize, const S: usize>(&mut self, problem: &StepProblem<'_, D, S>) -> bool {
+        let contacts = &problem.body.contacts;
+        write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
+        let mut pairs = contacts.iter().zip(&self.steepest_decreases);
+        pairs.all(|(contact, decrease)| *decrease <= LARGEST_DECREASE_RATIO * contact.friction_scale())
+    }
+
+    /// Lets unknowns follow obstacles that have touched unexpectedly, and no longer those that have parted; returns whether there are
+    /// such. Collective.
+    fn follow_obstacles<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-        fallback: Fallback,
-    ) -> Result<Option<String>> {
-        let system = equations.system;
+        Reduced { system, velocity, .. }: &Reduced<'_>,
+    ) -> Result<bool> {
         let multiply = |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
-        loop {
-            self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
-            let failure = self.attempt_with_bounds(problem, equations, fallback)?;
-            let (session, contacts) = (problem.session, &mut problem.body.contacts);
-            if failure.is_none() {
-                write_steepest_decreases(session, contacts, &mut self.steepest_decreases);
-                let mut pairs = contacts.iter().zip(&self.steepest_decreases);
-                if pairs
-                    .all(|(contact, decrease)| *decrease <= LARGEST_DECREASE_RATIO * contact.friction_scale())
-                {
-                    return Ok(None);
-                }
-                continue;
-            }
-            self.go_back(problem, equations)?;
-            let (contacts, velocity) = (&mut problem.body.contacts, &*equations.velocity);
-            if !self.obstacles.follow_new_contacts(session, contacts, velocity, multiply)? {
-                return Ok(failure);
-            }
-        }
+        let contacts = &mut problem.body.contacts;
+        self.obstacles.follow_new_contacts(problem.session, contacts, velocity, multiply)
     }
 
     /// Sets velocity and pressures to those from which the step was started.
@@ -220,15 +206,12 @@ impl Newton {
     /// Solves the equations with given parameters of the graphs. A fixed-point iteration solves with friction bounds at fixed pressures,
     /// and updates these until the solution also solves the equations with its own pressures. Returns the reason for failure, if it
     /// fails. Collective.
-    fn attempt_with_bounds<const D: usize, const S: usize>(
+    fn solve_with_bounds<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         equations: &mut Reduced<'_>,
         Fallback { search, iteration, .. }: Fallback,
     ) -> Result<Option<String>> {
-        if search == Search::Yielding {
-            self.solve_yielding(problem, equations)?;
-        }
         self.scratch.restart();
         if iteration == FrictionIteration::Newton {
             return self.attempt(problem, equations, search, 1.0);
@@ -259,88 +242,6 @@ impl Newton {
         contacts.iter_mut().for_each(Contact::fix_bounds);
         self.obstacles
             .set_columns(problem.session, contacts, &self.start, |x, y| system.matrix.multiply(x, y))
-    }
-
-    /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
-    /// none. Collective.
-    fn solve_yielding<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-    ) -> Result<()> {
-        let system = self.loosened(equations.system);
-        let equations = &mut Reduced { system, krylov: equations.krylov, velocity: equations.velocity };
-        let mut reached = None;
-        let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
-        set_give(problem.body, ratio);
-        write_unknowns(&problem.body.contacts, equations.velocity)?;
-        write_velocities(&mut problem.body.contacts, equations.velocity)?;
-        self.fix_bounds(problem, system)?;
-        loop {
-            set_give(problem.body, ratio);
-            self.scratch.restart();
-            let failure = self.attempt(problem, equations, Search::ShortDescent, 1.0)?;
-            if failure.is_none() {
-                self.fix_bounds(problem, system)?;
-                self.keep_reached(&problem.body.contacts, equations.velocity)?;
-                reached = Some(ratio);
-                factor = f64::max(RATIO_FACTOR, factor * factor);
-            } else {
-                factor = factor.sqrt();
-            }
-            let Some(last) = reached else {
-                self.go_back(problem, equations)?;
-                break;
-            };
-            if failure.is_some() {
-                set_give(problem.body, last);
-                self.go_to_reached(problem, equations)?;
-            }
-            if last <= LAST_RATIO || factor > LARGEST_RATIO_FACTOR {
-                break;
-            }
-            ratio = last * factor;
-        }
-        problem.body.contacts.iter_mut().for_each(|contact| contact.set_give(0.0));
-        Ok(())
-    }
-
-    /// The equations with the tolerance of solutions with points that yield.
-    fn loosened<'a>(&self, system: System<'a>) -> System<'a> {
-        let tolerance = system.tolerance.max(self.settings.tolerance * self.counts.first);
-        let enough = YIELDING_TOLERANCE * tolerance;
-        // The first residual may be much larger than all forces.
-        let tolerance = if system.floor.largest > 0.0 { enough.min(system.floor.largest) } else { enough };
-        System { tolerance, ..system }
-    }
-
-    /// Keeps the unknowns of this velocity, and the motions of obstacles.
-    fn keep_reached<const D: usize>(
-        &mut self,
-        contacts: &[Contact<D>],
-        velocity: &DistributedVector,
-    ) -> Result<()> {
-        let unknowns = match &mut self.reached {
-            Some(unknowns) => unknowns,
-            none => none.insert(velocity.like()?),
-        };
-        unknowns.copy_from(velocity)?;
-        write_unknowns(contacts, unknowns)?;
-        self.obstacles.keep(contacts);
-        Ok(())
-    }
-
-    /// Sets velocities, pressures and motions of obstacles to those kept last. Collective.
-    fn go_to_reached<const D: usize, const S: usize>(
-        &self,
-        problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-    ) -> Result<()> {
-        let Some(unknowns) = &self.reached else { return Ok(()) };
-        let contacts = &mut problem.body.contacts;
-        problem.session.agree(self.obstacles.restore(contacts))?;
-        equations.velocity.copy_from(unknowns)?;
-        write_velocities(contacts, equations.velocity)
     }
 
     fn conditions<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Conditions {
@@ -541,72 +442,6 @@ impl Newton {
         Ok(true)
     }
 
-    /// Solves to smaller residuals until the velocity and the pressures of the contacts lie on the graphs, and summarises the work of the
-    /// step. Collective.
-    fn finish<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-        search: Search,
-    ) -> Result<StepOutcome> {
-        let mut inclusion = self.inclusion_residual(problem, equations.velocity)?;
-        for times in 1..=MOST_SHARPER {
-            if inclusion <= self.settings.inclusion_tolerance {
-                break;
-            }
-            let sharpness = SHARPER.powi(times);
-            self.set_linear_tolerances(equations, sharpness)?;
-            self.scratch.restart();
-            // Where rounding errors end it, its last iterate is a solution with the residual of a search that is not sharper; otherwise it
-            // is none, even if it is on the graphs.
-            if let Some(reason) = self.attempt(problem, equations, search, sharpness)? {
-                let residual = self.last_residual().norm()?;
-                let is_balanced = self.obstacles.failure(residual, self.settings.tolerance).is_none();
-                if !(is_balanced && residual <= equations.system.tolerance) {
-                    return Err(problem.failed(&reason, INCLUSION_REMEDY));
-                }
-            }
-            inclusion = self.inclusion_residual(problem, equations.velocity)?;
-        }
-        let outcome = self.check_inclusion(problem, equations.velocity, inclusion)?;
-        // With points that yield nothing falls: the energies are those of fixed friction bounds.
-        let may_have_fallen = self.has_descended && search != Search::Yielding;
-        Ok(StepOutcome { fell: may_have_fallen && self.counts.unstable > 0, ..outcome })
-    }
-
-    /// Checks the distance from the graphs of this solution, whose ghosts are updated, and summarises the work of the step. Collective.
-    fn check_inclusion<const D: usize, const S: usize>(
-        &mut self,
-        problem: &StepProblem<'_, D, S>,
-        trial: &DistributedVector,
-        inclusion: f64,
-    ) -> Result<StepOutcome> {
-        let (session, body) = (problem.session, &*problem.body);
-        if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
-            let reason = format!("velocity and pressure deviate from the contact graph by {inclusion:.1e}");
-            return Err(problem.failed(&reason, INCLUSION_REMEDY));
-        }
-        write_branches(body, trial, &mut self.branches_after)?;
-        let changes = self.branches_before.iter().zip(&self.branches_after).filter(|(a, b)| a != b).count();
-        let residual = self.last_residual().norm()?;
-        let velocity = trial.local()?;
-        let mut points = [0.0; COUNTS];
-        for contact in &body.contacts {
-            let counts = contact.count(&velocity).to_array();
-            points.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-        }
-        Ok(StepOutcome {
-            newton_iterations: self.counts.newton_iterations,
-            linear_iterations: self.counts.linear_iterations,
-            active_changes: session.total(changes),
-            points: PointCount::from_array(session.sum(points)),
-            indefinite_solves: self.counts.indefinite,
-            inclusion_residual: inclusion,
-            residual,
-            ..StepOutcome::default()
-        })
-    }
-
     /// The norm of the first residual of the last solve, in N.
     pub(super) fn first_residual(&self) -> f64 {
         self.counts.first
@@ -619,23 +454,6 @@ impl Newton {
             (None, Some(descent)) if self.has_descended => &descent.residual,
             _ => self.snes.residual(),
         }
-    }
-
-    /// The largest distance of the velocity in `trial` and of the pressures of the contacts from the graphs. Collective.
-    fn inclusion_residual<const D: usize, const S: usize>(
-        &self,
-        problem: &StepProblem<'_, D, S>,
-        trial: &mut DistributedVector,
-    ) -> Result<f64> {
-        trial.update_ghosts()?;
-        let (velocity, residual) = (trial.local()?, self.last_residual().owned()?);
-        let mut largest = 0.0;
-        for contact in &problem.body.contacts {
-            let range = problem.session.largest(contact.range(&velocity));
-            let distance = contact.inclusion_residual(&velocity, &residual, range);
-            largest = larger(largest, distance);
-        }
-        Ok(problem.session.largest([largest])[0])
     }
 }
 
@@ -654,11 +472,6 @@ fn write_velocities<const D: usize>(
     let mut values = unknowns.owned_mut()?;
     contacts.iter_mut().for_each(|contact| contact.map(&mut values));
     Ok(())
-}
-
-/// Lets friction points yield by this ratio of the compliance of the body.
-fn set_give<const D: usize, const S: usize>(body: &mut Body<D, S>, ratio: f64) {
-    body.contacts.iter_mut().for_each(|contact| contact.set_give(ratio / contact.friction_scale()));
 }
 
 /// Whether pressure or friction of a contact decrease with the motion.

@@ -1,32 +1,26 @@
 //! The matrix of a step and its solver.
 
+mod attempts;
+
 use super::{
-    StepOutcome,
     bounded::{self, Bounded},
     condensed::Condensed,
-    contacts::{multiple_to_touch, restore_pressures},
-    corrections::correct,
-    equations::{Floor, StepMatrix},
+    equations::StepMatrix,
     factor_cache::{FactorCache, Prepared},
     flow::Flow,
-    flow_corrections::{Corrected, Factored, FlowCorrections},
-    force_scale::size_of,
-    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, ProblemSize, SolverSettings},
+    flow_corrections::FlowCorrections,
+    linear_solver::{Method, Preconditioner, ProblemSize, SolverSettings},
     newton::Newton,
-    problem::{REMEDY, StepProblem, System},
+    problem::StepProblem,
     resistance::{resistances, set_reference_values},
     solver::{Assembled, LinearSolver},
     springs::{RowsWithSprings, Springs},
-    step_clock::CountedMatrix,
     whole::Whole,
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, effect::Contact, space::linear_subspace, state::State},
-    linear_algebra::{
-        petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision, has_option},
-        tensor::larger,
-    },
+    fem::{body::Body, space::linear_subspace, state::State},
+    linear_algebra::petsc::{BlockRows, DistributedVector, Matrix, Precision, has_option},
     parallel::{agreement::Agreed, session::Session},
 };
 use std::cell::Cell;
@@ -36,41 +30,6 @@ use std::cell::Cell;
 pub(super) struct Lengths {
     pub matrix: f64,
     pub cached: f64,
-}
-
-/// The least force in N by which equations are measured: the square of a smaller one underflows.
-const LEAST_FORCE: f64 = 1e-150;
-/// The least force in N by which pressures are measured: the least residual at a node that stands for next to no area is below the accuracy
-/// of its pressure.
-const LEAST_REFERENCE: f64 = 1e-130;
-/// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
-/// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
-const ROUNDING_SHARE: f64 = 0.1;
-/// Share of the forces of a step above which no residual counts as rounding errors, unless those of `K v` are as large.
-const LARGEST_FLOOR: f64 = 1e-4;
-/// The largest residual at which Newton's method stagnates by rounding errors, as a multiple of those of `K v`.
-const STAGNANT: f64 = 4.0;
-
-/// Number of factors with derivatives at velocities of a step after which Newton's method solves it.
-const MOST_FACTORS: usize = 6;
-
-/// A body that only contact holds flies away if it moves by more than this multiple of its size in a step.
-const FAR: f64 = 1e3;
-const FLIGHT: &str =
-    "a body moves by more than a thousand times its size, so that rounding errors hide the forces on it";
-const NO_FLIGHT: &str = "check the loads and the gap";
-
-/// How accurately a step is solved, in N.
-#[derive(Debug, Clone, Copy)]
-struct Accuracy {
-    /// The residual norm at which it counts as solved.
-    tolerance: f64,
-    /// The size of the forces, of those that drive obstacles, too.
-    size: f64,
-    /// The rounding errors of `K v` at the start.
-    product: f64,
-    /// The forces to which its residual is compared: not below those of which rounding errors are the tolerance.
-    reference: f64,
 }
 
 /// The matrix for steps of one length, and its solver.
@@ -316,172 +275,6 @@ impl StepSolver {
         self.active.as_mut().ok_or_else(unassembled)?.solver.solve(r, z)
     }
 
-    /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails, it is repeated with a factor in
-    /// double precision, from the solution on soft springs where contact alone holds a body, and with the tolerance that rounding errors
-    /// of the solution allow. Collective.
-    pub(super) fn solve<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        trial: &mut DistributedVector,
-    ) -> Result<StepOutcome> {
-        let (session, converged, forces) = (problem.session, problem.converged, problem.forces);
-        let Accuracy { mut tolerance, size, product, reference } = self.accuracy(problem, trial)?;
-        let slope = STAGNANT * f64::EPSILON * self.matrix_norm;
-        let floor = Floor { slope, largest: (LARGEST_FLOOR * size).max(STAGNANT * product) };
-        let (mut is_relaxed, mut is_pressed_on) = (false, false);
-        // What is monotone stiffens the body: its derivatives may be part of a factor.
-        let stiffens = problem.body.flows() && !problem.body.flows_beside_viscosity();
-        let (mut factors, mut earlier) = (0, StepOutcome::default());
-        loop {
-            let is_replaceable = stiffens && factors < MOST_FACTORS;
-            let Self { active, step_matrix, newton, flowing, start, products, springs, .. } = &mut *self;
-            let Prepared { matrix, has_tangents, solver, scales, .. } =
-                active.as_mut().ok_or_else(unassembled)?;
-            let (solver, is_own) = (&mut **solver, step_matrix.is_none());
-            let is_single = solver.precision() == Some(Precision::Single);
-            if is_single {
-                keep(trial, start)?;
-            }
-            let other = &CountedMatrix { matrix: &*matrix, products };
-            let other: Option<&dyn StepMatrix> = if *has_tangents { Some(other) } else { None };
-            let matrix = &CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products };
-            let right_hand_side = forces;
-            // Where contact alone holds a body, a direction may be any rigid motion, whose rounding errors hide that nothing holds it.
-            let is_held = is_pressed_on || !springs.are_needed();
-            let floor = if is_held { floor } else { Floor::default() };
-            let system = System { matrix, right_hand_side, tolerance, floor, converged, scales };
-            let solved = match (newton, flowing) {
-                (None, _) => solve_linear(solver.krylov().linear_solver(), problem, system, trial),
-                (Some(newton), None) => correct(newton, solver, problem, system, trial),
-                (Some(newton), Some(flowing)) => {
-                    let factored = Factored { solver: &mut *solver, other, is_replaceable };
-                    let corrected = match is_own || *has_tangents {
-                        true => flowing.correct(newton, factored, problem, system, trial),
-                        false => Ok(Corrected::Unfinished(StepOutcome::default(), false)),
-                    };
-                    match corrected {
-                        Ok(Corrected::Solved(outcome)) => Ok(earlier.followed_by(outcome)),
-                        Ok(Corrected::Unfinished(work, has_progressed))
-                            if is_replaceable && (has_progressed || factors == 0) =>
-                        {
-                            (factors, earlier) = (factors + 1, earlier.followed_by(work));
-                            if !session.agree(self.refactor_with_tangents(problem, trial))? {
-                                session.agree(self.refactor(problem))?;
-                                factors = MOST_FACTORS;
-                            }
-                            continue;
-                        }
-                        Ok(Corrected::Unfinished(work, _)) => flowing
-                            .solve_whole(solver, problem, system, trial)
-                            .map(|outcome| earlier.followed_by(work).followed_by(outcome)),
-                        Err(error) => Err(error),
-                    }
-                }
-            };
-            let solved = match session.agree(solved) {
-                Ok(_) if self.springs.are_needed() && flies_away(problem, trial)? => {
-                    session.agree(Err(problem.failed(FLIGHT, NO_FLIGHT)))
-                }
-                solved => solved,
-            };
-            let failure = match solved {
-                Err(failure) if failure.is_failure() => failure,
-                Ok(solved) => {
-                    // Where only an obstacle moves the body, its forces are those with which the step begins.
-                    let first = self.newton.as_ref().map_or(0.0, |newton| newton.first_residual());
-                    let reference = reference.max(first);
-                    let residual = if reference > 0.0 { solved.residual / reference } else { 0.0 };
-                    return Ok(StepOutcome { residual, ..solved });
-                }
-                Err(error) => return Err(self.springs.explain(error)),
-            };
-            if is_single {
-                session.agree(self.refactor_in_double(problem, trial))?;
-                continue;
-            }
-            if is_relaxed {
-                return Err(self.springs.explain(failure));
-            }
-            // The start value may be much smaller than the solution, especially at rest.
-            let mut solution = forces.like()?;
-            self.precondition(forces, &mut solution)?;
-            if self.springs.are_needed() && !is_pressed_on {
-                // Foundations that nothing presses on yet do not resist: start where springs bear the loads, or farther on in the same
-                // direction where the gaps are closed. Dashpots, which bear less and less of a faster motion, resist most at rest.
-                let are_dashpots = |contact: &Contact<D>| !contact.law.depends_on_displacement();
-                match problem.body.contacts.iter().all(are_dashpots) {
-                    true => trial.fill(0.0)?,
-                    false => {
-                        trial.copy_from(&solution)?;
-                        let multiple = multiple_to_touch(session, problem.body, trial)?;
-                        trial.scale(multiple)?;
-                    }
-                }
-                restore_pressures(problem.body, problem.state)?;
-                is_pressed_on = true;
-                continue;
-            }
-            let floor = f64::EPSILON * self.matrix_norm * solution.norm()?;
-            if !floor.is_finite() || floor <= tolerance || floor > LARGEST_FLOOR * size {
-                return Err(self.springs.explain(failure));
-            }
-            if !self.is_nonlinear() {
-                trial.copy_from(&solution)?;
-            }
-            (tolerance, is_relaxed) = (floor, true);
-        }
-    }
-
-    /// How accurately a step is to be solved; refuses forces that are not finite. Sets the reference forces of the contacts.
-    /// Collective.
-    fn accuracy<const D: usize, const S: usize>(
-        &self,
-        problem: &mut StepProblem<'_, D, S>,
-        start: &DistributedVector,
-    ) -> Result<Accuracy> {
-        let mut norm = problem.norm;
-        if !norm.is_finite() {
-            let remedy = "check loads and initial values; use smaller steps";
-            return Err(problem.failed("the forces are not finite", remedy));
-        }
-        let StepProblem { session, body, scale, rounding, .. } = problem;
-        if norm == 0.0 && !body.contacts.is_empty() {
-            // Nothing but gaps that close sets the body in motion.
-            let square = body.contacts.iter().map(Contact::square_of_closing_forces).sum();
-            norm = session.sum([square])[0].sqrt();
-            *scale = norm;
-        }
-        // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
-        // obstacle rounds `v` as a difference from the obstacle's velocity.
-        let mut motion = start.norm()?;
-        if body.contacts.iter().any(Contact::has_moving_obstacle) {
-            let mine = body.contacts.iter().map(Contact::obstacle_velocity_square).sum();
-            motion += session.sum([mine])[0].sqrt();
-        }
-        let product = f64::EPSILON * self.matrix_norm * motion;
-        // An estimate of the forces as if they were equal in all unknowns. At rest under steady loads the forces cancel, and a body that
-        // its obstacle has released has none: the accuracy of pressures is then limited by rounding errors.
-        let accuracy = self.settings.inclusion_tolerance;
-        let size = norm.max(rounding.max(product) / accuracy);
-        let size = if size > 0.0 { size.max(LEAST_REFERENCE) } else { 0.0 };
-        let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
-        // The forces that drive obstacles are among those of the step.
-        let mut driving = 0.0;
-        for contact in &mut body.contacts {
-            let [along, _] = contact.driven();
-            let own = along.map_or(0.0, |motion| motion.driving().abs());
-            contact.reference.forces = total.max(own);
-            driving = larger(driving, own);
-        }
-        let size = size_of(norm, *scale);
-        let all = size.max(driving);
-        let tolerance =
-            (self.settings.tolerance * size).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product);
-        let rounded = rounding.max(product).max(LEAST_FORCE);
-        let reference = all.max(rounded / self.settings.tolerance);
-        Ok(Accuracy { tolerance, size: all, product, reference })
-    }
-
     /// Replaces the factor by one of the matrix with the derivatives of what cells add to the stress at this velocity; returns whether there
     /// is one. Collective.
     fn refactor_with_tangents<const D: usize, const S: usize>(
@@ -521,43 +314,10 @@ impl StepSolver {
         self.active = Some(prepared);
         Ok(())
     }
-
-    /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
-    fn refactor_in_double<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        trial: &mut DistributedVector,
-    ) -> Result<()> {
-        if let Some(start) = &self.start {
-            trial.copy_from(start)?;
-        }
-        restore_pressures(problem.body, problem.state)?;
-        self.precision = Precision::Double;
-        self.refactor(problem)
-    }
-}
-
-/// Whether the mean motion in the step at these velocities is a flight. Collective.
-fn flies_away<const D: usize, const S: usize>(
-    problem: &StepProblem<'_, D, S>,
-    velocity: &DistributedVector,
-) -> Result<bool> {
-    let body = &*problem.body;
-    let Some(contact) = body.contacts.first() else { return Ok(false) };
-    let way = problem.step.length * velocity.norm()? / (body.mesh.total_nodes as f64).sqrt();
-    Ok(way > FAR * contact.body_size())
 }
 
 fn unassembled() -> Error {
     Error::Internal("a matrix was requested before it was assembled".into())
-}
-
-/// Copies a vector to another, which it creates if there is none.
-fn keep(from: &DistributedVector, to: &mut Option<DistributedVector>) -> Result<()> {
-    match to {
-        Some(to) => to.copy_from(from),
-        none => none.insert(from.like()?).copy_from(from),
-    }
 }
 
 /// Whether all unknowns except the motions of contact nodes are eliminated.
@@ -606,27 +366,6 @@ fn nonlinear<const D: usize, const S: usize>(
         newton.flow = Some(Flow::new(like)?);
     }
     Ok((Some(newton), flowing))
-}
-
-/// Solves a step without contact and flow. Collective.
-fn solve_linear<const D: usize, const S: usize>(
-    ksp: &mut Ksp,
-    problem: &StepProblem<'_, D, S>,
-    system: System<'_>,
-    trial: &mut DistributedVector,
-) -> Result<StepOutcome> {
-    ksp.set_tolerances(0.0, system.tolerance, LINEAR_ITERATIONS)?;
-    let outcome = problem.session.agree(ksp.solve(problem.forces, trial))?;
-    let mut residual = outcome.residual;
-    if !outcome.converged() {
-        let mut left = trial.like()?;
-        system.write_residual(trial, &mut left)?;
-        residual = left.norm()?;
-        if !system.floor.is_reached(residual, trial.norm()?) {
-            return Err(problem.failed(outcome.description(), REMEDY));
-        }
-    }
-    Ok(StepOutcome { linear_iterations: outcome.iterations, residual, ..StepOutcome::default() })
 }
 
 /// The rows of the matrix on this rank. PETSc's integers can count them. Collective.

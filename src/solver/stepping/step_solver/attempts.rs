@@ -1,0 +1,413 @@
+//! The attempts at a step: how it is solved at first, and what is changed after each failure.
+
+use super::{StepSolver, unassembled};
+use crate::{
+    error::Result,
+    fem::effect::Contact,
+    linear_algebra::{
+        petsc::{DistributedVector, Ksp, Precision},
+        tensor::larger,
+    },
+    solver::stepping::{
+        StepOutcome,
+        contacts::{multiple_to_touch, restore_pressures},
+        corrections::correct,
+        equations::{Floor, StepMatrix},
+        factor_cache::Prepared,
+        flow_corrections::{Corrected, Factored, FlowCorrections},
+        force_scale::size_of,
+        linear_solver::LINEAR_ITERATIONS,
+        newton::Newton,
+        problem::{REMEDY, StepProblem, System},
+        solver::LinearSolver,
+        step_clock::CountedMatrix,
+    },
+};
+
+/// The least force in N by which equations are measured: the square of a smaller one underflows.
+const LEAST_FORCE: f64 = 1e-150;
+/// The least force in N by which pressures are measured: the least residual at a node that stands for next to no area is below the accuracy
+/// of its pressure.
+const LEAST_REFERENCE: f64 = 1e-130;
+/// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
+/// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
+const ROUNDING_SHARE: f64 = 0.1;
+/// Share of the forces of a step above which no residual counts as rounding errors, unless those of `K v` are as large.
+const LARGEST_FLOOR: f64 = 1e-4;
+/// The largest residual at which Newton's method stagnates by rounding errors, as a multiple of those of `K v`.
+const STAGNANT: f64 = 4.0;
+
+/// Number of factors with derivatives at velocities of a step after which Newton's method solves it.
+const MOST_FACTORS: usize = 6;
+
+/// A body that only contact holds flies away if it moves by more than this multiple of its size in a step.
+const FAR: f64 = 1e3;
+const FLIGHT: &str =
+    "a body moves by more than a thousand times its size, so that rounding errors hide the forces on it";
+const NO_FLIGHT: &str = "check the loads and the gap";
+
+/// What is changed before a step is tried again.
+#[derive(Clone, Copy)]
+enum Change {
+    /// The step is solved as it is.
+    Nothing,
+    /// The factor is one in double precision.
+    DoublePrecision,
+    /// Where contact alone holds a body, the step starts from what soft springs bear.
+    FromSprings,
+    /// The tolerance is the residual that rounding errors of the solution leave.
+    Relaxed,
+}
+
+impl Change {
+    /// All changes in their order. Each attempt keeps those before.
+    const ALL: [Self; 4] = [Self::Nothing, Self::DoublePrecision, Self::FromSprings, Self::Relaxed];
+}
+
+/// How accurately a step is solved, in N.
+#[derive(Debug, Clone, Copy)]
+struct Accuracy {
+    /// The residual norm at which it counts as solved.
+    tolerance: f64,
+    /// The size of the forces, of those that drive obstacles, too.
+    size: f64,
+    /// The residual that rounding errors leave.
+    floor: Floor,
+    /// Whether that holds only after something is pressed on: where contact alone holds a body, a direction may be any rigid motion, whose
+    /// rounding errors hide that nothing holds it.
+    awaits_pressure: bool,
+    /// The forces to which its residual is compared: not below those of which rounding errors are the tolerance.
+    reference: f64,
+}
+
+/// What an attempt uses: the solvers, the matrix of the step and the one that is factored.
+struct Parts<'a> {
+    newton: Option<&'a mut Newton>,
+    flowing: Option<&'a mut FlowCorrections>,
+    solver: &'a mut dyn LinearSolver,
+    matrix: CountedMatrix<'a>,
+    factored: FactorOf<'a>,
+    scales: &'a [[f64; 2]],
+}
+
+/// What is factored.
+enum FactorOf<'a> {
+    /// The matrix of the step.
+    Step,
+    /// That of a step of another length.
+    AnotherLength,
+    /// That of a step with the derivatives of what its cells add.
+    Tangents(CountedMatrix<'a>),
+}
+
+impl StepSolver {
+    /// Solves a step from the velocity in `trial`, and writes the new one there. Collective.
+    pub(in crate::solver::stepping) fn solve<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
+        let mut accuracy = self.accuracy(problem, trial)?;
+        let mut failure = None;
+        for change in Change::ALL {
+            if !self.apply(change, problem, trial, &mut accuracy)? {
+                continue;
+            }
+            let solved = match self.flowing {
+                Some(_) => self.solve_with_flow(problem, trial, accuracy),
+                None => self.solve_without_flow(problem, trial, accuracy),
+            };
+            let solved = problem.session.agree(solved);
+            let solved =
+                solved.and_then(|solved| problem.session.agree(self.refuse_flight(problem, trial, solved)));
+            match solved {
+                Ok(solved) => {
+                    // Where only an obstacle moves the body, its forces are those with which the step begins.
+                    let first = self.newton.as_ref().map_or(0.0, |newton| newton.first_residual());
+                    let reference = accuracy.reference.max(first);
+                    let residual = if reference > 0.0 { solved.residual / reference } else { 0.0 };
+                    return Ok(StepOutcome { residual, ..solved });
+                }
+                Err(error) if error.is_failure() => failure = Some(error),
+                Err(error) => return Err(self.springs.explain(error)),
+            }
+        }
+        Err(failure.map_or_else(unassembled, |failure| self.springs.explain(failure)))
+    }
+
+    /// Changes how a step is solved; returns whether the change is one. Collective.
+    fn apply<const D: usize, const S: usize>(
+        &mut self,
+        change: Change,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+        accuracy: &mut Accuracy,
+    ) -> Result<bool> {
+        match change {
+            Change::Nothing => Ok(true),
+            Change::DoublePrecision => {
+                if self.parts()?.solver.precision() != Some(Precision::Single) {
+                    return Ok(false);
+                }
+                problem.session.agree(self.refactor_in_double(problem, trial))?;
+                Ok(true)
+            }
+            Change::FromSprings => {
+                if !self.springs.are_needed() {
+                    return Ok(false);
+                }
+                self.start_from_springs(problem, trial)?;
+                accuracy.awaits_pressure = false;
+                Ok(true)
+            }
+            Change::Relaxed => {
+                // The start value may be much smaller than the solution, especially at rest.
+                let mut solution = trial.like()?;
+                self.precondition(problem.forces, &mut solution)?;
+                let rounding = f64::EPSILON * self.matrix_norm * solution.norm()?;
+                if !(rounding > accuracy.tolerance && rounding <= LARGEST_FLOOR * accuracy.size) {
+                    return Ok(false);
+                }
+                accuracy.tolerance = rounding;
+                if !self.is_nonlinear() {
+                    trial.copy_from(&solution)?;
+                }
+                Ok(true)
+            }
+        }
+    }
+
+    /// Starts a step anew from the velocity at which soft springs bear the loads. Foundations that nothing presses on yet do not resist: the
+    /// start lies farther on in the same direction, where the gaps are closed. Dashpots, which bear less and less of a faster motion,
+    /// resist most at rest. Collective.
+    fn start_from_springs<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        if problem.body.contacts.iter().all(|contact| !contact.law.depends_on_displacement()) {
+            trial.fill(0.0)?;
+        } else {
+            self.precondition(problem.forces, trial)?;
+            let multiple = multiple_to_touch(problem.session, problem.body, trial)?;
+            trial.scale(multiple)?;
+        }
+        restore_pressures(problem.body, problem.state)
+    }
+
+    /// Solves a step in which no cells flow, or the whole body by Newton's method. Collective.
+    fn solve_without_flow<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+        accuracy: Accuracy,
+    ) -> Result<StepOutcome> {
+        self.keep_start(trial)?;
+        let Parts { newton, solver, matrix, scales, .. } = self.parts()?;
+        let system = accuracy.system(problem, &matrix, scales);
+        match newton {
+            None => solve_linear(solver.krylov().linear_solver(), problem, system, trial),
+            Some(newton) => correct(newton, solver, problem, system, trial),
+        }
+    }
+
+    /// Solves a condensed step in which cells flow: by corrections, where these are slow with a factor that has derivatives at the
+    /// velocities reached, and where that does not help by Newton's method for the whole body. Collective.
+    fn solve_with_flow<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+        accuracy: Accuracy,
+    ) -> Result<StepOutcome> {
+        let session = problem.session;
+        // What is monotone stiffens the body: its derivatives may be part of a factor.
+        let stiffens = problem.body.flows() && !problem.body.flows_beside_viscosity();
+        let (mut factors, mut earlier) = (0, StepOutcome::default());
+        loop {
+            self.keep_start(trial)?;
+            let Parts { newton: Some(newton), flowing: Some(flowing), solver, matrix, factored, scales } =
+                self.parts()?
+            else {
+                return Err(unassembled());
+            };
+            let system = accuracy.system(problem, &matrix, scales);
+            let is_replaceable = stiffens && factors < MOST_FACTORS;
+            let corrected = match &factored {
+                FactorOf::AnotherLength => Corrected::Unfinished(StepOutcome::default(), false),
+                FactorOf::Step => {
+                    let factored = Factored { solver: &mut *solver, other: None, is_replaceable };
+                    flowing.correct(newton, factored, problem, system, trial)?
+                }
+                FactorOf::Tangents(other) => {
+                    let factored = Factored { solver: &mut *solver, other: Some(other), is_replaceable };
+                    flowing.correct(newton, factored, problem, system, trial)?
+                }
+            };
+            match corrected {
+                Corrected::Solved(outcome) => return Ok(earlier.followed_by(outcome)),
+                Corrected::Unfinished(work, has_progressed)
+                    if is_replaceable && (has_progressed || factors == 0) =>
+                {
+                    (factors, earlier) = (factors + 1, earlier.followed_by(work));
+                }
+                Corrected::Unfinished(work, _) => {
+                    let outcome = flowing.solve_whole(solver, problem, system, trial)?;
+                    return Ok(earlier.followed_by(work).followed_by(outcome));
+                }
+            }
+            if !session.agree(self.refactor_with_tangents(problem, trial))? {
+                session.agree(self.refactor(problem))?;
+                factors = MOST_FACTORS;
+            }
+        }
+    }
+
+    /// Refuses the solution of a step in which a body that only contact holds flies away. Collective.
+    fn refuse_flight<const D: usize, const S: usize>(
+        &self,
+        problem: &StepProblem<'_, D, S>,
+        trial: &DistributedVector,
+        solved: StepOutcome,
+    ) -> Result<StepOutcome> {
+        let contact = match problem.body.contacts.first() {
+            Some(contact) if self.springs.are_needed() => contact,
+            _ => return Ok(solved),
+        };
+        let way = problem.step.length * trial.norm()? / (problem.body.mesh.total_nodes as f64).sqrt();
+        match way > FAR * contact.body_size() {
+            true => Err(problem.failed(FLIGHT, NO_FLIGHT)),
+            false => Ok(solved),
+        }
+    }
+
+    /// Keeps the velocity from which a step with a factor in single precision starts.
+    fn keep_start(&mut self, trial: &DistributedVector) -> Result<()> {
+        if self.parts()?.solver.precision() == Some(Precision::Single) {
+            match &mut self.start {
+                Some(start) => start.copy_from(trial)?,
+                none => none.insert(trial.like()?).copy_from(trial)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn parts(&mut self) -> Result<Parts<'_>> {
+        let Self { active, step_matrix, newton, flowing, products, .. } = self;
+        let Prepared { matrix, has_tangents, solver, scales, .. } =
+            active.as_mut().ok_or_else(unassembled)?;
+        Ok(Parts {
+            newton: newton.as_deref_mut(),
+            flowing: flowing.as_deref_mut(),
+            solver: &mut **solver,
+            matrix: CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products },
+            factored: match step_matrix {
+                _ if *has_tangents => FactorOf::Tangents(CountedMatrix { matrix, products }),
+                Some(_) => FactorOf::AnotherLength,
+                None => FactorOf::Step,
+            },
+            scales,
+        })
+    }
+
+    /// How accurately a step is to be solved; refuses forces that are not finite. Sets the reference forces of the contacts.
+    /// Collective.
+    fn accuracy<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        start: &DistributedVector,
+    ) -> Result<Accuracy> {
+        let mut norm = problem.norm;
+        if !norm.is_finite() {
+            let remedy = "check loads and initial values; use smaller steps";
+            return Err(problem.failed("the forces are not finite", remedy));
+        }
+        let StepProblem { session, body, scale, rounding, .. } = problem;
+        if norm == 0.0 && !body.contacts.is_empty() {
+            // Nothing but gaps that close sets the body in motion.
+            let square = body.contacts.iter().map(Contact::square_of_closing_forces).sum();
+            norm = session.sum([square])[0].sqrt();
+            *scale = norm;
+        }
+        // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
+        // obstacle rounds `v` as a difference from the obstacle's velocity.
+        let mut motion = start.norm()?;
+        if body.contacts.iter().any(Contact::has_moving_obstacle) {
+            let mine = body.contacts.iter().map(Contact::obstacle_velocity_square).sum();
+            motion += session.sum([mine])[0].sqrt();
+        }
+        let product = f64::EPSILON * self.matrix_norm * motion;
+        // An estimate of the forces as if they were equal in all unknowns. At rest under steady loads the forces cancel, and a body that
+        // its obstacle has released has none: the accuracy of pressures is then limited by rounding errors.
+        let accuracy = self.settings.inclusion_tolerance;
+        let size = norm.max(rounding.max(product) / accuracy);
+        let size = if size > 0.0 { size.max(LEAST_REFERENCE) } else { 0.0 };
+        let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
+        // The forces that drive obstacles are among those of the step.
+        let mut driving = 0.0;
+        for contact in &mut body.contacts {
+            let [along, _] = contact.driven();
+            let own = along.map_or(0.0, |motion| motion.driving().abs());
+            contact.reference.forces = total.max(own);
+            driving = larger(driving, own);
+        }
+        let size = size_of(norm, *scale);
+        let all = size.max(driving);
+        let tolerance =
+            (self.settings.tolerance * size).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product);
+        let rounded = rounding.max(product).max(LEAST_FORCE);
+        let reference = all.max(rounded / self.settings.tolerance);
+        let slope = STAGNANT * f64::EPSILON * self.matrix_norm;
+        let floor = Floor { slope, largest: (LARGEST_FLOOR * all).max(STAGNANT * product) };
+        Ok(Accuracy { tolerance, size: all, floor, awaits_pressure: self.springs.are_needed(), reference })
+    }
+
+    /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
+    fn refactor_in_double<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        if let Some(start) = &self.start {
+            trial.copy_from(start)?;
+        }
+        restore_pressures(problem.body, problem.state)?;
+        self.precision = Precision::Double;
+        self.refactor(problem)
+    }
+}
+
+impl Accuracy {
+    /// The equations of a step that is solved so accurately, with this matrix and these parameters of the graphs.
+    fn system<'a, const D: usize, const S: usize>(
+        self,
+        problem: &StepProblem<'a, D, S>,
+        matrix: &'a dyn StepMatrix,
+        scales: &'a [[f64; 2]],
+    ) -> System<'a> {
+        let Self { tolerance, floor, awaits_pressure, .. } = self;
+        let floor = if awaits_pressure { Floor::default() } else { floor };
+        let StepProblem { forces: right_hand_side, converged, .. } = *problem;
+        System { matrix, right_hand_side, tolerance, floor, converged, scales }
+    }
+}
+
+/// Solves a step without contact and flow. Collective.
+fn solve_linear<const D: usize, const S: usize>(
+    ksp: &mut Ksp,
+    problem: &StepProblem<'_, D, S>,
+    system: System<'_>,
+    trial: &mut DistributedVector,
+) -> Result<StepOutcome> {
+    ksp.set_tolerances(0.0, system.tolerance, LINEAR_ITERATIONS)?;
+    let outcome = problem.session.agree(ksp.solve(problem.forces, trial))?;
+    let mut residual = outcome.residual;
+    if !outcome.converged() {
+        let mut left = trial.like()?;
+        system.write_residual(trial, &mut left)?;
+        residual = left.norm()?;
+        if !system.floor.is_reached(residual, trial.norm()?) {
+            return Err(problem.failed(outcome.description(), REMEDY));
+        }
+    }
+    Ok(StepOutcome { linear_iterations: outcome.iterations, residual, ..StepOutcome::default() })
+}
