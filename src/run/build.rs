@@ -85,11 +85,11 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.heat = Some(heat(session, job, &body.mesh, (&materials.all, of_cell))?);
         body.strain_by_temperature();
     }
+    refuse_conflicts(session, job, &body)?;
     if body.paired_displacement.is_some() {
         // As a restart does.
         body.form_pairs(session, &state.displacement)?;
     }
-    refuse_conflicts(session, job, &body)?;
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         redistribute_mass(session, job, &mut body, &parts, &state)?;
     }

@@ -775,7 +775,13 @@ fn a_side_may_be_in_several_contacts_if_their_laws_have_no_scale() {
         }
     }
     let words = "it also belongs to contact.";
-    parts("{ compliance = { stiffness = 1e4 } }").run_with(1, &[]).expect(2).says(words);
+    for law in [
+        "{ compliance = { stiffness = 1e4 } }",
+        "{ unilateral = {} }, wear.coefficient = 1e-9, friction.coulomb.coefficient = 0.1",
+    ] {
+        parts(law).run_with(1, &[]).expect(2).says(words);
+        parts(&format!("{law}, sliding = 'finite'")).run_with(1, &[]).expect(2).says(words);
+    }
 }
 
 /// A block on another one, of 4 x 2 and 3 x 2 cells divided into triangles, with a common left end; the left side of the lower one is at this

@@ -287,3 +287,33 @@ fn all(session: &Session) {
 fn half_and_quarter_models_with_friction_on_a_curved_boundary_are_the_whole_body() {
     run_on(&[1, 2, 3], |world| all(&world.session));
 }
+
+/// Tractions of a block that stands on its rough bottom next to a plane of symmetry, turned by this angle in degrees, in the directions of
+/// the block.
+fn standing(session: &Session, degrees: f64) -> Vec<Vector<2>> {
+    let (sine, cosine) = degrees.to_radians().sin_cos();
+    let turn = |[x, y]: Vector<2>, sine: f64| [cosine * x - sine * y, sine * x + cosine * y];
+    let mut mesh = crossed([2, 2]);
+    mesh.nodes.iter_mut().for_each(|place| *place = turn(*place, sine));
+    let job = format!(
+        "{}[time]\nscheme = \"implicit_euler\"\nend = 1.0\nstep = 0.5\n\
+         [material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0.3 }}\n\
+         [[support]]\non = [\"left\"]\nfix = \"normal\"\n[[traction]]\non = [\"top\"]\npressure = 1e4\n\
+         [[contact]]\non = [\"bottom\"]\nnormal.unilateral = {{}}\nfriction.coulomb.coefficient = 0.2\n",
+        any_mesh::<2>()
+    );
+    nodal::<2, 4>(session, &job, &mesh).into_iter().map(|[_, _, traction]| turn(traction, -sine)).collect()
+}
+
+#[test]
+fn planes_of_symmetry_at_any_angle_carry_no_friction() {
+    run_on(&[1], |world| {
+        let expected = standing(&world.session, 0.0);
+        for degrees in [10.0, 120.0] {
+            for (expected, found) in expected.iter().zip(standing(&world.session, degrees)) {
+                let off: Vector<2> = std::array::from_fn(|i| found[i] - expected[i]);
+                assert!(norm(&off) <= 1e-3, "{degrees} degrees: {found:?} for {expected:?} Pa");
+            }
+        }
+    });
+}

@@ -95,6 +95,14 @@ impl MovingSupports {
         velocity.add_scaled(1.0, &self.velocity)
     }
 
+    /// Lets the contacts of the body know the velocities of the supports.
+    pub(super) fn show_contacts<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
+        let velocity = self.carried.local()?;
+        let velocity = body.seen_by_contacts(&velocity);
+        body.contacts.iter_mut().for_each(|contact| contact.set_support_velocities(Some(&velocity)));
+        Ok(())
+    }
+
     /// Writes the residual of these velocities under these forces, without contact, and returns its norm in N. Collective.
     pub(super) fn write_residual(
         &mut self,

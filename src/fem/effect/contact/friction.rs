@@ -102,6 +102,7 @@ impl<const D: usize> Friction<D> {
                 count,
                 follows: true,
                 all,
+                is_carried: false,
                 obstacle: [0.0; D],
                 obstacle_speed: 0.0,
                 context: SlidingContext {
@@ -157,6 +158,11 @@ impl<const D: usize> Friction<D> {
         for point in &mut self.points {
             point.context.temperature = temperatures[point.node()];
         }
+    }
+
+    /// Sets the velocities of supports in the step in m/s by local nodes; none if all are at rest.
+    pub(super) fn set_support_velocities(&mut self, velocities: Option<&[f64]>) {
+        self.points.iter_mut().for_each(|point| point.set_support_velocity(velocities));
     }
 
     /// Marks the points that face nothing in the step.
@@ -553,6 +559,7 @@ mod tests {
         let law = DistanceWeakening { at_rest: 0.5, dynamic: 0.3, distance: 0.01, decay: Decay::Linear };
         let tangent = [0.8, 0.6];
         let point = TangentialPoint {
+            is_carried: false,
             at: 0,
             numbers: [0; 2],
             weight: 1.0,

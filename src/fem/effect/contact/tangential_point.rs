@@ -26,6 +26,8 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Whether its unknown is relative to the obstacle.
     pub follows: bool,
     pub all: usize,
+    /// Whether supports move the node along the held tangents in the current step.
+    pub is_carried: bool,
     /// Velocity of the obstacle along these tangents in m/s, in the current step, and its speed in any direction.
     pub obstacle: Vector<D>,
     pub obstacle_speed: f64,
@@ -149,13 +151,22 @@ impl<const D: usize> TangentialPoint<D> {
         self.obstacle_speed = norm(velocity);
     }
 
+    /// Sets whether supports move the node along the held tangents, given their velocities in m/s; none if all are at rest.
+    pub(super) fn set_support_velocity(&mut self, velocities: Option<&[f64]>) {
+        self.is_carried = velocities.is_some_and(|velocities| {
+            let velocity = self.value(Body, velocities);
+            norm(&self.held_part(&velocity)) > ROUNDED * norm(&velocity)
+        });
+    }
+
     /// The sliding velocity in m/s relative to the obstacle along the tangents that supports hold: there nodal velocities and unknowns
-    /// are those of the supports. Zero if it is a rounding error.
+    /// are those of the supports, which are exactly zero at rest, unlike parts of vectors along a direction that is not an axis. Zero if it
+    /// is a rounding error.
     pub(super) fn held_sliding(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
         if self.all == self.count {
             return [0.0; D];
         }
-        let value = self.value(vectors, nodal);
+        let value = if self.is_carried { self.value(vectors, nodal) } else { [0.0; D] };
         let (node, obstacle) = (self.held_part(&value), self.held_part(&self.obstacle));
         let sliding = add_scaled(&node, -1.0, &obstacle);
         let rounding = larger(ROUNDING * self.obstacle_speed, ROUNDED * norm(&value));
