@@ -89,7 +89,8 @@ fn fault(name: &str, sources: &[(String, String)], others: &str) -> Option<Strin
         |path: &str| path.contains(&format!("/{owner}/")) || path.ends_with(&format!("/{owner}.rs"));
     let known = sources.iter().any(|(path, text)| {
         let belongs = if owner.starts_with(char::is_uppercase) {
-            declares(text, owner) || text.contains(&format!("{owner}<"))
+            declares(text, owner)
+                || [format!("{owner}<"), format!("impl {owner} {{")].iter().any(|use_| text.contains(use_))
         } else {
             of_module(path)
         };

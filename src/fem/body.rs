@@ -578,8 +578,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// The largest contact pressure in Pa on this rank in the step just solved, where friction weakens under a pressure that no
     /// law bounds; `None` if it nowhere does.
     pub fn slip_pressure(&self, state: &State) -> Result<Option<f64>> {
-        let mut weakening =
-            self.contacts.iter().filter(|contact| contact.decrease_per_pressure(1.0).is_some()).peekable();
+        let mut weakening = self
+            .contacts
+            .iter()
+            .filter(|contact| contact.laws().decrease_per_pressure(1.0).is_some())
+            .peekable();
         if weakening.peek().is_none() {
             return Ok(None);
         }

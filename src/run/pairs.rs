@@ -161,6 +161,10 @@ const OR_EXCLUDE: &str = "or exclude the facets around it by `where`";
 const SHARED: &str = "use `unilateral` with the friction `coulomb` or `tresca`, without wear, adhesion and memory, which leave such nodes to \
                       their neighbours, or exclude the facets around it by the `where` of one of the tables";
 
+/// The same for parts of a fault, whose nodes have no neighbours to which they could be left.
+const PARTS_OF_A_FAULT: &str = "give the parts of the fault one table with a friction coefficient that is a formula of the place, such as \
+                                friction.expression.coefficient = \"if(x < 1, 0.3, 0.6)\"";
+
 /// Refuses nodes that carry the law of one pair and are on the other side of another. Collective.
 fn refuse_chains<const D: usize>(
     session: &Session,
@@ -234,6 +238,7 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
         Some((node, pair, why)) => {
             let contact = &job.contact[pair];
             let remedy = match (contact.side, is_exchanged(pairs, pair)) {
+                _ if why.starts_with(ALSO) && contact.against.is_empty() => PARTS_OF_A_FAULT.into(),
                 _ if why.starts_with(ALSO) => SHARED.into(),
                 (Side::Auto, _) => format!("hold both bodies there in the same directions, or none of them, {OR_EXCLUDE}"),
                 (_, true) => format!("delete `side`, {OR_EXCLUDE}"),

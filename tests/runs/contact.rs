@@ -781,3 +781,30 @@ fn a_block_under_large_stresses_falls_on_a_plane_under_a_small_load() {
         .set("time", "{end = 1.5625e-4, step = 1.5625e-4, scheme = 'implicit_euler'}");
     strays.run_with(1, &[]).expect(1).says("a body moves by more than a thousand times its size");
 }
+
+/// An obstacle that a force presses on a block without supports and inertia: nothing but the obstacle pushes it against its foundation.
+#[test]
+fn a_force_presses_an_obstacle_on_a_block_that_contact_alone_holds() {
+    let work = |law: &str| {
+        let job = format!(
+            "[mesh.rectangle]\nsize = [1.0, 0.4]\ncells = [4, 2]\n\
+             [material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 1e4, poisson_ratio = 0.3 }}\n\
+             [[contact]]\non = [\"top\"]\nnormal.unilateral = {{}}\n\
+             obstacle.sphere = {{ centre = [0.5, 1.0], radius = 0.6 }}\n\
+             obstacle_load = {{ direction = [0, -1], force = \"100*t\" }}\n\
+             [[contact]]\non = [\"bottom\"]\nfriction.coulomb.coefficient = 0.3\n{law}\n\
+             [time]\nend = 1.0\nstep = 0.5\nscheme = \"implicit_euler\"\n"
+        );
+        let case = Case::written_as(&job).run_and_keep(1);
+        let history = case.results().table("history.csv");
+        assert!(history.numbers("energy_imbalance").iter().all(|share| *share <= 1e-8), "{law}");
+        *history.numbers("obstacle_work").last().expect("a step")
+    };
+    let found = work("normal.compliance = { stiffness = 1e5 }");
+    let expected = work("normal.displacement_graph = { points = [[0.0, 0.0]], slope_after = 1e5 }");
+    assert!((found - expected).abs() <= 1e-8 * expected, "{found} and {expected} J");
+    assert!(
+        work("normal.unilateral = {}") < 0.9 * expected,
+        "a foundation that does not yield takes up no work"
+    );
+}

@@ -423,6 +423,21 @@ fn a_fault_through_a_body_is_contact_between_two_bodies() {
 }
 
 #[test]
+fn parts_of_a_fault_with_laws_of_their_own_are_refused_with_a_remedy_that_works() {
+    let part = |condition: &str, bound: &str| {
+        format!(
+            "{{ on = ['fault'], where = '{condition}', normal.unilateral = {{}}, friction.coulomb.coefficient = {bound} }}"
+        )
+    };
+    let parts = format!("[{}, {}]", part("x < 0.5", "0.3"), part("x > 0.5", "0.6"));
+    let words = "give the parts of the fault one table with a friction coefficient that is a formula of the place, such as \
+                 friction.expression.coefficient = \"if(x < 1, 0.3, 0.6)\"";
+    with_fault([0, 8]).set("contact", &parts).run_with(1, &[]).expect(2).says(words);
+    let one = "[{ on = ['fault'], normal.unilateral = {}, friction.expression.coefficient = 'if(x < 0.5, 0.3, 0.6)' }]";
+    with_fault([0, 8]).set("contact", one).set("time.end", "0.1").run(1);
+}
+
+#[test]
 fn a_fault_ends_inside_a_body() {
     for order in ["1", "2"] {
         let alone = with_fault([2, 6]).set("mesh.order", order).run_and_keep(1);

@@ -92,18 +92,21 @@ impl Gap {
             self.depth::<D>(start + share * (end - start), &place).unwrap_or(f64::NEG_INFINITY)
         };
         let ends = [depth(0.0), depth(1.0)];
-        let size = [before, after].into_iter().flatten().fold(0.0, |most, x| larger(most, x.abs()));
-        if ends.iter().any(|end| *end > ROUNDING * size) {
+        // Coordinates of one point may all be zero.
+        let centres: [Vector<D>; 2] = [*start, *end].map(|time| self.centre(time));
+        let places = [before, after].into_iter().chain(&centres).flatten();
+        let rounding = ROUNDING * places.fold(sweep.body_size, |most, x| larger(most, x.abs()));
+        if ends.iter().any(|end| *end > rounding) {
             return false;
         }
         // An obstacle that jumps as the step begins takes a point with it that it touches at the end.
         let jump = depth(EARLY) / (1.0 - EARLY);
-        let takes_along = ends[1] >= -ROUNDING * size && jump < sweep.body_size;
+        let takes_along = ends[1] >= -rounding && jump < sweep.body_size;
         let jump = if takes_along { jump.max(0.0) } else { 0.0 };
         let inside = (1..=SAMPLES).map(|at| at as f64 / (SAMPLES + 1) as f64);
         let inside = inside.map(|share| depth(share) - (1.0 - share) * jump);
         let deepest = inside.fold(f64::NEG_INFINITY, f64::max);
-        if deepest <= ROUNDING * size {
+        if deepest <= rounding {
             return false;
         }
         // The place of the point in the neighbouring steps is not known; that of the obstacle is. A depth that is no number is ignored.
@@ -116,7 +119,7 @@ impl Gap {
         let [least, most] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], depth| {
             [least.min(depth), most.max(depth)]
         });
-        deepest > ROUNDING * size + (most - least)
+        deepest > rounding + (most - least)
     }
 }
 
@@ -210,6 +213,10 @@ mod tests {
         for gap in driven("-0.2 + 0.01*step(t - 1e-9) + 0.02*sin(pi*t)^2") {
             assert!(passes(&gap, [[0.0, 0.0], [0.0, 0.01]]), "it goes on and comes back: {gap:?}");
         }
+        let along = |i: usize| expression(["0.1*cos(37*pi/180)*t", "0.1*sin(37*pi/180)*t"][i]);
+        let normal = vec![expression("-sin(37*pi/180)"), expression("cos(37*pi/180)")];
+        let belt = Gap::Plane(Plane { point: vec![along(0), along(1)], normal, rotation: None });
+        assert!(!passes(&belt, [[0.0, 0.0]; 2]), "it moves along itself");
         for gap in driven("-0.3 + 0.25*sin(pi*t/2)^2") {
             assert!(!passes(&gap, rest), "it is inside at the end, which the gap shows: {gap:?}");
         }

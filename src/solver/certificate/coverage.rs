@@ -12,7 +12,7 @@ pub(super) fn covers_steps<const D: usize, const S: usize>(body: &Body<D, S>, st
     let is_uncovered = |contact: &Contact<D>| {
         contact.friction().is_some_and(|friction| friction.follows_pressure())
             || contact.obstacle.is_some()
-            || contact.decrease_per_pressure(step_length).is_some()
+            || contact.laws().decrease_per_pressure(step_length).is_some()
     };
     !body.contacts.iter().any(is_uncovered)
         && body.softening().next().is_none()
@@ -52,7 +52,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
             Digits(decrease)
         ));
     }
-    for fall in contacts.iter().filter_map(|contact| contact.decrease_per_pressure(step_length)) {
+    for fall in contacts.iter().filter_map(|contact| contact.laws().decrease_per_pressure(step_length)) {
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
             if bound == 0.0 {
                 let why = match theta_step {

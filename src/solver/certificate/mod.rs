@@ -84,8 +84,8 @@ impl Certificates {
     ) -> Result<Self> {
         let (length, longest) = (matrix.length, range.steps[1]);
         let steepest = |constants: [f64; 2]| constants.into_iter().fold(0.0, f64::max);
-        let falls = body.contacts.iter().map(|c| steepest(c.monotonicity_constants(length)));
-        let decrease = body.contacts.iter().filter_map(Contact::decrease_with_displacement);
+        let falls = body.contacts.iter().map(|c| steepest(c.laws().monotonicity_constants(length)));
+        let decrease = body.contacts.iter().filter_map(|contact| contact.laws().decrease_with_displacement());
         let decrease = decrease.reduce(f64::max);
         let growth = growth(&body.contacts);
         let viscous = body.has_form_everywhere(Form::Viscosity);
@@ -110,9 +110,9 @@ impl Certificates {
                 known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?);
             }
         }
-        if body.contacts.iter().any(|contact| contact.decrease_per_pressure(length).is_some()) {
+        if body.contacts.iter().any(|contact| contact.laws().decrease_per_pressure(length).is_some()) {
             let bound = if known.steps_are_unique() {
-                let slips = |contact: &&Contact<D>| contact.decrease_per_pressure(length).is_some();
+                let slips = |contact: &&Contact<D>| contact.laws().decrease_per_pressure(length).is_some();
                 let tangents = body.contacts.iter().filter(slips).flat_map(Contact::tangential_directions);
                 if moves_rigidly(session, body, tangents, true)? {
                     0.0

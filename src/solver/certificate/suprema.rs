@@ -11,9 +11,10 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Contact, Decrease, Form},
+        effect::{Contact, Form},
         state::State,
     },
+    laws::contact::Decrease,
     linear_algebra::{petsc::DistributedVector, tensor::larger},
     parallel::session::Session,
     solver::stepping::{MatrixOfStep, StepRange, TIME_TOLERANCE},
@@ -217,8 +218,8 @@ impl<const D: usize, const S: usize> Pencil<'_, '_, D, S> {
     /// The coefficients of the squares at the points of a contact.
     fn coefficients(&self, part: Part, contact: &Contact<D>) -> [f64; 2] {
         let whole = |step: [Decrease; 2]| step.map(|d| d.constant + self.steps.lengths[1] * d.proportional);
-        let own = || contact.decreases(self.whole);
-        let per_pressure = || [Decrease::default(), contact.decreases_per_pressure(self.whole)];
+        let own = || contact.laws().decreases(self.whole);
+        let per_pressure = || [Decrease::default(), contact.laws().decreases_per_pressure(self.whole)];
         match part {
             Part::Constant => own().map(|decrease| decrease.constant),
             Part::Proportional => own().map(|decrease| decrease.proportional),
@@ -227,7 +228,7 @@ impl<const D: usize, const S: usize> Pencil<'_, '_, D, S> {
             Part::ProportionalPerPressure => per_pressure().map(|decrease| decrease.proportional),
             Part::WholePerPressure => whole(per_pressure()),
             Part::NormalTrace => [1.0, 0.0],
-            Part::Trace => contact.monotonicity_constants(self.matrix.length),
+            Part::Trace => contact.laws().monotonicity_constants(self.matrix.length),
             Part::Interior(_) | Part::Matrix | Part::OfMatrix(_) => [0.0; 2],
         }
     }

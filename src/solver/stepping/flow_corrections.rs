@@ -52,7 +52,7 @@ pub(super) enum Corrected {
 }
 
 /// A solver with the factor of a matrix.
-pub(super) struct Factored<'a> {
+pub(super) struct StepFactor<'a> {
     pub solver: &'a mut dyn LinearSolver,
     /// The matrix `K'`, unless it is that of the step.
     pub other: Option<&'a dyn StepMatrix>,
@@ -76,12 +76,12 @@ pub(super) struct FlowCorrections {
     /// The velocity from which the step was started.
     start: DistributedVector,
     /// Newton's method for the whole body, once it was needed.
-    whole: Option<Box<Whole>>,
+    whole: Option<Box<WholeBody>>,
     settings: SolverSettings,
 }
 
 /// Newton's method for the whole body, and its linear solver.
-struct Whole {
+struct WholeBody {
     newton: Newton,
     krylov: ProjectedKsp,
     scales: Vec<[f64; 2]>,
@@ -109,7 +109,7 @@ impl FlowCorrections {
     pub(super) fn correct<const D: usize, const S: usize>(
         &mut self,
         newton: &mut Newton,
-        Factored { solver, other, is_replaceable }: Factored<'_>,
+        StepFactor { solver, other, is_replaceable }: StepFactor<'_>,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         trial: &mut DistributedVector,
@@ -199,9 +199,9 @@ impl FlowCorrections {
     ) -> Result<StepOutcome> {
         let whole = match &mut self.whole {
             Some(whole) => whole,
-            none => none.insert(Whole::new(&problem.body.contacts, velocity, &self.settings)?),
+            none => none.insert(WholeBody::new(&problem.body.contacts, velocity, &self.settings)?),
         };
-        let Whole { newton, krylov, scales } = &mut **whole;
+        let WholeBody { newton, krylov, scales } = &mut **whole;
         scales.clear();
         scales.extend(problem.body.contacts.iter().map(|contact| contact.reference.resistance));
         number_unknowns(&mut problem.body.contacts, |node| node);
@@ -245,7 +245,7 @@ impl FlowCorrections {
     }
 }
 
-impl Whole {
+impl WholeBody {
     /// For contacts of a body whose cells flow, and velocities with the layout of `like`. Collective.
     fn new<const D: usize>(
         contacts: &[Contact<D>],

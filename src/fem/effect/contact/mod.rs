@@ -70,7 +70,6 @@ pub use loaded_obstacle::{
 };
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
-pub use sliding::Decrease;
 pub use sweep::OVERRUN;
 pub(super) use tangential_point::tangents;
 pub use unknowns::{choose_unknowns, set_walls};

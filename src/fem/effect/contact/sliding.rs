@@ -17,7 +17,7 @@ use crate::{
         },
         space::Held,
     },
-    laws::contact::{FrictionLaw, NodeContext, Wear},
+    laws::contact::{FrictionLaw, LawsOfContact, NodeContext, Wear},
     linear_algebra::tensor::{larger, norm},
     mesh::Mesh,
 };
@@ -191,42 +191,14 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or(0.0, Friction::rise_of_bound)
     }
 
+    /// Both laws.
+    pub fn laws(&self) -> LawsOfContact<'_> {
+        LawsOfContact { normal: &self.law, friction: self.friction() }
+    }
+
     /// The steepest decrease in Pa s/m of the normal graph in the current step.
     pub fn monotonicity_constant(&self) -> f64 {
         self.law.monotonicity_constant(self.blend.way())
-    }
-
-    /// The steepest decreases in Pa s/m of the normal and of the friction graph in a step of this length in s, as far as they are known
-    /// before it. Friction that depends on an unbounded pressure counts as not decreasing; see
-    /// [`decrease_per_pressure`](Self::decrease_per_pressure).
-    pub fn monotonicity_constants(&self, step_length: f64) -> [f64; 2] {
-        let friction = self.friction().map_or(0.0, |law| law.first_decrease(step_length));
-        let most = self.law.greatest_pressure();
-        let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
-        [self.law.monotonicity_constant(step_length), tangential]
-    }
-
-    /// The decreases of [`monotonicity_constants`](Self::monotonicity_constants) in steps between these two lengths in s.
-    pub fn decreases(&self, steps: [f64; 2]) -> [Decrease; 2] {
-        std::array::from_fn(|i| Decrease::of(|length| self.monotonicity_constants(length)[i], steps))
-    }
-
-    /// The decrease of [`decrease_per_pressure`](Self::decrease_per_pressure) in steps between these two lengths in s.
-    pub fn decreases_per_pressure(&self, steps: [f64; 2]) -> Decrease {
-        Decrease::of(|length| self.decrease_per_pressure(length).unwrap_or(0.0), steps)
-    }
-
-    /// The steepest decrease of the normal law with the displacement in Pa/m, if it depends on the displacement and decreases.
-    pub fn decrease_with_displacement(&self) -> Option<f64> {
-        let decrease = self.law.monotonicity_constant(1.0);
-        (self.law.depends_on_displacement() && decrease > 0.0).then_some(decrease)
-    }
-
-    /// The steepest descent of the friction coefficient in s/m in a step of this length in s, where the pressure that multiplies it is
-    /// unbounded.
-    pub fn decrease_per_pressure(&self, step_length: f64) -> Option<f64> {
-        let fall = self.friction()?.first_decrease(step_length);
-        (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 
     /// The largest contact pressure in Pa at points on this rank, at least 0, in the step just solved, at its velocities with
@@ -253,27 +225,6 @@ fn worn_after<const D: usize>(point: &Point<D>, wear: Wear, (velocity, speed): (
 const NEGLIGIBLE_HISTORY: f64 = 1e-3;
 /// Share of a displacement or a velocity that is a rounding error.
 const ROUNDING_SHARE: f64 = 1e-9;
-
-/// A bound of the steepest decrease of a graph, `constant + length * proportional` in a step of this length.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Decrease {
-    /// In Pa s/m.
-    pub constant: f64,
-    /// In Pa/m.
-    pub proportional: f64,
-}
-
-impl Decrease {
-    /// The bound in steps between these two lengths in s of a decrease that depends on the length, and grows at most in proportion to it.
-    fn of(at: impl Fn(f64) -> f64, [shortest, longest]: [f64; 2]) -> Self {
-        let most = at(longest);
-        if most == at(0.5 * longest) {
-            Self { constant: most, proportional: 0.0 }
-        } else {
-            Self { constant: 0.0, proportional: at(shortest) / shortest }
-        }
-    }
-}
 
 /// The depth of wear.
 const WEAR: Quantity = quantity!("wear");

@@ -1,10 +1,13 @@
-//! Other start velocities of a step that may have several solutions.
+//! Other start velocities of a step.
 
 use super::{
     Contact,
     point::{Point, Vectors::Body},
 };
-use crate::linear_algebra::tensor::larger;
+use crate::{
+    linear_algebra::tensor::{dot, larger},
+    parallel::session::Session,
+};
 
 /// Points that a motion closes by less than this share of the fastest one do not count.
 const SLOW: f64 = 1e-3;
@@ -26,6 +29,23 @@ impl<const D: usize> Contact<D> {
         let closing = carrying().filter(|point| way(point) > SLOW * longest);
         let multiples = closing.map(|point| (-point.context.penetration).max(0.0) / way(point));
         multiples.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Adds to nodal forces in N of the body, with ghosts, those with which the force on the obstacle presses it against the points in front
+    /// of it, with pressures in proportion to the components of their normals along the force. Collective.
+    pub fn add_driving_force(&self, session: &Session, nodal: &mut [f64]) {
+        let [Some(motion), _] = self.driven() else { return };
+        let Some((direction, _)) = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation()) else {
+            return;
+        };
+        let driving = motion.driving();
+        let against = |point: &Point<D>| (-driving.signum() * dot(&point.normal, direction)).max(0.0);
+        let faced = || self.points.iter().filter(|point| point.can_touch());
+        let [area] = session.sum([faced().map(|point| point.weight * against(point).powi(2)).sum()]);
+        if area > 0.0 {
+            let pressure = driving.abs() / area;
+            faced().for_each(|point| point.add_force(Body, -pressure * against(point), nodal));
+        }
     }
 
     /// Sets the normal velocity of the nodal points to the value of `velocity` for their node, in m/s, and the velocity along a

@@ -14,7 +14,7 @@ use crate::{
         corrections::correct,
         equations::{Floor, StepMatrix},
         factor_cache::Prepared,
-        flow_corrections::{Corrected, Factored, FlowCorrections},
+        flow_corrections::{Corrected, FlowCorrections, StepFactor},
         force_scale::size_of,
         linear_solver::LINEAR_ITERATIONS,
         newton::Newton,
@@ -188,7 +188,17 @@ impl StepSolver {
         if problem.body.contacts.iter().all(|contact| !contact.law.depends_on_displacement()) {
             trial.fill(0.0)?;
         } else {
-            self.precondition(problem.forces, trial)?;
+            let mut forces = trial.like()?;
+            {
+                let mut nodal = forces.local_mut()?;
+                nodal.fill(0.0);
+                let contacts = &problem.body.contacts;
+                contacts.iter().for_each(|contact| contact.add_driving_force(problem.session, &mut nodal));
+            }
+            forces.add_ghosts_to_owners()?;
+            problem.body.held.clear(&mut forces.owned_mut()?);
+            forces.add_scaled(1.0, problem.forces)?;
+            self.precondition(&forces, trial)?;
             let multiple = multiple_to_touch(problem.session, problem.body, trial)?;
             trial.scale(multiple)?;
         }
@@ -235,11 +245,11 @@ impl StepSolver {
             let corrected = match &factored {
                 FactorOf::AnotherLength => Corrected::Unfinished(StepOutcome::default(), false),
                 FactorOf::Step => {
-                    let factored = Factored { solver: &mut *solver, other: None, is_replaceable };
+                    let factored = StepFactor { solver: &mut *solver, other: None, is_replaceable };
                     flowing.correct(newton, factored, problem, system, trial)?
                 }
                 FactorOf::Tangents(other) => {
-                    let factored = Factored { solver: &mut *solver, other: Some(other), is_replaceable };
+                    let factored = StepFactor { solver: &mut *solver, other: Some(other), is_replaceable };
                     flowing.correct(newton, factored, problem, system, trial)?
                 }
             };
