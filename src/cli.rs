@@ -443,13 +443,13 @@ fn on_one_process(work: impl FnOnce() -> Result<Exit>) -> Result<Exit> {
     Ok(outcome.unwrap_or_else(|error| printed(&session, &error)))
 }
 
-/// Splits a mesh, on one process.
 /// A factor on the command line.
 fn factor(word: &str) -> Result<f64, String> {
     let factor = word.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0);
     factor.ok_or_else(|| "a number above 0 is expected".into())
 }
 
+/// Splits a mesh, on one process.
 fn partition((mesh, scale): (&Path, f64), parts: usize, output: &Path) -> Result<Exit> {
     in_session(|session, _| {
         let alone =
@@ -458,6 +458,13 @@ fn partition((mesh, scale): (&Path, f64), parts: usize, output: &Path) -> Result
         let placement = Placement { scale, ..Placement::default() };
         let (header, notes) = partitioned::make((mesh, &placement), parts, output)?;
         notes.iter().for_each(|note| print(&format!("note: {note}")));
+        for group in &header.inner_groups {
+            print(&format!(
+                "note: {} has facets inside the body, along which a partitioned mesh is not split: a job with a contact on it needs the mesh \
+                 file itself",
+                group.name
+            ));
+        }
         print(&format!(
             "{}: {} cells in {parts} parts, imbalance {:.3}, {} facets between them; run it with [mesh] file = {output:?} on 1 to \
              {parts} ranks",

@@ -174,8 +174,12 @@ impl<'a> Table<'a> {
             let message = format!(
                 "\"{name}\" has facets inside the body, for example around {place}: no table can act there"
             );
-            let help =
-                "name a boundary, or take the facets with a cell on both sides out of this physical group";
+            // Meshes that are read as a whole have been split there.
+            let help = if key.starts_with("on") && self.path(key).starts_with("contact") {
+                "a partitioned mesh is not split along faults: name the file of which it was made in [mesh] file"
+            } else {
+                "name a boundary, or take the facets with a cell on both sides out of this physical group"
+            };
             return self.fault(key, message, help);
         }
         let known = [mesh.boundaries, points].concat();

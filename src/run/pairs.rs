@@ -93,7 +93,7 @@ pub(super) fn find<const D: usize>(
         slaves.extend(on.difference(&beside));
         masters.extend(against);
     }
-    refuse_chains(session, mesh, [&slaves, &masters])?;
+    refuse_chains(session, job, mesh, [&slaves, &masters])?;
     mesh.add_ghosts(session, ghosts)?;
     Ok(pairs)
 }
@@ -168,6 +168,7 @@ const PARTS_OF_A_FAULT: &str = "give the parts of the fault one table with a fri
 /// Refuses nodes that carry the law of one pair and are on the other side of another. Collective.
 fn refuse_chains<const D: usize>(
     session: &Session,
+    job: &Job,
     mesh: &Mesh<D>,
     [slaves, masters]: [&BTreeSet<u32>; 2],
 ) -> Result<(), Agreed> {
@@ -179,9 +180,10 @@ fn refuse_chains<const D: usize>(
     session.agree(match both {
         None => Ok(()),
         Some(&node) => Err(Error::Refused(format!(
-            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; exchange \
-             the sides of one of them by `side`, {SHARED}",
-            mesh.nodes[mesh.owned_node(node)]
+            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {}{SHARED}",
+            mesh.nodes[mesh.owned_node(node)],
+            // Otherwise all sides have been tried.
+            if job.contact.iter().any(|contact| contact.side != Side::Auto) { "delete `side`, " } else { "" }
         ))),
     })
 }

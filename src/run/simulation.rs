@@ -14,7 +14,7 @@ use crate::{
         state::State,
     },
     io::output::history::Totals,
-    job::{Job, Loaded, Time},
+    job::{Job, Loaded},
     linear_algebra::{petsc::DistributedVector, sparse::Precision, tensor::larger},
     mesh::{GlobalMesh, Mesh},
     parallel::{agreement::Agreed, session::Session},
@@ -36,7 +36,6 @@ pub struct Simulation<const D: usize, const S: usize> {
     pub scheme: Stepper,
     /// Sums and maxima over the steps.
     pub totals: Totals,
-    time: Time,
     /// Times at which steps must end.
     pub(super) landings: Landings,
     /// The step size control, if steps are adaptive.
@@ -84,14 +83,13 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if totals.single_precision_failed {
             scheme.use_double_precision();
         }
-        let (time, landings) = (job.time.clone(), steps::landings(job));
-        Ok(Self { body, state, scheme, totals, time, landings, adaptive })
+        Ok(Self { body, state, scheme, totals, landings: steps::landings(job), adaptive })
     }
 
     /// Takes the next step, shortened to land on required times, and adds it to the totals; `None` at the end time. Collective.
     pub fn advance(&mut self, session: &Session) -> Result<Option<StepOutcome>, Agreed> {
-        let Self { body, state, scheme, totals, time, landings, adaptive } = self;
-        if state.time >= time.end {
+        let Self { body, state, scheme, totals, landings, adaptive } = self;
+        if state.time >= landings.end {
             return Ok(None);
         }
         let target = landings.next([state.time, state.step_length]);

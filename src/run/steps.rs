@@ -170,8 +170,9 @@ pub(super) fn warnings(job: &Job) -> Vec<String> {
     warnings
 }
 
-/// The times at which loads and motions of a job have kinks or jumps, if steps end there.
-fn breakpoints(job: &Job) -> Vec<Breakpoint> {
+/// The times at which loads and motions of a job have kinks or jumps, if steps end there, and the end of its last step: where they jump at
+/// the end of the run, the last time before it.
+fn breakpoints(job: &Job) -> (Vec<Breakpoint>, f64) {
     let mut found = Vec::new();
     for TimeDependent { name, value, .. } in time_dependent(job) {
         let kinks = kinks(job, &value).unwrap_or_default();
@@ -186,9 +187,12 @@ fn breakpoints(job: &Job) -> Vec<Breakpoint> {
         found.extend(switches.into_iter().map(|time| switch(&value, time, largest, name)));
     }
     let near = TIME_TOLERANCE * shortest_step(job);
+    let at_end = |time: f64| (0.0..=near).contains(&(job.time.end - time));
+    let jumps = found.iter().filter(|breakpoint| breakpoint.is_jump && at_end(breakpoint.time));
+    let end = jumps.map(|jump| jump.time).fold(job.time.end, f64::min);
     found.retain(|breakpoint| breakpoint.time > near && job.time.end - breakpoint.time > near);
     found.sort_by(|one, other| one.time.total_cmp(&other.time));
-    found
+    (found, end)
 }
 
 /// The breakpoint of a value that switches near `time`. Where the value depends on position it counts as a jump.
@@ -228,15 +232,16 @@ pub(super) fn landings(job: &Job) -> Landings {
     output_times.retain(|time| *time > 0.0 && !job.time.land_on.contains(time));
     output_times.sort_by(f64::total_cmp);
     output_times.dedup();
+    let (breakpoints, end) = breakpoints(job);
     Landings {
         times: job.time.land_on.clone(),
         output_times,
         interval,
-        breakpoints: breakpoints(job),
+        breakpoints,
         length: shortest_step(job),
         is_fixed: job.time.adaptive.is_none(),
         forgets: forgets(job),
-        end: job.time.end,
+        end,
     }
 }
 

@@ -171,7 +171,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             refuse_uncertified(&self.certificates, &outcome, self.simulation.state.time)?;
             let Simulation { state, landings, adaptive, .. } = &self.simulation;
             self.outputs.after_step(self.session, &self.simulation, &outcome)?;
-            let has_steps_left = state.time < self.job.time.end;
+            let has_steps_left = state.time < landings.end;
             let steps_left = landings.steps_after(state.time, state.step_length);
             let last = if adaptive.is_some() { state.step + steps_left } else { last };
             self.report(&outcome, last);

@@ -53,3 +53,35 @@ fn tables_with_more_kinks_than_steps_are_sampled_with_a_warning() {
     let followed = Case::square(4).set("body_force", &table(20));
     assert_eq!(followed.run(1).number("steps"), 16.0 + 21.0);
 }
+
+/// The last step ends before a jump at the end of the run, as it does where the run goes on.
+#[test]
+fn a_load_that_jumps_at_the_end_of_the_run_acts_until_then() {
+    let adaptive = "{ tolerance = 1e-2, smallest_step = 1e-3, largest_step = 0.0625 }";
+    for scheme in ["implicit_euler", "bdf2"] {
+        for is_adaptive in [false, true] {
+            let until = |end: &str| {
+                let case = Case::square(4)
+                    .set("time.scheme", &format!("'{scheme}'"))
+                    .set("body_force", "[{ value = ['200*pulse(t, 0, 0.5)', 0] }]")
+                    .set("checkpoint.every", "1")
+                    .set("checkpoint.keep", "1")
+                    .set("time.end", end);
+                if is_adaptive { case.set("time.adaptive", adaptive) } else { case }
+            };
+            let rows = |results: &crate::results::Results| {
+                let text = results.text("probes.csv");
+                text.lines().map(str::to_owned).collect::<Vec<_>>()
+            };
+            let longer = until("0.75").run_and_keep(1);
+            let longer = rows(&longer.results());
+            let case = until("0.5").run_and_keep(1);
+            let shorter = rows(&case.results());
+            assert_eq!(shorter[..], longer[..shorter.len()], "{scheme}, adaptive: {is_adaptive}");
+            assert_eq!(case.results().table("history.csv").numbers("time").last(), Some(&0.5));
+            let case = case.set("time.end", "0.75");
+            case.run_with(1, &["--restart"]).expect(0);
+            assert_eq!(rows(&case.results()), longer, "{scheme}, adaptive: {is_adaptive}: continued");
+        }
+    }
+}

@@ -119,7 +119,23 @@ fn a_group_inside_the_body_is_noted_and_no_table_may_name_it() {
     let (folder, file) = with_a_fault();
     let parts = folder.path().join("parts.h5");
     let text = |path: &Path| path.to_str().expect("a path").to_owned();
-    launch::run_alone(&["partition", &text(&file), "-n", "2", "-o", &text(&parts)]).expect(0);
+    let outcome = launch::run_alone(&["partition", &text(&file), "-n", "2", "-o", &text(&parts)]).expect(0);
+    outcome.says("note: fault has facets inside the body, along which a partitioned mesh is not split");
+    let split = |file: &Path| {
+        let contact = "[{ on = ['fault'], normal.unilateral = {} }]";
+        Case::square(2)
+            .without("mesh.rectangle")
+            .without("output.probe")
+            .set("mesh.file", &format!("{file:?}"))
+            .set("support", "[{ on = ['bottom'], fix = 'all' }]")
+            .set("traction", "[{ on = ['left'], value = [0.1, 0] }]")
+            .set("contact", contact)
+    };
+    split(&parts)
+        .run_with(1, &["--force"])
+        .expect(2)
+        .says("name the file of which it was made in [mesh] file");
+    split(&file).run_with(1, &["--force"]).expect(0);
     for (file, ranks) in [(&file, 1), (&file, 2), (&parts, 1), (&parts, 2)] {
         let outcome = launch::run_alone(&["inspect", &text(file)]).expect(0);
         outcome.says("inside      fault: 1 facet inside the body, around (1, 0.5)");

@@ -79,9 +79,10 @@ impl Compliance {
         }
     }
 
-    /// Derivative of the pressure in Pa/m.
+    /// Derivative of the pressure in Pa/m; where the springs are just touched, that of their compression, so that a body that rests there
+    /// is held.
     fn stiffness_at(&self, penetration: f64) -> f64 {
-        if penetration <= 0.0 {
+        if penetration < 0.0 {
             return 0.0;
         }
         self.stiffness * self.exponent * penetration.powf(self.exponent - 1.0)
@@ -123,7 +124,7 @@ impl Compliance {
     fn resolve_springs(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
         let k = node.step_length;
         let excess = node.penetration_at(s / c);
-        if excess > 0.0 {
+        if excess >= 0.0 {
             // The penetration d at the end of the step solves d + (k / c) p(d) = excess.
             let reached = self.penetration(excess, k / c);
             let pressure = self.pressure_at(reached);
@@ -142,7 +143,9 @@ impl Compliance {
             return discrete_gradient::resolve(&damped, s, c, node, before);
         }
         let excess = node.penetration_at(s / c);
-        if excess <= 0.0 || damped.beside(excess, self.of_springs(excess, node))[0] <= 0.0 {
+        let touches = excess == 0.0 && from == 0.0;
+        let presses = excess > 0.0 && damped.beside(excess, self.of_springs(excess, node))[0] > 0.0;
+        if !(touches || presses) {
             return Resolved::free(s, c);
         }
         // The same equation with the pressure p(d) + ratio (d - from).
@@ -276,6 +279,17 @@ mod tests {
         assert!((found.derivative - 1.0 / 102.0).abs() < 1e-16);
         let open = law.resolve(-4.0, 2.0, node);
         assert_eq!((open.velocity, open.pressure, open.branch), (-2.0, 0.0, 0));
+    }
+
+    #[test]
+    fn springs_that_are_just_touched_hold_a_body_at_rest() {
+        let node = NodeContext { step_length: 0.5, ..NodeContext::default() };
+        let springs = Compliance { stiffness: 100.0, exponent: 1.0, damping: 0.0, gap: None };
+        for (law, stiffness) in [(springs.clone(), 50.0), (Compliance { damping: 5.0, ..springs }, 55.0)] {
+            let found = law.resolve(0.0, 2.0, node);
+            assert_eq!((found.velocity, found.pressure), (0.0, 0.0));
+            assert!((found.derivative - 1.0 / (2.0 + stiffness)).abs() < 1e-16, "{found:?}");
+        }
     }
 
     #[test]
