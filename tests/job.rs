@@ -89,6 +89,20 @@ fn jobs_of_the_papers_load_and_flow_in_the_cube_is_warned_of() {
 }
 
 #[test]
+fn an_initial_velocity_without_inertia_is_warned_of() {
+    let quasistatic = SQUARE.replace("\ndensity", "\n# density");
+    let warned = |text: &str, velocity: &str| {
+        let loaded = load(text, &[&format!("initial.velocity={velocity}")]);
+        loaded
+            .warnings
+            .iter()
+            .any(|words| words.starts_with("initial.velocity has no effect: no material has"))
+    };
+    assert!(warned(&quasistatic, "[0.0, '0.1*x']") && !warned(&quasistatic, "[0.0, 0]"));
+    assert!(!warned(SQUARE, "[0.0, 0.1]"));
+}
+
+#[test]
 fn flow_that_keeps_the_volume_is_warned_of_where_cells_lock() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
     let warned = |overrides: &[&str]| {

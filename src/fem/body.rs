@@ -346,14 +346,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
         (energy, squares)
     }
 
-    /// Collects the heat that friction, viscosity and flow release in the step just committed, at the velocity where its equations hold.
+    /// Collects the heat that friction, viscosity and flow release in the step just solved, at this velocity, where its equations hold.
     /// Collective.
-    pub fn release_heat(&mut self, state: &State) -> Result<()> {
+    pub fn release_heat(&mut self, state: &State, velocity: &DistributedVector) -> Result<()> {
         let Some(mut heat) = self.heat.take() else { return Ok(()) };
         heat.start_release(&self.mesh);
-        let released = with_nodal(state, |nodal| {
-            self.add_heat_of_friction(nodal.velocity, &mut heat);
-            self.add_heat_of_viscosity(nodal, &mut heat);
+        let released = velocity.local().and_then(|velocity| {
+            with_nodal(state, |nodal| {
+                self.add_heat_of_friction(&velocity, &mut heat);
+                self.add_heat_of_viscosity(Nodal { velocity: &velocity, ..nodal }, &mut heat);
+            })
         });
         let released = released.and_then(|()| heat.finish_release());
         self.heat = Some(heat);
@@ -950,6 +952,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// this rank.
     pub fn expand(&mut self, state: &State) -> Result<f64> {
         if !self.heat.as_ref().is_some_and(Heat::has_changed) {
+            self.heat.iter_mut().for_each(Heat::expand);
             return Ok(0.0);
         }
         let rest = Step { time: state.time, ..Step::default() };
@@ -958,6 +961,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.strain_by_temperature();
         let (after, _) = self.energy_beside(state, rest)?;
         Ok(after[ELASTIC] - before[ELASTIC])
+    }
+
+    /// Takes back the last expansion.
+    pub fn contract(&mut self) {
+        self.heat.iter_mut().for_each(Heat::contract);
+        self.strain_by_temperature();
     }
 
     /// Gives cells their thermal strain, and laws of flow the temperature, both where some material has such a thing.

@@ -198,6 +198,16 @@ fn check_density_and_elasticity(job: &Job, table: &mut Table<'_>) {
         let help = "give [material] density; for a body without inertia, write the weight as [[body_force]]";
         table.fault_at_key("gravity", message, help);
     }
+    let initial_velocity = job.initial.as_ref().and_then(|initial| initial.velocity.as_ref());
+    if initial_velocity.is_some_and(|velocity| !velocity.iter().all(is_zero))
+        && job.materials().all(|(_, material)| material.density.is_none())
+    {
+        table.warn(
+            "initial.velocity has no effect: no material has a density, and without inertia the forces of a step alone determine its \
+             velocity; add density, or delete it"
+                .into(),
+        );
+    }
     let has_stress = job.initial.as_ref().is_some_and(|initial| initial.stress.is_some());
     if has_stress && job.materials().all(|(_, material)| material.elasticity.is_none()) {
         let message = "an initial stress requires an elastic material";

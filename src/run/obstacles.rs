@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Closeness, Contact, Gaps, OVERRUN},
+        effect::{Closeness, Contact, Gaps, LoadedMotion, OVERRUN},
         space::longest_side,
         state::State,
     },
@@ -177,8 +177,8 @@ fn gaps_of_all<const D: usize>(
     Gaps { smallest: -nearest, largest: farthest, without: session.total(without) }
 }
 
-/// Warnings about nodes that supports hold inside of an obstacle, where constraints have no contact force, and, after the last step, about contacts
-/// that have never touched. Collective, with the same warnings on all ranks.
+/// Warnings about nodes that supports hold inside of an obstacle, where constraints have no contact force, about obstacles that leapt, and, after
+/// the last step, about contacts that have never touched. Collective, with the same warnings on all ranks.
 pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
@@ -208,6 +208,13 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                 "contact.{number}: the obstacle moved up to {held:.3e} m beyond nodes of the boundary {on} that a support holds along \
                  the normal: a constraint has no contact force at these nodes, and contact forces do not include what the support would \
                  have to carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
+            ));
+        }
+        let [translation, _] = contact.driven();
+        if let Some(leap) = translation.map(LoadedMotion::longest_way).filter(|leap| *leap > size) {
+            out.push(format!(
+                "contact.{number}: the obstacle that a force moves leapt by {leap:.3e} m in one step, more than the size of the body, \
+                 {size:.3e} m: steps that long don't resolve its motion; take a smaller [time] step, or correct its force or its mass"
             ));
         }
         let touched = larger(penetration, held) >= -ROUNDING * size;

@@ -2,16 +2,22 @@
 
 use crate::{
     error::{Error, Result},
-    fem::space::facets,
+    fem::{body::Body, space::facets},
     job::{Job, Scalar},
     laws::digits::Digits,
-    linear_algebra::tensor::{Vector, add_scaled, norm},
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{Vector, add_scaled, norm},
+    },
     mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, session::Session},
 };
 
 /// Conditions are compared at this share of the way from the corners of a facet to its centre.
 const INSIDE: f64 = 1e-3;
+
+/// Shares of a boundary up to this one are facets in its corners, whose nodes belong to other boundaries.
+const NEGLIGIBLE: f64 = 0.1;
 
 /// The facets of the boundaries of a table on this rank at whose centre the expression is not 0. Collective.
 pub(super) fn part_of<const D: usize>(
@@ -36,37 +42,84 @@ pub(super) fn part_of<const D: usize>(
     Ok(facets)
 }
 
-/// Warnings of conditions on the place of loads and supports that facets do not follow: these belong to a part as a whole. Collective, with
+/// Warnings of conditions on the place of loads, supports and heat that facets do not follow: these belong to a part as a whole. Collective, with
 /// the same warnings on all ranks.
 pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh<D>) -> Vec<String> {
     let tractions = job.traction.iter().enumerate().map(|(at, t)| (format!("traction.{at}"), &t.on, &t.part));
     let supports = job.support.iter().enumerate();
     let on_areas = supports.filter(|(_, support)| support.gives_way());
     let supports = on_areas.map(|(at, s)| (format!("support.{at}"), &s.on, &s.part));
+    let flows = job.heat.iter().enumerate().filter(|(_, heat)| heat.temperature.is_none());
+    let flows = flows.map(|(at, heat)| (format!("heat.{at}"), &heat.on, &heat.part));
     let mut warnings = Vec::new();
-    for (table, on, part) in tractions.chain(supports) {
+    for (table, on, part) in tractions.chain(supports).chain(flows) {
         let Some(part) = part else { continue };
-        let areas: Vec<f64> = facets(mesh, on)
-            .into_iter()
-            .filter(|facet| is_cut(mesh, *facet, part))
-            .map(|facet| area_of(mesh, facet))
-            .collect();
-        let count = session.total(areas.len());
-        let [area] = session.sum([areas.iter().sum()]);
-        if count > 0 {
-            let (facets, unit) = (
-                if count == 1 { "facet" } else { "facets" },
-                if D == 2 && !mesh.is_revolved { "m" } else { "m^2" },
-            );
+        let cut = facets(mesh, on).into_iter().filter(|facet| is_cut(mesh, *facet, part));
+        let [count, area] = measured(session, mesh, cut);
+        if count > 0.0 {
             warnings.push(format!(
-                "{table}.where: the condition changes within {count} {facets} of {}, {} {unit} in all, which belong to the part if their \
-                 centre does: let facets end where it changes, or refine the mesh there",
-                on.join(", "),
-                Digits(area)
+                "{table}.where: the condition changes within {} of {}, which belong to the part if their centre does: let facets end where \
+                 it changes, or refine the mesh there",
+                in_words(mesh, [count, area]),
+                on.join(", ")
             ));
         }
     }
     warnings
+}
+
+/// Warnings of boundaries with heat at whose nodes other tables give the temperature. Collective, with the same warnings on all ranks.
+pub(super) fn warnings_of_heat<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+) -> Result<Vec<String>> {
+    let Body { mesh, heat: Some(heat), .. } = body else { return Ok(Vec::new()) };
+    // The number of the table that gives the temperature of a node, from 1 on.
+    let giver = DistributedVector::ghosted(1, mesh.owned, &mesh.ghosts);
+    let mut giver = session.agree(giver)?;
+    {
+        let mut numbers = giver.owned_mut()?;
+        heat.held_nodes().iter().for_each(|(node, number)| numbers[*node as usize] = f64::from(number + 1));
+    }
+    giver.update_ghosts()?;
+    let giver = giver.local()?;
+    let mut warnings = Vec::new();
+    for (at, table) in job.heat.iter().enumerate() {
+        let own = (at + 1) as f64;
+        let is_lost = |facet: &u32| {
+            let nodes = mesh.facets[*facet as usize].iter();
+            nodes.map(|node| giver[*node as usize]).all(|number| number != 0.0 && number != own)
+        };
+        let part = part_of(session, mesh, ("heat", &table.on), table.part.as_ref())?;
+        let [_, whole] = measured(session, mesh, part.iter().copied());
+        let [count, area] = measured(session, mesh, part.into_iter().filter(is_lost));
+        if area > NEGLIGIBLE * whole {
+            let key = table.key();
+            warnings.push(format!(
+                "heat.{at}.{key} has no effect on {} of {}, where another table gives the temperature of all nodes: delete one of the two, \
+                 or add `where`",
+                in_words(mesh, [count, area]),
+                table.on.join(", ")
+            ));
+        }
+    }
+    Ok(warnings)
+}
+
+/// The number of these facets of this rank on all ranks, and their area. Collective.
+fn measured<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    facets: impl Iterator<Item = u32>,
+) -> [f64; 2] {
+    session.sum(facets.fold([0.0; 2], |[count, area], facet| [count + 1.0, area + area_of(mesh, facet)]))
+}
+
+/// A number of facets and their area in words.
+fn in_words<const D: usize>(mesh: &Mesh<D>, [count, area]: [f64; 2]) -> String {
+    let unit = if D == 2 && !mesh.is_revolved { "m" } else { "m^2" };
+    format!("{count} facet{} ({} {unit})", if count == 1.0 { "" } else { "s" }, Digits(area))
 }
 
 /// Whether an expression holds at one corner of a facet and not at another one, just inside of the facet.

@@ -62,6 +62,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;
     warnings.extend(bonds::warnings(session, job, &body));
     warnings.extend(parts::warnings(session, job, &body.mesh));
+    warnings.extend(parts::warnings_of_heat(session, job, &body)?);
     warnings.extend(circumstances.warnings(&body.pairs));
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);

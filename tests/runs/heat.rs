@@ -170,3 +170,48 @@ fn temperatures_below_zero_kelvin_are_refused_where_they_are_given_and_where_the
         .says("the temperature at the end of the step is -")
         .says("check the fluxes");
 }
+
+#[test]
+fn a_step_that_fails_leaves_temperature_and_motion_as_they_were() {
+    let case = |end: &str, every: &str| {
+        heated()
+            .set("material.heat", "{ conductivity = 2, capacity = 3, expansion = 1e-4, reference = 290 }")
+            .set("heat.1.flux", "'50*t'")
+            .set("time.end", end)
+            .set("checkpoint.every", every)
+    };
+    let before = case("0.1875", "3").run_and_keep(1);
+    let before = NumberFile::open(&before.results().path("checkpoint-3.h5")).checkpoint_tables();
+    for (key, value, words) in [
+        ("heat.1.flux", "'50*t + 0*sqrt(0.2 - t)'", "the flux is NaN at t = 0.25 s"),
+        ("heat.1.flux", "'50*t - 1e9*exp(1000*(t - 0.25))'", "the temperature at the end of the step is -"),
+        ("traction.0.value", "[0, '-10 + 0*sqrt(0.2 - t)']", "component y is NaN at t = 0.25 s"),
+    ] {
+        let case = case("0.25", "2").set(key, value);
+        case.run_with(1, &[]).expect(1).says(words);
+        assert_eq!(case.results().checkpoints().first(), Some(&3), "{words}");
+        let after = NumberFile::open(&case.results().path("checkpoint-3.h5")).checkpoint_tables();
+        for ((name, values), (_, expected)) in after.iter().zip(&before) {
+            assert_eq!(values, expected, "{name:?}: {words}");
+        }
+        assert_eq!(after.len(), before.len());
+    }
+}
+
+#[test]
+fn heat_without_effect_and_parts_that_facets_do_not_follow_are_warned_of() {
+    let heat = "[{ on = ['left'], temperature = 300 }, { on = ['left'], flux = 5 }, { on = ['top'], where = 'x < 0.4', flux = 5 },
+                 { on = ['left', 'right'], where = 'y > 0.5', convection = { coefficient = 1, ambient = 300 } },
+                 { on = ['left'], temperature = 310 }]";
+    let case = heated().set("heat", &heat.replace('\n', "")).set("time.end", "0.0625");
+    for ranks in [1, 2] {
+        case.run_with(ranks, &["--force"])
+            .expect(0)
+            .says("heat.1.flux has no effect on 6 facets (1 m) of left, where another table gives the temperature")
+            .says("heat.2.where: the condition changes within 1 facet (0.166667 m) of top")
+            .says("heat.3.convection has no effect on 3 facets (0.5 m) of left, right")
+            .says("heat.4.temperature has no effect on 6 facets (1 m) of left");
+        let warnings = case.results().summary()["warnings"].clone();
+        assert_eq!(warnings.as_array().map(Vec::len), Some(4), "{warnings}");
+    }
+}

@@ -491,3 +491,15 @@ fn a_plane_that_is_inclined_to_the_body_is_warned_of() {
         assert_eq!(launch::unwrapped(&checked.stdout).contains(words), angle, "{normal}\n{}", checked.stdout);
     }
 }
+
+#[test]
+fn an_obstacle_that_leaps_away_in_a_step_is_warned_of() {
+    // The free disc moves by F k^2/m = 2.5e-3 F/m in the first step; the block is 2 m long.
+    for (mass, leaps) in [("0.1", true), ("2", false)] {
+        let load = format!("{{direction = [0, 1], force = 100, mass = {mass}}}");
+        let case = under(&disc("0.7", 0.1)).set("contact.0.obstacle_load", &load).set("time.end", "0.05");
+        let outcome = case.run_with(2, &[]).expect(0);
+        let words = "the obstacle that a force moves leapt by 2.500e0 m in one step, more than the size of the body, 2.000e0 m";
+        assert_eq!(warns_of(&outcome, &case, words), leaps);
+    }
+}

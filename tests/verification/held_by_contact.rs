@@ -195,3 +195,48 @@ fn contact_and_friction_alone_hold_a_quasistatic_block_up_to_coulombs_limit() {
 fn friction_holds_a_block_whose_inertia_counts_for_next_to_nothing() {
     run_on(&[1, 2], |world| nearly_free(&world.session));
 }
+
+/// Free blocks that rest where a law without growth at first begins to press, far beyond its gap or beside much larger stresses; the pressure on
+/// the floor bears the load.
+fn on_stairs(session: &Session) {
+    let stairs = |d: f64, p: f64| {
+        format!(
+            "[[0, 0], [{d:e}, 0], [{d:e}, {p:e}], [{:e}, {p:e}], [{:e}, {:e}]]",
+            2.0 * d,
+            2.0 * d,
+            3.0 * p
+        )
+    };
+    for (modulus, ratio, load, side, gap, depth) in [
+        (3.5e4, 0.45, 0.05, 0.0, 1e-5, 3.4e-3),
+        (8.6e10, 0.49, 1.1e4, 1.1e4, 1e-6, 5.5e-4),
+        (9e10, 0.3, 4.6e6, 1.8e9, 0.0, 4.5e-3),
+        (3.3e3, 0.4999, 0.013, 13.0, 1e-6, 6.7e-4),
+    ] {
+        let mesh = rectangle([2.0, 1.0], [6, 3], Diagonal::Right, [1.0, 1.0]).expect("mesh");
+        let text = format!(
+            "{}[material]\nhypothesis = \"plane_strain\"\n\
+             elasticity = {{ youngs_modulus = {modulus:e}, poisson_ratio = {ratio} }}\n\
+             [[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[traction]]\non = [\"top\"]\npressure = \"{load:e}*t\"\n\
+             [[traction]]\non = [\"right\"]\npressure = {side:e}\n[[contact]]\non = [\"bottom\"]\n\
+             normal.displacement_graph = {{ gap = {gap:e}, slope_after = {modulus:e}, points = {} }}\n\
+             [time]\nscheme = \"implicit_euler\"\nend = 1\nstep = 0.25\n",
+            any_mesh::<2>(),
+            stairs(depth, 1.5 * load)
+        );
+        let mut run = simulation::<2, 4>(session, &text, &mesh);
+        while run.advance(session).unwrap_or_else(|e| panic!("{modulus:e} Pa: {e}")).is_some() {}
+        assert_eq!(run.state.step, 4, "{modulus:e} Pa");
+        let displacement = run.state.displacement.owned().expect("values");
+        let bottom =
+            run.body.mesh.nodes.iter().zip(displacement.chunks_exact(2)).filter(|(place, _)| place[1] == 0.0);
+        let [most, least] = bottom
+            .fold([f64::MIN; 2], |[most, least], (_, u)| [most.max(-u[1] - gap), least.max(u[1] + gap)]);
+        assert!(most >= depth * (1.0 - 1e-9) && most < 3.0 * depth, "{modulus:e} Pa: {most} {least}");
+    }
+}
+
+#[test]
+fn a_free_block_rests_where_a_law_begins_to_press() {
+    run_on(&[1], |world| on_stairs(&world.session));
+}

@@ -54,6 +54,8 @@ pub struct Heat<const D: usize> {
     /// The temperature in K by which the body is strained, and which its flow sees, that at the start of the last step, if some material
     /// does.
     strained: Option<NodalField>,
+    /// The same before the last expansion.
+    strained_before: Vec<f64>,
     /// Powers in W of friction and of viscosity at the owned nodes at the end of the last step, where schemes average them.
     powers: Vec<NodalField>,
     owned: usize,
@@ -71,7 +73,7 @@ pub struct Heat<const D: usize> {
     dissipation_share: Vec<f64>,
     /// What flow takes up in each cell in the step just solved, in J; empty if no cell flows.
     flow: Vec<f64>,
-    /// What is released in the step just committed.
+    /// What is released in the step just solved.
     released: Released,
     boundaries: Vec<Boundary>,
     /// The owned nodes whose temperature is given, each with the boundary that gives it.
@@ -164,6 +166,7 @@ impl<const D: usize> Heat<D> {
                 values: vec![0.0; mesh.nodes.len()],
             },
             strained: None,
+            strained_before: Vec::new(),
             powers: Vec::new(),
             owned: mesh.owned,
             has_middles: mesh.corner_nodes < mesh.total_nodes,
@@ -270,8 +273,12 @@ impl<const D: usize> Heat<D> {
         self.boundaries.iter().flat_map(|boundary| boundary.given.expressions()).map(|(_, value)| value)
     }
 
-    /// Adds these changes of the owned nodes in K. Collective.
-    pub fn add(&mut self, changes: &[f64]) -> Result<()> {
+    /// Adds these changes of the owned nodes in K over the step just committed, and keeps its powers. Collective.
+    pub fn commit(&mut self, changes: &[f64]) -> Result<()> {
+        let Released { friction, viscosity, .. } = &self.released;
+        for (field, power) in self.powers.iter_mut().zip([friction, viscosity]) {
+            field.values.copy_from_slice(power);
+        }
         self.temperature.values.iter_mut().zip(changes).for_each(|(value, change)| *value += change);
         self.refresh()
     }
@@ -404,9 +411,18 @@ impl<const D: usize> Heat<D> {
 
     /// Lets the temperature strain the body: now, and from the start of each step on.
     pub fn expand(&mut self) {
-        let Self { strained, temperature, owned, .. } = self;
+        let Self { strained, strained_before, temperature, owned, .. } = self;
         let field = || NodalField { quantity: STRAINED, owned: *owned, values: Vec::new() };
-        strained.get_or_insert_with(field).values.clone_from(&temperature.values);
+        let strained = strained.get_or_insert_with(field);
+        std::mem::swap(&mut strained.values, strained_before);
+        strained.values.clone_from(&temperature.values);
+    }
+
+    /// Takes back the last expansion.
+    pub fn contract(&mut self) {
+        if let Some(strained) = &mut self.strained {
+            std::mem::swap(&mut strained.values, &mut self.strained_before);
+        }
     }
 
     /// Whether some material expands.
@@ -453,7 +469,7 @@ impl<const D: usize> Heat<D> {
         self.flow = flow;
     }
 
-    /// Takes the heat of flow of the step just committed, and lets powers be added to it. Collective are only the calls that end with
+    /// Takes the heat of flow of the step just solved, and lets powers be added to it. Collective are only the calls that end with
     /// [`finish_release`](Self::finish_release).
     pub fn start_release(&mut self, mesh: &Mesh<D>) {
         let Released { friction, viscosity, flow } = &mut self.released;
@@ -508,9 +524,9 @@ impl<const D: usize> Heat<D> {
         self.gather(|sums| sums.copy_from_slice(values))
     }
 
-    /// The heat in J that was released at the owned nodes in the step just committed of this length in s, added to `sum`, and that of
+    /// The heat in J that is released at the owned nodes in the step just solved of this length in s, added to `sum`, and that of
     /// friction and of flow on this rank. Under a formula of second order powers are means over the step.
-    pub fn released(&mut self, length: f64, averages: bool, sum: &mut [f64]) -> [f64; 2] {
+    pub fn released(&self, length: f64, averages: bool, sum: &mut [f64]) -> [f64; 2] {
         let Released { friction, viscosity, flow } = &self.released;
         let mut totals = [0.0; 2];
         for (kind, power) in [friction, viscosity].into_iter().enumerate() {
@@ -524,9 +540,6 @@ impl<const D: usize> Heat<D> {
         for (sum, heat) in sum.iter_mut().zip(flow) {
             *sum += heat;
             totals[1] += heat;
-        }
-        for (field, power) in self.powers.iter_mut().zip([friction, viscosity]) {
-            field.values.copy_from_slice(power);
         }
         totals
     }

@@ -47,6 +47,15 @@ pub struct Convection {
 }
 
 impl HeatBoundary {
+    /// The key of what it gives.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self { temperature: Some(_), .. } => "temperature",
+            Self { flux: Some(_), .. } => "flux",
+            _ => "convection",
+        }
+    }
+
     /// Its expressions of time, each with its key.
     pub fn expressions(&self) -> impl Iterator<Item = (&'static str, &Scalar)> {
         let convection = self.convection.iter().flat_map(|convection| {

@@ -287,6 +287,12 @@ impl Parser<'_> {
                 let help = format!("a product is written {name}*(...)");
                 Err(Fault::new(span, format!("`{name}` is not a function"), help))
             }
+            Some(Meaning::Value(Instruction::Number(f64::INFINITY)))
+                if self.variables != Variable::OF_TIME_AND_PLACE =>
+            {
+                let help = "write a large number, or the law of a rigid obstacle";
+                Err(Fault::new(span, "an infinite number in a law", help))
+            }
             Some(Meaning::Value(value)) => {
                 self.program.push(value);
                 if let Some(number) = number {

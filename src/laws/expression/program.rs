@@ -100,11 +100,6 @@ impl Program {
         self.instructions.contains(&Instruction::Variable(variable))
     }
 
-    /// Whether all its numbers are finite.
-    pub(super) fn is_finite(&self) -> bool {
-        self.instructions.iter().all(|one| !matches!(one, Instruction::Number(number) if !number.is_finite()))
-    }
-
     /// Whether one of its functions is piecewise.
     pub(super) fn has_pieces(&self) -> bool {
         self.instructions.iter().any(|instruction| match instruction {

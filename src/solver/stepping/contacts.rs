@@ -11,6 +11,10 @@ use crate::{
     parallel::session::Session,
 };
 
+/// The largest multiple of a rigid motion at which it is looked for what bears it, and the share of it that is rounding.
+const FARTHEST: f64 = 1e12;
+const ROUNDING: f64 = 1e-14;
+
 /// Adds the energy that contact dissipated in a committed step, the numerical part, and the work on obstacles; adds the powers of friction
 /// and of laws of the velocity to `powers`.
 pub(super) fn add_contact_energy<const D: usize, const S: usize>(
@@ -102,6 +106,52 @@ pub(super) fn multiple_to_touch<const D: usize, const S: usize>(
         most = if negative.is_finite() { most.max(-2.0 * negative) } else { most };
     }
     Ok(most)
+}
+
+/// Adds the multiple of a rigid motion to a motion at which the pressures balance the forces that have this power in it, and sets pressures
+/// to those there; returns whether there is such a multiple. Collective.
+pub(super) fn rest_on_contacts<const D: usize, const S: usize>(
+    session: &Session,
+    body: &mut Body<D, S>,
+    (motion, rigid): (&mut DistributedVector, &mut DistributedVector),
+    power: f64,
+) -> Result<bool> {
+    motion.update_ghosts()?;
+    rigid.update_ghosts()?;
+    let found = {
+        let motions = [&*motion.local()?, &*rigid.local()?];
+        let open = |multiple: f64| {
+            let powers = body.contacts.iter().map(|contact| contact.power_of_pressures(motions, multiple));
+            session.sum([powers.sum()])[0] - power
+        };
+        let (mut low, mut high) = (-1.0, 1.0);
+        let mut ends = [open(low), open(high)];
+        while ends[1] < 0.0 && high < FARTHEST {
+            (low, high) = (high, 2.0 * high);
+            ends = [ends[1], open(high)];
+        }
+        while ends[0] >= 0.0 && -low < FARTHEST {
+            (high, low) = (low, 2.0 * low);
+            ends = [open(low), ends[0]];
+        }
+        if !(ends[0] < 0.0 && ends[1] >= 0.0) {
+            return Ok(false);
+        }
+        while high - low > ROUNDING * low.abs().max(high.abs()) {
+            let middle = 0.5 * (low + high);
+            match open(middle) {
+                below if below < 0.0 => (low, ends[0]) = (middle, below),
+                above => (high, ends[1]) = (middle, above),
+            }
+        }
+        let share = -ends[0] / (ends[1] - ends[0]);
+        for contact in &mut body.contacts {
+            contact.set_pressures_between(motions, [low, high], share);
+        }
+        low + share * (high - low)
+    };
+    motion.add_scaled(found, rigid)?;
+    Ok(true)
 }
 
 /// Sets the pressures of all contacts to those of the converged state, and obstacles that forces move to the start of the step.

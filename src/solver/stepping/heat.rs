@@ -1,4 +1,4 @@
-//! The step of the temperature, after that of the motion: see [`Heat`] for its equations.
+//! The step of the temperature, with the solved motion of the same step: see [`Heat`] for its equations.
 
 use crate::{
     error::{Error, Result},
@@ -94,9 +94,9 @@ impl HeatStep {
         }))
     }
 
-    /// Advances the temperature by the step just committed, over which powers of heat are constant or averages; gives the energies of heat of
-    /// this rank. Collective.
-    pub(super) fn advance<const D: usize, const S: usize>(
+    /// Finds the temperature at the end of the step just solved, over which powers of heat are constant or averages; gives the energies of
+    /// heat of this rank. Collective.
+    pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
@@ -135,36 +135,40 @@ impl HeatStep {
                 };
             }
         }
-        self.solve()?;
+        session.agree(self.find_changes())?;
         if !self.is_held {
             self.balance(session, heat.capacity(), step.length)?;
         }
         let Conditions { power, film, .. } = &self.conditions;
-        let changes = self.change.owned()?;
-        session.agree(heat.check(mesh, &changes))?;
-        heat.add(&changes)?;
+        session.agree(heat.check(mesh, &self.change.owned()?))?;
+        self.change.update_ghosts()?;
         self.field.clear();
-        self.field.extend_from_slice(heat.temperature());
+        let (before, changes) = (heat.temperature(), self.change.local()?);
+        self.field.extend(before.iter().zip(changes.iter()).map(|(before, change)| before + change));
         heat.conduct(mesh, &self.field, &mut self.conducted)?;
         // What enters at each node; where the temperature is given, what balances the rest.
-        let after = heat.temperature();
         let entered = &mut self.field;
-        entered.clear();
-        entered.extend(
-            power.iter().zip(film).zip(after).map(|((power, film), t)| step.length * (power - film * t)),
-        );
+        entered.truncate(mesh.owned);
+        let flows = power.iter().zip(film);
+        entered.iter_mut().zip(flows).for_each(|(t, (power, film))| *t = step.length * (power - film * *t));
         for &(node, _) in heat.held_nodes() {
             let node = node as usize;
             let taken = heat.capacity()[node] * changes[node] - self.released[node];
             entered[node] = taken + step.length * self.conducted[node];
         }
         let mut energy = Energy::default();
-        let stored = heat.capacity().iter().zip(changes.iter());
+        let stored = heat.capacity().iter().zip(&changes[..mesh.owned]);
         energy[STORED_HEAT] = stored.map(|(capacity, change)| capacity * change).sum();
         (energy[FRICTION_HEAT], energy[FLOW_HEAT]) = (friction, flow);
         energy[ENTERED_HEAT] = entered.iter().map(|heat| heat.max(0.0)).sum();
         energy[LOST_HEAT] = entered.iter().map(|heat| (-heat).max(0.0)).sum();
         Ok(energy)
+    }
+
+    /// Makes the temperature just found that of the body. Collective.
+    pub(super) fn commit<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
+        let Some(heat) = &mut body.heat else { return Ok(()) };
+        heat.commit(&self.change.owned()?)
     }
 
     /// Prepares the matrix of a step of this length in s, unless it is. Collective.
@@ -212,7 +216,7 @@ impl HeatStep {
         Ok(())
     }
 
-    fn solve(&mut self) -> Result<()> {
+    fn find_changes(&mut self) -> Result<()> {
         let Some(solver) = &mut self.solver else { return Ok(()) };
         if self.right_hand_side.norm()? == 0.0 {
             return self.change.fill(0.0);

@@ -68,8 +68,8 @@ pub struct Stepper {
     force_scale: ForceScale,
     /// The temperature, of bodies with heat.
     heat: Option<HeatStep>,
-    /// The work in J of thermal expansion at the start of the step, until it is accepted.
-    thermal_work: f64,
+    /// The work in J of thermal expansion at the start of the step, from then until it is accepted.
+    thermal_work: Option<f64>,
     trial: DistributedVector,
     /// The velocity of the converged state in the unknowns of a step, with contact between bodies.
     converged: Option<DistributedVector>,
@@ -144,7 +144,7 @@ impl Stepper {
             moving_supports: MovingSupports::new(body, state)?,
             force_scale: ForceScale::new(body, &state.velocity)?,
             heat: HeatStep::new(session, body)?,
-            thermal_work: 0.0,
+            thermal_work: None,
             trial: state.velocity.like()?,
             converged: if body.coupling.is_some() { Some(state.velocity.like()?) } else { None },
             is_finished: false,
@@ -278,12 +278,49 @@ impl Stepper {
         state: &State,
         step: Step,
     ) -> Result<StepOutcome> {
+        let outcome = self.solve_expanded(session, body, state, step);
+        if outcome.is_err() {
+            self.contract(body);
+        }
+        outcome
+    }
+
+    /// Takes back the expansion of a step that has failed.
+    fn contract<const D: usize, const S: usize>(&mut self, body: &mut Body<D, S>) {
+        if self.thermal_work.take().is_some() {
+            body.contract();
+        }
+    }
+
+    /// Finds the temperature at the end of the step just solved; gives the energies of heat. Collective.
+    fn solve_heat<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<Energy> {
+        let Some(heat) = &mut self.heat else { return Ok(Energy::default()) };
+        self.trial.update_ghosts()?;
+        session.agree(body.release_heat(state, &self.trial))?;
+        let averages = self.integrator.averages_powers();
+        Ok(heat.solve(session, body, step, averages)?.map_values(|values| session.sum(values)))
+    }
+
+    /// Solves a step of the body at its temperature at the start. Collective.
+    fn solve_expanded<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<StepOutcome> {
         let range = StepRange::of(self.scheme, step);
         self.attempted = Some(self.attempted.map_or(range, |attempted| attempted.or(range)));
         self.follow_sliding(session, body, state)?;
-        if body.heat.as_ref().is_some_and(Heat::expands) {
+        if self.thermal_work.is_none() && body.heat.as_ref().is_some_and(Heat::expands) {
             let work = session.agree(body.expand(state))?;
-            self.thermal_work += session.sum([work])[0];
+            self.thermal_work = Some(session.sum([work])[0]);
         }
         self.prepare_matrix(session, body, step)?;
         self.is_finished = false;
@@ -448,14 +485,16 @@ impl Stepper {
         for motion in driven(body) {
             of_obstacles += motion.energy_of_step(state.time);
         }
+        let of_heat = self.solve_heat(session, body, state, step);
+        if of_heat.is_err() {
+            self.contract(body);
+        }
+        let of_heat = of_heat?;
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         keep_closeness(body, state)?;
         body.commit();
         drop(stage);
-        if self.heat.is_some() {
-            session.agree(body.release_heat(state))?;
-        }
         let balancing = Instant::now();
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
@@ -481,12 +520,10 @@ impl Stepper {
         outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
         outcome.energy[NUMERICAL] += std::mem::take(&mut self.energy_of_pairing);
-        outcome.energy[THERMAL_WORK] += std::mem::take(&mut self.thermal_work);
-        if let Some(heat) = &mut self.heat {
-            let (solving, averages) = (Instant::now(), self.integrator.averages_powers());
-            outcome.energy +=
-                heat.advance(session, body, step, averages)?.map_values(|values| session.sum(values));
-            self.clock.solve += solving.elapsed();
+        outcome.energy[THERMAL_WORK] += self.thermal_work.take().unwrap_or_default();
+        outcome.energy += of_heat;
+        if let Some(heat) = &self.heat {
+            heat.commit(body)?;
         }
         Ok(())
     }

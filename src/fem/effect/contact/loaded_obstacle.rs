@@ -16,7 +16,7 @@
 use crate::{
     fem::effect::{Blend, Curvature, Energy, EnergyKind, Role, WORK},
     laws::{contact::ObstacleLoad, expression::Scalar},
-    linear_algebra::tensor::{Vector, add_scaled, cross, norm},
+    linear_algebra::tensor::{Vector, add_scaled, cross, larger, norm},
 };
 
 /// Kinetic energy of the obstacles that forces and moments move.
@@ -53,6 +53,8 @@ pub struct LoadedMotion {
     earlier: [f64; 2],
     /// Displacement at the end of the current step, and the velocity in its equations.
     trial: [f64; 2],
+    /// The longest way in m (rad) in a step of the run.
+    longest: f64,
     /// Resultant in N (N m) of the contact tractions in the last step and in the current one.
     resultant: [f64; 2],
     blend: Blend,
@@ -188,6 +190,7 @@ impl LoadedMotion {
             start,
             earlier,
             trial,
+            longest: 0.0,
             resultant,
             blend: Blend::euler(0.0),
             driving: 0.0,
@@ -343,8 +346,14 @@ impl LoadedMotion {
         [error, velocity].map(|velocity| self.mass * velocity * velocity)
     }
 
+    /// The longest way in m (rad) in a step of the run.
+    pub fn longest_way(&self) -> f64 {
+        self.longest
+    }
+
     fn commit(&mut self) {
         (self.earlier, self.converged) = (self.converged, self.end());
+        self.longest = larger(self.longest, (self.converged[0] - self.earlier[0]).abs());
         self.resultant[0] = self.resultant[1];
     }
 }

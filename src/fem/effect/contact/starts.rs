@@ -48,6 +48,29 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// The power in W of the pressures on this rank in a rigid motion, at a motion plus this multiple of the rigid one.
+    pub fn power_of_pressures(&self, motions: [&[f64]; 2], multiple: f64) -> f64 {
+        let power = |point: &Point<D>| {
+            let [along, rigid] = motions.map(|motion| point.normal_component(Body, motion));
+            let pressure = self.law.pressure(along + multiple * rigid, point.context);
+            // Beyond a wall it is infinite.
+            if rigid == 0.0 || pressure == 0.0 { 0.0 } else { point.weight * pressure * rigid }
+        };
+        self.points.iter().filter(|point| point.carries(&self.law) && point.can_touch()).map(power).sum()
+    }
+
+    /// Sets the pressures of points that have their own to those at this share of the way between two such multiples.
+    pub fn set_pressures_between(&mut self, motions: [&[f64]; 2], ends: [f64; 2], share: f64) {
+        for point in self.points.iter_mut().filter(|point| point.unknown.has_pressure()) {
+            let [along, rigid] = motions.map(|motion| point.normal_component(Body, motion));
+            let [low, high] = ends.map(|multiple| self.law.pressure(along + multiple * rigid, point.context));
+            let pressure = low + share * (high - low);
+            if pressure.is_finite() {
+                point.pressure = pressure;
+            }
+        }
+    }
+
     /// Sets the normal velocity of the nodal points to the value of `velocity` for their node, in m/s, and the velocity along a
     /// tangent to the same value where there is friction. `nodal` contains velocities at the owned nodes of the body.
     pub fn set_start_velocities(&self, velocity: impl Fn(usize) -> f64, nodal: &mut [f64]) {

@@ -10,7 +10,7 @@ use crate::{
     },
     solver::stepping::{
         StepOutcome,
-        contacts::{multiple_to_touch, restore_pressures},
+        contacts::{multiple_to_touch, rest_on_contacts, restore_pressures},
         corrections::correct,
         equations::{Floor, StepMatrix},
         factor_cache::Prepared,
@@ -55,13 +55,16 @@ enum Change {
     DoublePrecision,
     /// Where contact alone holds a body, the step starts from what soft springs bear.
     FromSprings,
+    /// The same, but moved as a rigid body to where the contacts bear the loads.
+    OnContacts,
     /// The tolerance is the residual that rounding errors of the solution leave.
     Relaxed,
 }
 
 impl Change {
     /// All changes in their order. Each attempt keeps those before.
-    const ALL: [Self; 4] = [Self::Nothing, Self::DoublePrecision, Self::FromSprings, Self::Relaxed];
+    const ALL: [Self; 5] =
+        [Self::Nothing, Self::DoublePrecision, Self::FromSprings, Self::OnContacts, Self::Relaxed];
 }
 
 /// How accurately a step is solved, in N.
@@ -160,6 +163,7 @@ impl StepSolver {
                 accuracy.awaits_pressure = false;
                 Ok(true)
             }
+            Change::OnContacts => Ok(self.springs.are_needed() && self.start_on_contacts(problem, trial)?),
             Change::Relaxed => {
                 // The start value may be much smaller than the solution, especially at rest.
                 let mut solution = trial.like()?;
@@ -188,21 +192,31 @@ impl StepSolver {
         if problem.body.contacts.iter().all(|contact| !contact.law.depends_on_displacement()) {
             trial.fill(0.0)?;
         } else {
-            let mut forces = trial.like()?;
-            {
-                let mut nodal = forces.local_mut()?;
-                nodal.fill(0.0);
-                let contacts = &problem.body.contacts;
-                contacts.iter().for_each(|contact| contact.add_driving_force(problem.session, &mut nodal));
-            }
-            forces.add_ghosts_to_owners()?;
-            problem.body.held.clear(&mut forces.owned_mut()?);
-            forces.add_scaled(1.0, problem.forces)?;
+            let forces = loads(problem, trial)?;
             self.precondition(&forces, trial)?;
             let multiple = multiple_to_touch(problem.session, problem.body, trial)?;
             trial.scale(multiple)?;
         }
         restore_pressures(problem.body, problem.state)
+    }
+
+    /// Starts a step anew from the same velocity, to which a rigid motion is added that takes the body to where its contacts bear what the
+    /// springs bear: a law may have no pressure until far beyond the gap, and none that grows. Returns whether there is such a place.
+    /// Collective.
+    fn start_on_contacts<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<bool> {
+        let mut borne = loads(problem, trial)?;
+        self.precondition(&borne, trial)?;
+        let (mut inner, mut rigid) = (trial.like()?, trial.like()?);
+        self.multiply(trial, &mut inner)?;
+        borne.add_scaled(-1.0, &inner)?;
+        self.precondition(&borne, &mut rigid)?;
+        restore_pressures(problem.body, problem.state)?;
+        let power = borne.dot(&rigid)?;
+        rest_on_contacts(problem.session, problem.body, (trial, &mut rigid), power)
     }
 
     /// Solves a step in which no cells flow, or the whole body by Newton's method. Collective.
@@ -279,12 +293,7 @@ impl StepSolver {
         trial: &DistributedVector,
         solved: StepOutcome,
     ) -> Result<StepOutcome> {
-        let contact = match problem.body.contacts.first() {
-            Some(contact) if self.springs.are_needed() => contact,
-            _ => return Ok(solved),
-        };
-        let way = problem.step.length * trial.norm()? / (problem.body.mesh.total_nodes as f64).sqrt();
-        match way > FAR * contact.body_size() {
+        match self.springs.are_needed() && trial.norm()? > farthest(problem) {
             true => Err(problem.failed(FLIGHT, NO_FLIGHT)),
             false => Ok(solved),
         }
@@ -367,7 +376,9 @@ impl StepSolver {
         let rounded = rounding.max(product).max(LEAST_FORCE);
         let reference = all.max(rounded / self.settings.tolerance);
         let slope = STAGNANT * f64::EPSILON * self.matrix_norm;
-        let floor = Floor { slope, largest: (LARGEST_FLOOR * all).max(STAGNANT * product) };
+        // No rounding errors of a flight.
+        let far = if self.springs.are_needed() { farthest(problem) } else { f64::INFINITY };
+        let floor = Floor { slope, largest: (LARGEST_FLOOR * all).max(STAGNANT * product).min(slope * far) };
         Ok(Accuracy { tolerance, size: all, floor, awaits_pressure: self.springs.are_needed(), reference })
     }
 
@@ -399,6 +410,30 @@ impl Accuracy {
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
         System { matrix, right_hand_side, tolerance, floor, converged, scales }
     }
+}
+
+/// The forces of a step in N, with those that drive obstacles as they act on bodies, in a vector with the layout of `like`. Collective.
+fn loads<const D: usize, const S: usize>(
+    problem: &StepProblem<'_, D, S>,
+    like: &DistributedVector,
+) -> Result<DistributedVector> {
+    let mut forces = like.like()?;
+    {
+        let mut nodal = forces.local_mut()?;
+        nodal.fill(0.0);
+        let contacts = &problem.body.contacts;
+        contacts.iter().for_each(|contact| contact.add_driving_force(problem.session, &mut nodal));
+    }
+    forces.add_ghosts_to_owners()?;
+    problem.body.held.clear(&mut forces.owned_mut()?);
+    forces.add_scaled(1.0, problem.forces)?;
+    Ok(forces)
+}
+
+/// The norm of the velocities in m/s above which a body that only contact holds flies away.
+fn farthest<const D: usize, const S: usize>(problem: &StepProblem<'_, D, S>) -> f64 {
+    let Some(contact) = problem.body.contacts.first() else { return f64::INFINITY };
+    FAR * contact.body_size() / problem.step.length * (problem.body.mesh.total_nodes as f64).sqrt()
 }
 
 /// Solves a step without contact and flow. Collective.
