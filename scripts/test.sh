@@ -10,11 +10,15 @@ mkdir -p "$logs"
 fuzz/run.sh 20 >"$logs/random-input.log" 2>&1 &
 random_input=$!
 
+# What each test takes is told by an unstable option of libtest, which this variable allows.
+timed() {
+    cargo --config "target.'cfg(all())'.runner = ['env', 'RUSTC_BOOTSTRAP=1']" "$@" -- -Zunstable-options --report-time
+}
+
 failed=0
 {
-    # What each test takes is told by an unstable option of libtest, which this variable allows.
-    cargo --config "target.'cfg(all())'.runner = ['env', 'RUSTC_BOOTSTRAP=1']" \
-        test --release --locked --lib --test all -- -Zunstable-options --report-time &&
+    timed --config scripts/unit-tests.toml test --release --locked --lib &&
+        timed test --release --locked --test all &&
         cargo test --release --locked --doc &&
         CLARKE_SOLVER=$(realpath "${CARGO_TARGET_DIR:-target}")/release/solver \
             python3 -m unittest discover -b -v -s python/tests -t python

@@ -6,6 +6,8 @@ use std::process::{Command, Output};
 
 const WORDS: &str = "CLARKE_TEST_SCENARIO";
 const FOLDER: &str = "CLARKE_TEST_FOLDER";
+/// Seconds after which a scenario has hung.
+const LIMIT: &str = "300";
 
 /// The words for the test that was started under `mpirun`.
 pub fn words() -> String {
@@ -27,18 +29,24 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
     print!("{words}");
 }
 
+/// Starts a scenario and waits for it. One rank is started without `mpirun`, which would take longer than many a scenario.
 pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
     let (test, words) = scenario.split_once(' ').unwrap_or((scenario, ""));
-    let mut launcher = Command::new("mpirun");
+    let program = std::env::current_exe().expect("this program");
+    let mut launcher = Command::new(if ranks == 1 { "timeout" } else { "mpirun" });
+    if ranks == 1 {
+        launcher.args(["--signal=KILL", LIMIT]);
+    } else {
+        launcher.args(["--oversubscribe", "--bind-to", "none", "--timeout", LIMIT, "-n", &ranks.to_string()]);
+    }
     let _folder = cores::share(&mut launcher);
     launcher
-        .args(["--oversubscribe", "--bind-to", "none", "--timeout", "300", "-n", &ranks.to_string()])
-        .arg(std::env::current_exe().expect("this program"))
+        .arg(program)
         .args(["--include-ignored", "--exact", test, "--nocapture", "--test-threads", "1"])
         .env(WORDS, words)
         .env(FOLDER, folder)
         .output()
-        .expect("mpirun")
+        .expect("a launcher")
 }
 
 /// A pseudorandom number.

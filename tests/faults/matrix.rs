@@ -115,7 +115,8 @@ fn combinations() -> Vec<Combination> {
 
 fn job((effect, scheme, adaptive): Combination) -> Case {
     let case = Case::square(5)
-        .set("checkpoint.every", "1")
+        .set("checkpoint.every", "4")
+        .set("checkpoint.at", "[0.5]")
         .set("checkpoint.keep", "1000")
         .set("solver.tolerance", "1e-13")
         .set("time.end", "0.5")

@@ -713,8 +713,16 @@ mod tests {
 
     #[test]
     fn a_few_extreme_values_do_not_rule_the_colours_and_the_caption_says_so() {
-        let mut snapshot = square(0.0);
-        snapshot.cells = [0, 1, 2].repeat(400);
+        // 20 by 10 squares of two triangles. Copies of one large triangle would each paint half of the picture.
+        let node = |column: u32, row: u32| row * 21 + column;
+        let nodes = (0..11).flat_map(|row| (0..21).map(move |column| [column, row, 0].map(f64::from)));
+        let squares = (0..10).flat_map(|row| (0..20).map(move |column| (column, row)));
+        let cells = squares.flat_map(|(x, y)| {
+            let [a, b, c, d] = [node(x, y), node(x + 1, y), node(x + 1, y + 1), node(x, y + 1)];
+            [a, b, c, a, c, d]
+        });
+        let mut snapshot = Snapshot { nodes: nodes.collect(), cells: cells.collect(), ..square(0.0) };
+        snapshot.fields = BTreeMap::from([("displacement", vec![0.0; 3 * 21 * 11])]);
         let mut values: Vec<f64> = (0..400).map(|n| f64::from(n) / 399.0).collect();
         values[399] = 1e6;
         snapshot.fields.insert("von_mises", values);

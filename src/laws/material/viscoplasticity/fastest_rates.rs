@@ -221,6 +221,7 @@ fn spectral_radius(map: &dyn Fn(&[f64]) -> Vec<f64>, at: &[f64]) -> f64 {
         columns.push(above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * h)).collect::<Vec<f64>>());
     }
     let (mut logarithm, mut power) = (0.0, 1.0);
+    let mut before = vec![vec![0.0; n]; n];
     for _ in 0..30 {
         let largest = columns.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
         if largest == 0.0 {
@@ -228,11 +229,17 @@ fn spectral_radius(map: &dyn Fn(&[f64]) -> Vec<f64>, at: &[f64]) -> f64 {
         }
         columns.iter_mut().flatten().for_each(|x| *x /= largest);
         logarithm += largest.ln() / power;
+        let changes = columns.iter().flatten().zip(before.iter().flatten()).map(|(x, y)| (x - y).abs());
+        if changes.fold(0.0, larger) < 1e-14 {
+            // Its square is a multiple of the matrix, so that all further powers add the same logarithm, halved again and again.
+            return f64::exp(logarithm + largest.ln() / power);
+        }
         power *= 2.0;
         let product = |column: &Vec<f64>| -> Vec<f64> {
             (0..n).map(|i| (0..n).map(|k| columns[k][i] * column[k]).sum()).collect()
         };
-        columns = columns.iter().map(product).collect();
+        before = columns.iter().map(product).collect();
+        std::mem::swap(&mut before, &mut columns);
     }
     f64::exp(logarithm)
 }

@@ -67,10 +67,11 @@ fn difference<const S: usize>(a: &Mandel<S>, b: &Mandel<S>) -> f64 {
 /// mappings.
 fn by_force<const S: usize>(law: &FlowLaw, trial: &Mandel<S>, length: f64, accumulated: f64) -> Mandel<S> {
     let stiff = 1.0 + length * law.fastest_rate::<S>(2.0) * 4.0;
+    let stiffness = law.stiffness::<S>();
     let (mut s, mut p) = (*trial, accumulated);
     for _ in 0..200_000 {
         let (rate, growth) = law.rate(&s, p);
-        let open = add_scaled(&add_scaled(trial, -length, &law.stiffness::<S>().apply(&rate)), -1.0, &s);
+        let open = add_scaled(&add_scaled(trial, -length, &stiffness.apply(&rate)), -1.0, &s);
         let behind = accumulated + length * growth - p;
         s = add_scaled(&s, 1.0 / stiff, &open);
         p += behind / stiff;
