@@ -254,6 +254,17 @@ fn refuse_own_files(folder: &Path) -> Result<()> {
     }
 }
 
+/// The files with which Open MPI locks `fields.vtkhdf` and which a killed run has left in a folder.
+fn locks_of_fields(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::unreadable(folder, e))?;
+    let names = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let is_lock = |path: &PathBuf| {
+        let name = path.file_name().and_then(|name| name.to_str());
+        name.is_some_and(|name| name.starts_with("fields.vtkhdf-") && name.ends_with(".lock"))
+    };
+    Ok(names.filter(is_lock).collect())
+}
+
 /// Creates the output folder, locks it for this run, opens the log and removes the summary of an earlier run, so that this summary
 /// is not mistaken for that of this run. A new start also removes the checkpoints found when the folder was claimed (`None` for a
 /// restart), and is refused if there are others: another run wrote them. On one rank.
@@ -275,6 +286,9 @@ pub(super) fn prepare_folder(folder: &Path, claimed: Option<&[PathBuf]>, log: &m
     match std::fs::remove_file(&summary) {
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(Error::unwritable(&summary, error)),
         _ => {}
+    }
+    for path in locks_of_fields(folder)? {
+        std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;
     }
     if !is_restart {
         for (_, path) in there {
@@ -333,7 +347,9 @@ mod tests {
         let said = prepare_folder(folder.path(), Some(&claimed), &mut log).expect_err("refused").to_string();
         assert!(said.contains("checkpoint-6.h5") && said.contains("another run"), "{said}");
         assert_eq!(list(folder.path()).expect("listed").len(), 2);
+        write(folder.path().join("fields.vtkhdf-1-833.lock"), "").expect("written");
         prepare_folder(folder.path(), None, &mut log).expect("a restart");
+        assert!(!folder.path().join("fields.vtkhdf-1-833.lock").exists(), "of a killed run");
         std::fs::remove_file(folder.path().join("checkpoint-6.h5")).expect("removed");
         prepare_folder(folder.path(), Some(&claimed), &mut log).expect("a new start");
         assert_eq!(list(folder.path()).expect("listed").len(), 0);

@@ -12,9 +12,10 @@ use crate::{
     job::{Job, Sliding},
     laws::contact::Gap,
     linear_algebra::tensor::{Vector, larger},
-    parallel::session::Session,
+    parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
@@ -66,8 +67,15 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 100.0 * deepest / size
             ));
         }
-        let [least, most] = depths(session, &contact.gap, &body.mesh.nodes);
+        let all = body.mesh.nodes.iter();
+        let [_, most] = depths(session, &contact.gap, all);
         if deepest > ROUNDING * size || most <= TOO_DEEP * size {
+            continue;
+        }
+        // Other bodies may be anywhere.
+        let own = nodes_of_bodies(session, body, contact)?;
+        let [least, most] = depths(session, &contact.gap, own.iter().map(|node| &body.mesh.nodes[*node]));
+        if most <= TOO_DEEP * size {
             continue;
         }
         if least < -ROUNDING * size {
@@ -245,10 +253,31 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     Ok(out)
 }
 
+/// The nodes on this rank of the bodies that have a contact, ascending. Collective.
+fn nodes_of_bodies<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    contact: &Contact<D>,
+) -> Result<Vec<usize>, Agreed> {
+    let of_cell = body.mesh.bodies(session)?.of_cell;
+    let mut of_node = vec![None; body.mesh.nodes.len()];
+    for (cell, number) in of_cell.iter().enumerate() {
+        body.mesh.cell_nodes(cell).for_each(|node| of_node[node as usize] = Some(*number));
+    }
+    let mine: Vec<u32> = contact.nodes().filter_map(|node| of_node[node]).collect();
+    let touched: BTreeSet<u32> = gather(session.world(), &mine)?.into_iter().collect();
+    let is_own = |node: &usize| of_node[*node].is_some_and(|number| touched.contains(&number));
+    Ok((0..of_node.len()).filter(is_own).collect())
+}
+
 /// The smallest and the largest depth of nodes inside of the obstacle in m, negative outside; minus infinity without an obstacle.
 /// Collective.
-fn depths<const D: usize>(session: &Session, gap: &Gap, nodes: &[Vector<D>]) -> [f64; 2] {
-    let depths = nodes.iter().filter_map(|node| gap.depth(0.0, node));
+fn depths<'a, const D: usize>(
+    session: &Session,
+    gap: &Gap,
+    nodes: impl Iterator<Item = &'a Vector<D>>,
+) -> [f64; 2] {
+    let depths = nodes.filter_map(|node| gap.depth(0.0, node));
     let [least, most] =
         depths.fold([f64::NEG_INFINITY; 2], |[a, b], depth| [larger(a, -depth), larger(b, depth)]);
     let [least, most] = session.largest([least, most]);

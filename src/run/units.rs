@@ -29,6 +29,9 @@ const LARGEST_PART: f64 = 1000.0;
 /// Share of a body that a wave passes in a run, below which most of the body does not know of any load: with millimetres taken as metres
 /// the share is too small by a factor of 1000.
 const LEAST_PASSED: f64 = 0.01;
+/// Coordinates of this multiple of the size of a body have few digits left for places in it: directions of its sides and rigid motions are
+/// rounding errors.
+const FARTHEST: f64 = 1e6;
 /// Strain of loads in a body of this stiffness above which no solid holds together, and the equations of small strains are meaningless.
 const LARGEST_STRAIN: f64 = 1.0;
 
@@ -37,6 +40,8 @@ const LARGEST_STRAIN: f64 = 1.0;
 pub(super) struct BodySize {
     /// Its size along each axis in m.
     pub extent: Vec<f64>,
+    /// Its largest coordinate in m.
+    pub farthest: f64,
     /// In `mass_unit`; 0 without density.
     pub mass: f64,
     /// kg, in the plane kg/m.
@@ -166,6 +171,7 @@ impl<const D: usize> Measured<D> {
         let wave_time = wave_speed.map(|speed| longest / speed);
         BodySize {
             extent,
+            farthest: low.iter().chain(&high).fold(0.0, |most, x| larger(most, x.abs())),
             mass,
             mass_unit: "kg",
             density,
@@ -231,6 +237,14 @@ impl BodySize {
                 Digits(rounded(time))
             ));
         }
+        if self.farthest > FARTHEST * longest {
+            warn(format!(
+                "is {} m long, but its coordinates reach {} m: differences of such numbers have few digits, so that straight sides are bent \
+                 and steps may fail; move it near the origin by [mesh] translate",
+                Digits(rounded(longest)),
+                Digits(rounded(self.farthest))
+            ));
+        }
         if let Some(strain) = self.load_strain.filter(|strain| *strain > LARGEST_STRAIN) {
             warn(format!(
                 "has loads of {} times its stiffness, but the equations assume small strains: check the units of loads (N and Pa) and of \
@@ -255,6 +269,7 @@ mod tests {
     fn bar() -> BodySize {
         BodySize {
             extent: vec![1.0, 0.1, 0.1],
+            farthest: 1.0,
             mass: 78.5,
             mass_unit: "kg",
             density: 7850.0,
@@ -304,6 +319,8 @@ mod tests {
         assert!(warns(&long, "is 10000 m long"));
         let short = BodySize { density: 2700.0, extent: vec![700.0; 3], wave_time: Some(0.14), ..bar() };
         assert!(warns(&short, "millimetres taken as metres?"));
+        let far = BodySize { farthest: 4.5e6, ..bar() };
+        assert!(warns(&far, "is 1 m long, but its coordinates reach 4500000 m"));
         let soft = BodySize { load_strain: Some(1.5), ..bar() };
         assert!(warns(&soft, "has loads of 1.5 times its stiffness"));
     }

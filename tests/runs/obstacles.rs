@@ -427,6 +427,22 @@ fn an_obstacle_inside_the_body_is_warned_of() {
     }
 }
 
+/// The half-space of a plane goes on to where other bodies may be.
+#[test]
+fn a_body_without_contact_may_lie_inside_an_obstacle() {
+    let blocks = "[{ name = 'lower', size = [1, 0.5], cells = [4, 2] }, \
+                   { name = 'upper', corner = [0, 0.7], size = [1, 0.5], cells = [4, 2] }]";
+    let case = under("{plane = {point = [0, 0.52], normal = [0, -1]}}")
+        .set("mesh", &format!("{{ rectangle = {blocks} }}"))
+        .set("contact.0.on", "['lower.top']")
+        .set("support", "[{ on = ['lower.bottom', 'upper.bottom'], fix = 'all' }]")
+        .set("output.profile", "[{ on = 'lower.top' }]");
+    for ranks in [1, 2] {
+        let check = launch::run(ranks, &["check", case.written().to_str().expect("a path")]).expect(0);
+        assert!(!check.stdout.contains("inside the body"), "{}", check.stdout);
+    }
+}
+
 #[test]
 fn a_check_prints_the_gaps_of_contacts() {
     let case = under("{plane = {point = [0, 0.75], normal = [1, -10]}}");

@@ -61,6 +61,7 @@ fn bodies_are_measured_alike_on_all_ranks_and_mixed_units_are_warned_of() {
         };
         assert_eq!(bodies.as_array().map(Vec::len), Some(1));
         close("mass", 785.0);
+        close("farthest", 1.0);
         // sqrt(2.1e11 / 7850), 1 m over it, in steps of 1e-5 s.
         close("wave_speed", 5172.19);
         close("wave_time", 1.93342e-4);
