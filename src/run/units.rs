@@ -320,7 +320,7 @@ mod tests {
         let short = BodySize { density: 2700.0, extent: vec![700.0; 3], wave_time: Some(0.14), ..bar() };
         assert!(warns(&short, "millimetres taken as metres?"));
         let far = BodySize { farthest: 4.5e6, ..bar() };
-        assert!(warns(&far, "is 1 m long, but its coordinates reach 4500000 m"));
+        assert!(warns(&far, "is 1 m long, but its coordinates reach 4.5e6 m"));
         let soft = BodySize { load_strain: Some(1.5), ..bar() };
         assert!(warns(&soft, "has loads of 1.5 times its stiffness"));
     }

@@ -114,13 +114,13 @@ pub(super) struct ProbePlace {
 }
 
 /// A cell of this rank around a point, and its local nodes with the values of their shape functions there.
-pub(super) type Found = (usize, Vec<(u32, f64)>);
+pub(super) type ProbedCell = (usize, Vec<(u32, f64)>);
 
 /// The places of probes, given the cell and its local nodes with their shares on the ranks that evaluate. Collective.
 pub(super) fn places<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
-    found: &[Option<Found>],
+    found: &[Option<ProbedCell>],
 ) -> Result<Vec<ProbePlace>, Agreed> {
     let mut records = Vec::new();
     for (number, place) in found.iter().enumerate() {
@@ -128,7 +128,7 @@ pub(super) fn places<const D: usize>(
             records.extend([number as f64, f64::from(mesh.global_node(*node)), *share]);
         }
     }
-    let cell = |place: &Option<Found>| place.as_ref().map(|(cell, _)| *cell);
+    let cell = |place: &Option<ProbedCell>| place.as_ref().map(|(cell, _)| *cell);
     let mut places: Vec<ProbePlace> =
         found.iter().map(|place| ProbePlace { cell: cell(place), owned: Vec::new() }).collect();
     for record in gather(session.world(), &records)?.chunks_exact(3) {

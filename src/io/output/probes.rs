@@ -4,7 +4,7 @@ use super::{
     columns::PROBES,
     csv::{CsvFile, Numbers, Time, entry},
     output_field::Converged,
-    probed::{Found, ProbePlace, Probed, groups, places},
+    probed::{ProbePlace, Probed, ProbedCell, groups, places},
 };
 use crate::{
     error::{Error, Result},
@@ -152,7 +152,7 @@ impl<const D: usize> Probes<D> {
 }
 
 /// The first cell around a point, and its nodes with the values of their shape functions there.
-fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<Found> {
+fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<ProbedCell> {
     (0..mesh.cell_count()).find_map(|number| {
         let nodes: Vec<Vector<D>> = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]).collect();
         let outside = (0..D).any(|i| {

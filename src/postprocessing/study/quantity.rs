@@ -33,7 +33,7 @@ impl Window {
 
 /// A quantity that a run has.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Found {
+pub(super) enum RunQuantity {
     /// Its value.
     Number(f64),
     /// The values do not oscillate, so that they have no period.
@@ -48,37 +48,37 @@ pub(super) enum Found {
 /// the others are over all steps.
 pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
     match quantity_in(folder, name, Window::default())? {
-        Found::Number(number) => Some(number),
-        Found::NoPeriod => None,
+        RunQuantity::Number(number) => Some(number),
+        RunQuantity::NoPeriod => None,
     }
 }
 
 /// As [`quantity`], of the steps in a window of time. Only histories, probes and resultants have values there.
-pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<Found> {
+pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<RunQuantity> {
     let Some(TableQuantity { table, of, side, column: field }) = TableQuantity::parse(name) else {
         let text = std::fs::read_to_string(folder.join("summary.json")).ok()?;
         let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
-        return summary.pointer(&format!("/{}", name.replace('.', "/")))?.as_f64().map(Found::Number);
+        return summary.pointer(&format!("/{}", name.replace('.', "/")))?.as_f64().map(RunQuantity::Number);
     };
     let filter = table.keys.last().copied().zip(of);
     let numbers = |name: &str| column(folder, table.file, filter, name);
     if table.keys.first() == Some(&"time") {
         let times = numbers("time")?;
         let rows = times.iter().zip(numbers(field)?).filter(|(time, _)| Some(*time) == times.last());
-        return extreme(side?, rows.map(|(_, value)| value)).map(Found::Number);
+        return extreme(side?, rows.map(|(_, value)| value)).map(RunQuantity::Number);
     }
     let is_over_time = matches!(side, Some("mean" | "period"));
     if window.is_whole() && !is_over_time {
-        return over_steps(side, &numbers(field)?).map(Found::Number);
+        return over_steps(side, &numbers(field)?).map(RunQuantity::Number);
     }
     let rows = numbers("time")?.into_iter().zip(numbers(field)?).filter(|(time, _)| window.contains(*time));
     let (times, values): (Vec<f64>, Vec<f64>) = rows.unzip();
     if side == Some("period") {
         let level = mean(&times, &values)?;
-        return Some(period(&times, &values, level).map_or(Found::NoPeriod, Found::Number));
+        return Some(period(&times, &values, level).map_or(RunQuantity::NoPeriod, RunQuantity::Number));
     }
     let value = if side == Some("mean") { mean(&times, &values) } else { over_steps(side, &values) };
-    value.map(Found::Number)
+    value.map(RunQuantity::Number)
 }
 
 /// The last value, an extremum or the amplitude.
@@ -197,7 +197,11 @@ mod tests {
             ("probe.a.mean.velocity_y", Some(2.5), Some(3.5), None),
             ("probe.a.max.velocity_y", Some(5.0), None, None),
         ] {
-            assert_eq!(value(name, from, to), expected.map(Found::Number), "{name} from {from:?} to {to:?}");
+            assert_eq!(
+                value(name, from, to),
+                expected.map(RunQuantity::Number),
+                "{name} from {from:?} to {to:?}"
+            );
         }
     }
 
@@ -214,9 +218,13 @@ mod tests {
         let value = |from: Option<f64>, to: Option<f64>| {
             quantity_in(folder.path(), "history.period.work", Window { from, to })
         };
-        assert_eq!(value(Some(5.0), None), Some(Found::Number(2.0)));
-        assert_eq!(value(None, None), Some(Found::NoPeriod), "the jump crosses the mean of the run once");
-        assert_eq!(value(None, Some(4.0)), Some(Found::NoPeriod), "nothing moves");
+        assert_eq!(value(Some(5.0), None), Some(RunQuantity::Number(2.0)));
+        assert_eq!(
+            value(None, None),
+            Some(RunQuantity::NoPeriod),
+            "the jump crosses the mean of the run once"
+        );
+        assert_eq!(value(None, Some(4.0)), Some(RunQuantity::NoPeriod), "nothing moves");
         assert_eq!(value(Some(20.0), None), None, "no steps");
         assert_eq!(quantity(folder.path(), "history.period.work"), None);
         assert_eq!(quantity(folder.path(), "history.period.nothing"), None);

@@ -3,7 +3,7 @@
 use super::{
     document::Response,
     plan::Plan,
-    quantity::{Found, quantity_in},
+    quantity::{RunQuantity, quantity_in},
     results::Results,
 };
 use crate::{
@@ -30,8 +30,8 @@ pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
             let value = here.then(|| quantity_in(folders[at], &response.of, response.window())).flatten();
             let (mark, value) = match value {
                 None => continue,
-                Some(Found::Number(value)) => (VALUE, value),
-                Some(Found::NoPeriod) => (NO_PERIOD, 0.0),
+                Some(RunQuantity::Number(value)) => (VALUE, value),
+                Some(RunQuantity::NoPeriod) => (NO_PERIOD, 0.0),
             };
             found[place(at, name)] = mark;
             found[place(at, name) + 1] = value;
