@@ -143,6 +143,18 @@ mod tests {
     }
 
     #[test]
+    fn a_step_from_a_graph_with_one_corner_starts_at_its_jump_whatever_the_rounding() {
+        let law = graph(&[[0.0, 0.0], [0.0, 6.0]], 9.0);
+        for before in [0.0, 1e-17, -1e-17] {
+            let at = node(before, 0.0);
+            let found = law.resolve(3.0, 2.0, at);
+            assert!((found.pressure - 3.0).abs() < 1e-12 && found.derivative == 0.0, "{before}: {found:?}");
+            let off = law.distance(found.velocity, found.pressure, at, [1.0, 6.0]);
+            assert!(off < 1e-12, "{before}: {off}");
+        }
+    }
+
+    #[test]
     fn means_of_springs_by_hand() {
         // From 0.1 m beside the obstacle to 0.3 m beyond it: 300 / 2 0.3^2 J/m^2 over 0.4 m.
         let law = Compliance { stiffness: 300.0, exponent: 1.0, damping: 0.0, gap: None };

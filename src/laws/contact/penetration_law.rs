@@ -48,10 +48,15 @@ impl<G: StoringGraph> Potential for PenetrationLaw<G> {
     fn vertical_parts(&self, before: f64) -> Vertical {
         let corners = self.corners();
         let extent = corners.iter().fold(0.0, |extent: f64, corner| extent.max(corner[0].abs()));
-        let is_jump =
-            |pair: &&[[f64; 2]]| pair[0][0] == pair[1][0] && (pair[0][0] - before).abs() <= ROUNDING * extent;
-        let jump = corners.windows(2).find(is_jump);
-        Vertical { jump: jump.map(|pair| [pair[0][1], pair[1][1]]), wall: self.0.wall() }
+        let jumps = corners.windows(2).map(|pair| [pair[0], pair[1]]).filter(|[low, high]| low[0] == high[0]);
+        // A graph whose corners are all at one place extends as far as the pressure takes to grow by as much as it jumps.
+        let rise = |[[at, below], [_, above]]: [[f64; 2]; 2]| {
+            let growth = (above - below) / self.0.graph().slope(at, NodeContext::AT_THE_GAP).abs();
+            if growth.is_finite() { growth } else { 0.0 }
+        };
+        let mut at_start =
+            jumps.filter(|jump| (jump[0][0] - before).abs() <= ROUNDING * extent.max(rise(*jump)));
+        Vertical { jump: at_start.next().map(|[low, high]| [low[1], high[1]]), wall: self.0.wall() }
     }
 
     fn steepest_decrease(&self) -> f64 {
