@@ -11,7 +11,7 @@
 //! Sci. 6, 1996.)
 
 use super::normal_law::{NodeContext, Resolved};
-use crate::laws::law::increasing_root;
+use crate::{laws::law::increasing_root, linear_algebra::tensor::larger};
 
 /// A difference of two pressures below this share of them is rounding errors of their means.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -37,6 +37,8 @@ pub(super) trait Potential {
 pub(super) struct Vertical {
     /// Pressures in Pa below and above the jump at the penetration before the step.
     pub jump: Option<[f64; 2]>,
+    /// The penetration in m of the jump nearest to it, and these pressures there.
+    pub nearest: Option<(f64, [f64; 2])>,
     /// Penetration in m of a rigid obstacle.
     pub wall: Option<f64>,
 }
@@ -48,7 +50,7 @@ pub(super) fn resolve(law: &impl Potential, s: f64, c: f64, node: NodeContext, b
     let closed =
         |pressure: f64| Resolved { velocity: (s - pressure) / c, pressure, derivative: 0.0, branch: 1 };
     let open = |after: f64, pressure: f64| parameter * (after - free) + pressure;
-    let Vertical { jump, wall } = law.vertical_parts(before);
+    let Vertical { jump, wall, .. } = law.vertical_parts(before);
     if let Some(wall) = wall
         && open(wall, law.mean(before, wall)[0]) <= 0.0
     {
@@ -90,15 +92,20 @@ pub(super) fn distance(
     [width, height]: [f64; 2],
 ) -> f64 {
     let after = node.penetration_at(velocity);
-    let Vertical { jump, wall } = law.vertical_parts(before);
-    let beside = |at: f64, [low, high]: [f64; 2]| {
+    let Vertical { jump, nearest, wall } = law.vertical_parts(before);
+    let apart = |way: f64, [low, high]: [f64; 2]| {
         let off = if pressure < low { low - pressure } else { (pressure - high).max(0.0) };
-        ((after - at) / (node.step_length * width)).hypot(off / height)
+        (way / (node.step_length * width)).hypot(off / height)
     };
+    let beside = |at: f64, pressures: [f64; 2]| apart(after - at, pressures);
     let mut least = (law.mean(before, after)[0] - pressure).abs() / height;
     if let Some(wall) = wall {
         let at_wall = beside(wall, [law.mean(before, wall)[0], f64::INFINITY]);
         least = if after > wall { at_wall } else { least.min(at_wall) };
+    }
+    // Rounding errors of the start decide on which side of a jump it is: the graph of a step that starts there is as near as the start.
+    if let Some((at, pressures)) = nearest {
+        least = least.min(apart(larger((after - at).abs(), (before - at).abs()), pressures));
     }
     jump.map_or(least, |jump| least.min(beside(before, jump)))
 }
@@ -139,6 +146,22 @@ mod tests {
             step_length: 0.02,
             mean_from: Some(before),
             ..NodeContext::AT_THE_GAP
+        }
+    }
+
+    #[test]
+    fn a_step_from_a_graph_with_one_corner_starts_at_its_jump_whatever_the_rounding() {
+        for slope in [9.0, 0.0, f64::INFINITY] {
+            let law = graph(&[[0.0, 0.0], [0.0, 6.0]], slope);
+            for before in [0.0, 1e-17, -1e-17] {
+                let at = node(before, 0.0);
+                let found = law.resolve(3.0, 2.0, at);
+                assert!((found.pressure - 3.0).abs() < 1e-9, "{slope} {before}: {found:?}");
+                let off = law.distance(found.velocity, found.pressure, at, [1.0, 6.0]);
+                assert!(off < 1e-14, "{slope} {before}: {off}");
+                let wrong = law.distance(found.velocity, -1.0, at, [1.0, 6.0]);
+                assert!((wrong - 1.0 / 6.0).abs() < 1e-9, "{slope} {before}: {wrong}");
+            }
         }
     }
 

@@ -48,10 +48,15 @@ impl<G: StoringGraph> Potential for PenetrationLaw<G> {
     fn vertical_parts(&self, before: f64) -> Vertical {
         let corners = self.corners();
         let extent = corners.iter().fold(0.0, |extent: f64, corner| extent.max(corner[0].abs()));
-        let is_jump =
-            |pair: &&[[f64; 2]]| pair[0][0] == pair[1][0] && (pair[0][0] - before).abs() <= ROUNDING * extent;
-        let jump = corners.windows(2).find(is_jump);
-        Vertical { jump: jump.map(|pair| [pair[0][1], pair[1][1]]), wall: self.0.wall() }
+        let off = |[corner, _]: &[[f64; 2]; 2]| (corner[0] - before).abs();
+        let jumps = corners.windows(2).map(|pair| [pair[0], pair[1]]).filter(|[low, high]| low[0] == high[0]);
+        let nearest = jumps.min_by(|a, b| off(a).total_cmp(&off(b)));
+        let pressures = |[low, high]: [[f64; 2]; 2]| [low[1], high[1]];
+        Vertical {
+            jump: nearest.filter(|jump| off(jump) <= ROUNDING * extent).map(pressures),
+            nearest: nearest.map(|jump| (jump[0][0], pressures(jump))),
+            wall: self.0.wall(),
+        }
     }
 
     fn steepest_decrease(&self) -> f64 {
