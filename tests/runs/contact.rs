@@ -768,7 +768,7 @@ fn a_block_under_large_stresses_falls_on_a_plane_under_a_small_load() {
         let ring = ring.set("initial.stress", "{xx = -5e4, yy = -2e4}");
         assert_carries(&ring, whole_turn, &format!("axisymmetric, order {order}"));
     }
-    // If Newton's method strays to a flight, the step fails.
+    // Newton's method strays to a flight, and solves the step from where the law bears the load.
     let graph = "{displacement_graph = {points = [[0.0, 0.0], [0.001, 1.2e5], [0.002, 2e5]], slope_after = 2e8, gap = 4e-3}}";
     let strays = case("1")
         .set("material.hypothesis", "'axisymmetric'")
@@ -779,7 +779,8 @@ fn a_block_under_large_stresses_falls_on_a_plane_under_a_small_load() {
         .set("contact.0.normal", graph)
         .set("contact.0.friction.coulomb.coefficient", "0.0")
         .set("time", "{end = 1.5625e-4, step = 1.5625e-4, scheme = 'implicit_euler'}");
-    strays.run_with(1, &[]).expect(1).says("a body moves by more than a thousand times its size");
+    let whole_turn = 504.0 * std::f64::consts::PI * (1.5f64.powi(2) - 0.25);
+    assert_carries(&strays, whole_turn, "a graph that begins beyond the gap");
 }
 
 /// An obstacle that a force presses on a block without supports and inertia: nothing but the obstacle pushes it against its foundation.

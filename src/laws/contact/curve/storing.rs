@@ -13,8 +13,9 @@ const NEAREST: f64 = 1e-12;
 const GROWTH: f64 = 4.0;
 /// Changes of the pressure in a step below this share are rounding errors in its derivative.
 const SMALL: f64 = 1e-6;
-/// Halvings of a part.
+/// Halvings of a part, and those at whose ends potentials are kept.
 const DEPTH: usize = 10;
+const KEPT_DEPTH: usize = 6;
 
 /// The integral of a smooth function from `a` to `b`, and that of its absolute value, by ten points.
 fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
@@ -23,9 +24,9 @@ fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
 }
 
 /// The integral of a smooth function from `a` to `b`, as a part of a sum of the size `scale`.
-fn integral(function: &dyn Fn(f64) -> f64, [a, b]: [f64; 2], scale: f64) -> f64 {
+fn integral(function: &dyn Fn(f64) -> f64, [a, b]: [f64; 2], (scale, depth): (f64, usize)) -> f64 {
     let [sum, size] = gauss(function, a, b);
-    adaptive(function, [a, b], sum, (EXACT * size.max(scale), DEPTH))
+    adaptive(function, [a, b], sum, (EXACT * size.max(scale), depth))
 }
 
 /// The integral over a part with this integral by ten points, by halves until they agree within `slack`.
@@ -44,6 +45,27 @@ fn adaptive(
     }
     let next = (slack, depth - 1);
     adaptive(function, [a, middle], halves[0], next) + adaptive(function, [middle, b], halves[1], next)
+}
+
+/// The ends of parts between `a` and `b`, in this order, within which ten points suffice, as far as they are no shorter than parts with kept
+/// ends may be.
+fn ends_of_parts(
+    function: &dyn Fn(f64) -> f64,
+    [a, b]: [f64; 2],
+    whole: f64,
+    (slack, depth): (f64, usize),
+    ends: &mut Vec<f64>,
+) {
+    let middle = 0.5 * (a + b);
+    let halves = [gauss(function, a, middle), gauss(function, middle, b)].map(|[sum, _]| sum);
+    let error = (halves[0] + halves[1] - whole).abs();
+    if depth == 0 || error <= slack || error.is_nan() {
+        return;
+    }
+    let next = (slack, depth - 1);
+    ends_of_parts(function, [a, middle], halves[0], next, ends);
+    ends.push(middle);
+    ends_of_parts(function, [middle, b], halves[1], next, ends);
 }
 
 /// A curve over the penetration in m, with its potential.
@@ -84,11 +106,17 @@ impl StoringCurve {
         let (apart, close): (Vec<f64>, Vec<f64>) = at.into_iter().partition(|at| *at < 0.0);
         let storing = Self { curve, knots: Vec::new() };
         let outwards = |at: &mut dyn Iterator<Item = f64>| -> Vec<[f64; 2]> {
-            let next = |last: &mut [f64; 2], to| {
-                *last = [to, storing.potential_from(*last, to)];
-                Some(*last).filter(|knot| knot[1].is_finite())
-            };
-            at.scan([0.0; 2], next).collect()
+            let (mut knots, mut last) = (Vec::new(), [0.0; 2]);
+            for to in at {
+                for to in storing.ends_between(last, to).into_iter().chain([to]) {
+                    last = [to, storing.potential_from(last, to)];
+                    if !last[1].is_finite() {
+                        return knots;
+                    }
+                    knots.push(last);
+                }
+            }
+            knots
         };
         let mut knots = outwards(&mut apart.into_iter().rev());
         knots.reverse();
@@ -96,11 +124,23 @@ impl StoringCurve {
         Ok(Self { knots, ..storing })
     }
 
+    /// Where potentials are to be kept between a knot and a penetration in m without a corner between: a curve that waves is integrated over
+    /// a short way.
+    fn ends_between(&self, [knot, potential]: [f64; 2], penetration: f64) -> Vec<f64> {
+        let branch = self.curve.branch(0.5 * (knot + penetration), NodeContext::AT_THE_GAP);
+        let pressure = |at| self.curve.pressure_on_branch(branch, at);
+        let [sum, size] = gauss(&pressure, knot, penetration);
+        let slack = EXACT * size.max(potential.abs());
+        let mut ends = Vec::new();
+        ends_of_parts(&pressure, [knot, penetration], sum, (slack, KEPT_DEPTH), &mut ends);
+        ends
+    }
+
     /// The potential in J/m² at a penetration in m from that at a knot without a corner between.
     fn potential_from(&self, [knot, potential]: [f64; 2], penetration: f64) -> f64 {
         let branch = self.curve.branch(0.5 * (knot + penetration), NodeContext::AT_THE_GAP);
         let pressure = |at| self.curve.pressure_on_branch(branch, at);
-        potential + integral(&pressure, [knot, penetration], potential.abs())
+        potential + integral(&pressure, [knot, penetration], (potential.abs(), DEPTH - KEPT_DEPTH))
     }
 }
 
@@ -140,7 +180,8 @@ impl StoringGraph for StoringCurve {
             return [mean, (own - mean) / advance];
         }
         let at = |share: f64| before + share * advance;
-        let mean = integral(&|share| self.curve.pressure_on_branch(branch, at(share)), [0.0, 1.0], 0.0);
+        let mean =
+            integral(&|share| self.curve.pressure_on_branch(branch, at(share)), [0.0, 1.0], (0.0, DEPTH));
         let own = self.curve.pressure_on_branch(branch, after);
         let change = own - mean;
         if change.abs() > SMALL * own.abs().max(mean.abs()) {
@@ -182,6 +223,18 @@ mod tests {
                 );
             }
             assert_eq!(curve.potential(f64::NEG_INFINITY), curve.potential(-REACH), "{text}");
+        }
+    }
+
+    #[test]
+    fn potentials_of_a_curve_that_waves_are_integrated_over_short_ways() {
+        let curve = storing("if(d < 0, 0, 18*(0.3*sin(2e4*d) + 4e3*d))");
+        let expected = |d: f64| 18.0 * (0.3 * (1.0 - (2e4 * d).cos()) / 2e4 + 2e3 * d * d);
+        for d in [1e-6, 1e-4, 3e-3, 0.0123] {
+            let found = curve.potential(d);
+            assert!((found - expected(d)).abs() <= 1e-12 * expected(d), "{d}: {found}, {}", expected(d));
+            let knot = curve.knots.partition_point(|knot| knot[0] <= d) - 1;
+            assert!(curve.knots[knot + 1][0] - curve.knots[knot][0] < 1e-3, "{d}");
         }
     }
 
