@@ -1,5 +1,5 @@
 //! Rules of the source: modules use only modules above them, the files of a module have no circular imports, functions have few
-//! parameters, `unsafe` occurs in few files only, and the licences of all packages are allowed.
+//! parameters, few of them lie between a step and PETSc, `unsafe` occurs in few files only, and the licences of all packages are allowed.
 
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 use std::{
@@ -559,6 +559,60 @@ fn functions_have_few_parameters() {
     let text = "fn f<T: Fn(u8, u8) -> u8>(&'a mut self, a: [u8; 2], b: A<C, D>, c: impl Fn(u8, u8), (d, e): (u8, A<C, D>)) {}";
     parameters(tokens(text), &mut found);
     assert_eq!(found, [("f".to_owned(), 5)]);
+}
+
+/// The largest number of functions from the solution of a step to the call of PETSc or of the descent, both with their own.
+const MOST_FRAMES: usize = 7;
+
+/// The functions in which a step is solved, with their text, by the type that they belong to (a file, with those in its folder) and name.
+fn functions_of_steps() -> BTreeMap<(String, String), String> {
+    let mut functions = BTreeMap::new();
+    for (path, text) in sources() {
+        let Some(inside) = path.strip_prefix("src/solver/stepping/") else { continue };
+        let owner = inside.split(['/', '.']).next().expect("a name").to_owned();
+        let text = text.split("#[cfg(test)]").next().expect("a part");
+        let mut current = None;
+        for line in text.lines() {
+            let code = line.trim_start();
+            let is_outer = line.len() - code.len() <= 4 && !code.starts_with("//");
+            if let Some((_, rest)) = format!(" {code}").split_once(" fn ").filter(|_| is_outer) {
+                let name = rest.split(['(', '<']).next().expect("a name");
+                current = Some((owner.clone(), name.to_owned()));
+            }
+            if let Some(key) = &current {
+                *functions.entry(key.clone()).or_insert_with(String::new) += &format!("{line}\n");
+            }
+        }
+    }
+    functions
+}
+
+/// The length of the longest way from a function to one that calls PETSc; 0 where there is none.
+fn frames(functions: &BTreeMap<(String, String), String>, from: &(String, String)) -> usize {
+    let Some(text) = functions.get(from) else { return 0 };
+    let receivers = [("self", &*from.0), ("newton", "newton"), ("flowing", "flow_corrections")];
+    let deeper = functions.keys().filter(|key| *key != from).map(|key| {
+        let (owner, name) = key;
+        let called = |receiver: &str| text.contains(&format!("{receiver}.{name}("));
+        let is_called = receivers.iter().any(|(receiver, of)| of == owner && called(receiver))
+            || (owner == "corrections" && text.contains(&format!(" {name}(newton")));
+        if is_called { frames(functions, key) } else { 0 }
+    });
+    let calls_petsc = ["snes.solve(", "descent.solve("].iter().any(|call| text.contains(call));
+    match (deeper.max().unwrap_or(0), calls_petsc) {
+        (0, calls) => usize::from(calls),
+        (deeper, _) => deeper + 1,
+    }
+}
+
+#[test]
+fn few_functions_lie_between_a_step_and_petsc() {
+    let functions = functions_of_steps();
+    let of = |owner: &str, name: &str| frames(&functions, &(owner.to_owned(), name.to_owned()));
+    assert_eq!(of("newton", "search"), 1, "it calls PETSc");
+    assert!(of("newton", "solve") > 2 && of("flow_corrections", "solve_whole") > of("newton", "solve"));
+    let found = of("step_solver", "solve");
+    assert!(found <= MOST_FRAMES, "{found} functions from StepSolver::solve to PETSc");
 }
 
 /// The lines with the word `unsafe`, and whether the word starts a block.

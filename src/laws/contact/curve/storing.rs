@@ -54,18 +54,19 @@ fn ends_of_parts(
     [a, b]: [f64; 2],
     whole: f64,
     (slack, depth): (f64, usize),
-    ends: &mut Vec<f64>,
-) {
+) -> Vec<f64> {
     let middle = 0.5 * (a + b);
     let halves = [gauss(function, a, middle), gauss(function, middle, b)].map(|[sum, _]| sum);
     let error = (halves[0] + halves[1] - whole).abs();
     if depth == 0 || error <= slack || error.is_nan() {
-        return;
+        return Vec::new();
     }
     let next = (slack, depth - 1);
-    ends_of_parts(function, [a, middle], halves[0], next, ends);
+    let [before, after] = [[a, middle], [middle, b]];
+    let mut ends = ends_of_parts(function, before, halves[0], next);
     ends.push(middle);
-    ends_of_parts(function, [middle, b], halves[1], next, ends);
+    ends.append(&mut ends_of_parts(function, after, halves[1], next));
+    ends
 }
 
 /// A curve over the penetration in m, with its potential.
@@ -131,9 +132,7 @@ impl StoringCurve {
         let pressure = |at| self.curve.pressure_on_branch(branch, at);
         let [sum, size] = gauss(&pressure, knot, penetration);
         let slack = EXACT * size.max(potential.abs());
-        let mut ends = Vec::new();
-        ends_of_parts(&pressure, [knot, penetration], sum, (slack, KEPT_DEPTH), &mut ends);
-        ends
+        ends_of_parts(&pressure, [knot, penetration], sum, (slack, KEPT_DEPTH))
     }
 
     /// The potential in J/m² at a penetration in m from that at a knot without a corner between.
