@@ -28,7 +28,7 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
     solver::{
         certificate::Certificates,
-        stepping::{Preconditioner, StepOutcome, StepRange},
+        stepping::{Preconditioner, StepOutcome, StepRange, without_rounding},
     },
 };
 use std::time::{Duration, Instant};
@@ -456,7 +456,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             preconditioner: scheme.preconditioner().0.name(),
             factor_precision: scheme.factor_precision().map(Precision::name),
             steps: state.step,
-            time: state.time,
+            time: without_rounding(state.time),
             rejected_steps: totals.step_level.map_or(0, |level| level.rejected),
             unstable_steps: totals.unstable_steps,
             unresolved_steps: totals.unresolved_steps,

@@ -79,6 +79,7 @@ fn a_load_that_jumps_at_the_end_of_the_run_acts_until_then() {
             let shorter = rows(&case.results());
             assert_eq!(shorter[..], longer[..shorter.len()], "{scheme}, adaptive: {is_adaptive}");
             assert_eq!(case.results().table("history.csv").numbers("time").last(), Some(&0.5));
+            assert_eq!(case.results().number("time"), 0.5, "as written in the job");
             let case = case.set("time.end", "0.75");
             case.run_with(1, &["--restart"]).expect(0);
             assert_eq!(rows(&case.results()), longer, "{scheme}, adaptive: {is_adaptive}: continued");
