@@ -14,6 +14,17 @@ use crate::{
     },
 };
 
+impl Bodies {
+    /// The body of each node of this rank that belongs to a cell of this rank.
+    pub fn of_nodes<const D: usize>(&self, mesh: &Mesh<D>) -> Vec<Option<u32>> {
+        let mut of_node = vec![None; mesh.nodes.len()];
+        for (cell, number) in self.of_cell.iter().enumerate() {
+            mesh.cell_nodes(cell).for_each(|node| of_node[node as usize] = Some(*number));
+        }
+        of_node
+    }
+}
+
 impl<const D: usize> Mesh<D> {
     /// The bodies of the whole mesh, numbered by their first cells, and the body of each cell of this rank. Collective.
     ///

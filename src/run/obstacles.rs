@@ -259,11 +259,7 @@ fn nodes_of_bodies<const D: usize, const S: usize>(
     body: &Body<D, S>,
     contact: &Contact<D>,
 ) -> Result<Vec<usize>, Agreed> {
-    let of_cell = body.mesh.bodies(session)?.of_cell;
-    let mut of_node = vec![None; body.mesh.nodes.len()];
-    for (cell, number) in of_cell.iter().enumerate() {
-        body.mesh.cell_nodes(cell).for_each(|node| of_node[node as usize] = Some(*number));
-    }
+    let of_node = body.mesh.bodies(session)?.of_nodes(&body.mesh);
     let mine: Vec<u32> = contact.nodes().filter_map(|node| of_node[node]).collect();
     let touched: BTreeSet<u32> = gather(session.world(), &mine)?.into_iter().collect();
     let is_own = |node: &usize| of_node[*node].is_some_and(|number| touched.contains(&number));

@@ -71,10 +71,9 @@ pub(super) fn bodies<const D: usize, const S: usize>(
     let found = mesh.bodies(session)?;
     let materials = Materials::new(session, job, mesh)?;
     let mut sums = vec![Measured::<D>::default(); found.count.min(MOST)];
-    let mut of_node = vec![usize::MAX; mesh.nodes.len()];
+    let of_node = found.of_nodes(mesh);
     for (cell, shape) in body.geometry.cells().enumerate() {
         let number = found.of_cell[cell] as usize;
-        mesh.cell_nodes(cell).for_each(|node| of_node[node as usize] = number);
         let Some(sum) = sums.get_mut(number) else { continue };
         for node in mesh.cell_nodes(cell) {
             let place = &mesh.nodes[node as usize];
@@ -104,7 +103,7 @@ pub(super) fn bodies<const D: usize, const S: usize>(
     }
     for facet in body.load.tractions.iter().flat_map(|traction| &traction.facets) {
         let nodes = mesh.facets[*facet as usize];
-        if let Some(sum) = sums.get_mut(of_node[nodes[0] as usize]) {
+        if let Some(sum) = of_node[nodes[0] as usize].and_then(|number| sums.get_mut(number as usize)) {
             sum.loaded_area += area_of(mesh, *facet);
         }
     }
@@ -118,14 +117,14 @@ pub(super) fn bodies<const D: usize, const S: usize>(
 fn loads<const D: usize, const S: usize>(
     body: &Body<D, S>,
     end: f64,
-    (of_node, count): (&[usize], usize),
+    (of_node, count): (&[Option<u32>], usize),
 ) -> Result<Vec<Vec<[f64; 2]>>> {
     let mut sums = vec![vec![[0.0; 2]; TIMES as usize + 1]; count];
     let times = if body.load.is_steady() { 0 } else { TIMES };
     for at in 0..=times {
         let time = end * f64::from(at) / f64::from(TIMES);
         body.load.forces(&body.mesh, &body.geometry, time, |cell, node, force| {
-            if let Some(sums) = sums.get_mut(of_node[node as usize]) {
+            if let Some(sums) = of_node[node as usize].and_then(|number| sums.get_mut(number as usize)) {
                 sums[at as usize][usize::from(cell.is_some())] += norm(force);
             }
         })?;

@@ -139,6 +139,10 @@ pub(super) fn rest_on_contacts<const D: usize, const S: usize>(
         }
         while high - low > ROUNDING * low.abs().max(high.abs()) {
             let middle = 0.5 * (low + high);
+            // Next to zero there may be no number between.
+            if middle <= low || middle >= high {
+                break;
+            }
             match open(middle) {
                 below if below < 0.0 => (low, ends[0]) = (middle, below),
                 above => (high, ends[1]) = (middle, above),

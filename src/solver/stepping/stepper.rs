@@ -635,12 +635,9 @@ impl Stepper {
         step: Step,
     ) -> Result<()> {
         self.extrapolate(state, step)?;
-        match &self.moving_supports {
-            Some(supports) => {
-                supports.set(body, &mut self.trial)?;
-                supports.show_contacts(body)?;
-            }
-            None => body.contacts.iter_mut().for_each(|contact| contact.set_support_velocities(None)),
+        if let Some(supports) = &self.moving_supports {
+            supports.set(body, &mut self.trial)?;
+            supports.show_contacts(body)?;
         }
         let (blend, time) = (self.integrator.blend(step.length), self.integrator.balanced_time(step));
         let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);

@@ -99,7 +99,7 @@ impl MovingSupports {
     pub(super) fn show_contacts<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
         let velocity = self.carried.local()?;
         let velocity = body.seen_by_contacts(&velocity);
-        body.contacts.iter_mut().for_each(|contact| contact.set_support_velocities(Some(&velocity)));
+        body.contacts.iter_mut().for_each(|contact| contact.set_support_velocities(&velocity));
         Ok(())
     }
 

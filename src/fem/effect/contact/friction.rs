@@ -160,8 +160,8 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Sets the velocities of supports in the step in m/s by local nodes; none if all are at rest.
-    pub(super) fn set_support_velocities(&mut self, velocities: Option<&[f64]>) {
+    /// Sets the velocities of supports in the step in m/s by local nodes.
+    pub(super) fn set_support_velocities(&mut self, velocities: &[f64]) {
         self.points.iter_mut().for_each(|point| point.set_support_velocity(velocities));
     }
 

@@ -18,8 +18,8 @@ impl<const D: usize> Contact<D> {
         self.friction.iter_mut().for_each(|friction| friction.set_temperatures(temperatures));
     }
 
-    /// Lets friction know the velocities of supports in the step in m/s by local nodes, as contacts see them; none if all are at rest.
-    pub fn set_support_velocities(&mut self, velocities: Option<&[f64]>) {
+    /// Lets friction know the velocities of supports in the step in m/s by local nodes, as contacts see them. Not called, all are at rest.
+    pub fn set_support_velocities(&mut self, velocities: &[f64]) {
         self.friction.iter_mut().for_each(|friction| friction.set_support_velocities(velocities));
     }
 

@@ -151,12 +151,10 @@ impl<const D: usize> TangentialPoint<D> {
         self.obstacle_speed = norm(velocity);
     }
 
-    /// Sets whether supports move the node along the held tangents, given their velocities in m/s; none if all are at rest.
-    pub(super) fn set_support_velocity(&mut self, velocities: Option<&[f64]>) {
-        self.is_carried = velocities.is_some_and(|velocities| {
-            let velocity = self.value(Body, velocities);
-            norm(&self.held_part(&velocity)) > ROUNDED * norm(&velocity)
-        });
+    /// Sets whether supports move the node along the held tangents, given their velocities in m/s.
+    pub(super) fn set_support_velocity(&mut self, velocities: &[f64]) {
+        let velocity = self.value(Body, velocities);
+        self.is_carried = norm(&self.held_part(&velocity)) > ROUNDED * norm(&velocity);
     }
 
     /// The sliding velocity in m/s relative to the obstacle along the tangents that supports hold: there nodal velocities and unknowns

@@ -23,50 +23,39 @@ fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
     [mean * (b - a), size * (b - a).abs()]
 }
 
-/// The integral of a smooth function from `a` to `b`, as a part of a sum of the size `scale`.
-fn integral(function: &dyn Fn(f64) -> f64, [a, b]: [f64; 2], (scale, depth): (f64, usize)) -> f64 {
-    let [sum, size] = gauss(function, a, b);
-    adaptive(function, [a, b], sum, (EXACT * size.max(scale), depth))
+/// A smooth function that is integrated by halves until they agree within `slack`.
+struct Halved<'a> {
+    function: &'a dyn Fn(f64) -> f64,
+    slack: f64,
 }
 
-/// The integral over a part with this integral by ten points, by halves until they agree within `slack`.
-fn adaptive(
-    function: &dyn Fn(f64) -> f64,
-    [a, b]: [f64; 2],
-    whole: f64,
-    (slack, depth): (f64, usize),
-) -> f64 {
-    let middle = 0.5 * (a + b);
-    let halves = [gauss(function, a, middle), gauss(function, middle, b)].map(|[sum, _]| sum);
-    let sum = halves[0] + halves[1];
-    let error = (sum - whole).abs();
-    if depth == 0 || error <= slack || error.is_nan() {
-        return sum;
+impl<'a> Halved<'a> {
+    /// From `a` to `b`, as a part of a sum of the size `scale`; with the integral by ten points.
+    fn of(function: &'a dyn Fn(f64) -> f64, [a, b]: [f64; 2], scale: f64) -> (Self, f64) {
+        let [sum, size] = gauss(function, a, b);
+        (Self { function, slack: EXACT * size.max(scale) }, sum)
     }
-    let next = (slack, depth - 1);
-    adaptive(function, [a, middle], halves[0], next) + adaptive(function, [middle, b], halves[1], next)
+
+    /// The integral over a part with the integral `whole` by ten points, which is halved this often at most; visits in their order the places
+    /// where parts are halved.
+    fn integral(&self, [a, b]: [f64; 2], whole: f64, depth: usize, visit: &mut dyn FnMut(f64)) -> f64 {
+        let middle = 0.5 * (a + b);
+        let halves = [gauss(self.function, a, middle), gauss(self.function, middle, b)].map(|[sum, _]| sum);
+        let sum = halves[0] + halves[1];
+        let error = (sum - whole).abs();
+        if depth == 0 || error <= self.slack || error.is_nan() {
+            return sum;
+        }
+        let before = self.integral([a, middle], halves[0], depth - 1, visit);
+        visit(middle);
+        before + self.integral([middle, b], halves[1], depth - 1, visit)
+    }
 }
 
-/// The ends of parts between `a` and `b`, in this order, within which ten points suffice, as far as they are no shorter than parts with kept
-/// ends may be.
-fn ends_of_parts(
-    function: &dyn Fn(f64) -> f64,
-    [a, b]: [f64; 2],
-    whole: f64,
-    (slack, depth): (f64, usize),
-) -> Vec<f64> {
-    let middle = 0.5 * (a + b);
-    let halves = [gauss(function, a, middle), gauss(function, middle, b)].map(|[sum, _]| sum);
-    let error = (halves[0] + halves[1] - whole).abs();
-    if depth == 0 || error <= slack || error.is_nan() {
-        return Vec::new();
-    }
-    let next = (slack, depth - 1);
-    let [before, after] = [[a, middle], [middle, b]];
-    let mut ends = ends_of_parts(function, before, halves[0], next);
-    ends.push(middle);
-    ends.append(&mut ends_of_parts(function, after, halves[1], next));
-    ends
+/// The integral of a smooth function from `a` to `b`, as a part of a sum of the size `scale`, by this many halvings at most.
+fn integral(function: &dyn Fn(f64) -> f64, ends: [f64; 2], (scale, depth): (f64, usize)) -> f64 {
+    let (halved, whole) = Halved::of(function, ends, scale);
+    halved.integral(ends, whole, depth, &mut |_| ())
 }
 
 /// A curve over the penetration in m, with its potential.
@@ -125,21 +114,26 @@ impl StoringCurve {
         Ok(Self { knots, ..storing })
     }
 
-    /// Where potentials are to be kept between a knot and a penetration in m without a corner between: a curve that waves is integrated over
-    /// a short way.
-    fn ends_between(&self, [knot, potential]: [f64; 2], penetration: f64) -> Vec<f64> {
+    /// The pressure in Pa between a knot and a penetration in m without a corner between.
+    fn pressure_between(&self, [knot, penetration]: [f64; 2]) -> impl Fn(f64) -> f64 {
         let branch = self.curve.branch(0.5 * (knot + penetration), NodeContext::AT_THE_GAP);
-        let pressure = |at| self.curve.pressure_on_branch(branch, at);
-        let [sum, size] = gauss(&pressure, knot, penetration);
-        let slack = EXACT * size.max(potential.abs());
-        ends_of_parts(&pressure, [knot, penetration], sum, (slack, KEPT_DEPTH))
+        move |at| self.curve.pressure_on_branch(branch, at)
     }
 
-    /// The potential in J/m² at a penetration in m from that at a knot without a corner between.
+    /// Where potentials are to be kept between a knot and such a penetration, in order: a curve that waves is integrated over a short way.
+    fn ends_between(&self, [knot, potential]: [f64; 2], penetration: f64) -> Vec<f64> {
+        let ends = [knot, penetration];
+        let pressure = self.pressure_between(ends);
+        let (halved, whole) = Halved::of(&pressure, ends, potential.abs());
+        let mut kept = Vec::new();
+        halved.integral(ends, whole, KEPT_DEPTH, &mut |at| kept.push(at));
+        kept
+    }
+
+    /// The potential in J/m² at such a penetration from that at the knot.
     fn potential_from(&self, [knot, potential]: [f64; 2], penetration: f64) -> f64 {
-        let branch = self.curve.branch(0.5 * (knot + penetration), NodeContext::AT_THE_GAP);
-        let pressure = |at| self.curve.pressure_on_branch(branch, at);
-        potential + integral(&pressure, [knot, penetration], (potential.abs(), DEPTH - KEPT_DEPTH))
+        let ends = [knot, penetration];
+        potential + integral(&self.pressure_between(ends), ends, (potential.abs(), DEPTH - KEPT_DEPTH))
     }
 }
 

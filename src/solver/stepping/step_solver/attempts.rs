@@ -256,15 +256,15 @@ impl StepSolver {
             };
             let system = accuracy.system(problem, &matrix, scales);
             let is_replaceable = stiffens && factors < MOST_FACTORS;
-            let corrected = match &factored {
+            let other: Option<&dyn StepMatrix> = match &factored {
+                FactorOf::Tangents(other) => Some(other),
+                FactorOf::Step | FactorOf::AnotherLength => None,
+            };
+            let corrected = match factored {
                 FactorOf::AnotherLength => Corrected::Unfinished(StepOutcome::default(), false),
-                FactorOf::Step => {
-                    let factored = StepFactor { solver: &mut *solver, other: None, is_replaceable };
-                    flowing.correct(newton, factored, problem, system, trial)?
-                }
-                FactorOf::Tangents(other) => {
-                    let factored = StepFactor { solver: &mut *solver, other: Some(other), is_replaceable };
-                    flowing.correct(newton, factored, problem, system, trial)?
+                FactorOf::Step | FactorOf::Tangents(_) => {
+                    let factor = StepFactor { solver: &mut *solver, other, is_replaceable };
+                    flowing.correct(newton, factor, problem, system, trial)?
                 }
             };
             match corrected {
