@@ -30,7 +30,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-effects bench-estimates bench-space verification python lint deny msrv book gallery deb install clean
+.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy bench-errors bench-effects bench-estimates bench-space verification python lint deny msrv book gallery deb install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -48,6 +48,7 @@ help:
 	@echo 'make bench-accuracy  the studies of docs/what-accuracy-costs.md; ARGS=--write puts their tables into it'
 	@echo 'make book      docs/ as a book in target/book, with its links and formulas checked'
 	@echo 'make gallery   run the jobs with pictures in README.md, and write the pictures'
+	@echo 'make bench-errors  estimated errors of all jobs against true ones; ARGS=--write puts the table into docs/what-accuracy-costs.md'
 	@echo 'make bench-effects  what effects cost (docs/speed.md); ARGS=--write puts the table into it'
 	@echo 'make bench-estimates  estimated and measured times of all jobs (docs/speed.md); ARGS=--write puts the table into it'
 	@echo 'make bench-space  errors in space against seconds and memory (docs/space.md); ARGS=--write puts the tables into it'
@@ -124,6 +125,10 @@ bench-runs: deps
 # The studies behind docs/what-accuracy-costs.md, some ten minutes; ARGS=--write puts their tables into it.
 bench-accuracy: deps
 	cargo bench --locked --bench accuracy -- $(ARGS)
+
+# Estimated errors of runs against true ones.
+bench-errors: deps
+	cargo bench --locked --bench errors -- $(ARGS)
 
 # What effects cost, a few minutes.
 bench-effects: deps

@@ -1,6 +1,6 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{Summary, setup::Setup, sides, steps};
+use super::{Summary, accuracy::Errors, setup::Setup, sides, steps};
 use crate::{
     error::Result,
     io::output::{field_list::FIELDS, log::Log, output_field::Figures},
@@ -112,6 +112,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         let found: Option<Vec<f64>> = names.iter().map(|name| summary.of_fields.get(name).copied()).collect();
         found.into_iter().for_each(|figures| log.line(line(&figures)));
     }
+    errors(log, summary);
     if summary.unstable_steps > 0 || summary.indefinite_solves > 0 {
         log.line(format!(
             "unstable   {} steps passed unstable states, {} linear systems were indefinite",
@@ -135,4 +136,29 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         summary.peak_memory_bytes as f64 / 1e6
     ));
     log.line(format!("files      {}", job.output_folder().display()));
+}
+
+/// Logs the estimated errors, and what half of them would take.
+fn errors(log: &mut Log, summary: &Summary) {
+    let Errors { error_of_mesh, vibrates, error_of_steps, order_of_steps } = summary.errors;
+    let percent = |error: f64| {
+        let unit = 10f64.powf(error.log10().floor() - 1.0);
+        format!("{} %", Digits(100.0 * (error / unit).round() * unit))
+    };
+    if let Some(error) = error_of_mesh {
+        let (least, waves) = if vibrates {
+            ("at least ", ": the body vibrates, and errors of waves add to it")
+        } else {
+            ("", "")
+        };
+        log.line(format!("errors     by the mesh {least}{} of the stress at the end{waves}", percent(error)));
+    }
+    if let (Some(error), Some(order)) = (error_of_steps, order_of_steps) {
+        let times = 2f64.powf(1.0 / order);
+        log.line(format!(
+            "errors     by the steps {} of stress and velocity at the end; half of it takes {} times as many steps",
+            percent(error),
+            Digits(times)
+        ));
+    }
 }

@@ -1,5 +1,6 @@
 //! Runs a job: builds only what the job contains, then takes the steps.
 
+mod accuracy;
 mod axis;
 mod bonds;
 mod build;
@@ -32,6 +33,7 @@ mod time_loop;
 mod trial;
 mod units;
 
+pub use accuracy::{EndState, error_of_mesh, error_of_steps, vibrates, with_steps};
 pub use build::normal_law;
 pub use check::Report;
 pub use inventory::Inventory;

@@ -1,6 +1,6 @@
 //! `summary.json`: the results of a run in one object.
 
-use super::Inventory;
+use super::{Inventory, accuracy::Errors};
 use crate::{
     error::{Error, Result},
     fem::effect::Peaks,
@@ -70,6 +70,9 @@ pub struct Summary {
     pub linear_iterations: u64,
     /// The checkpoint that this run continued from.
     pub restarted_from: Option<String>,
+    /// Estimated errors.
+    #[serde(flatten)]
+    pub(super) errors: Errors,
     /// The digest of the checkpoint from which the run started; present if it started from one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start_state: Option<String>,

@@ -2,6 +2,7 @@
 
 use super::{
     Clock, Inventory, Simulation, Start,
+    accuracy::{Errors, error_of_mesh, error_of_steps, vibrates},
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
     header, obstacles,
@@ -55,6 +56,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let folder = job.output_folder();
     let mut log = Log::new(session.is_first(), clock.on_terminal);
     let claimed = session.on_first(|| claim_folder(job, start, &mut log))?.unwrap_or_default();
+    let began_on = job.output.error_estimate.then(|| mesh.clone());
     let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let is_restart = start.is_restart();
     let start_state = ready.began_from.as_ref().map(|state| state.digest.clone());
@@ -98,7 +100,9 @@ pub(super) fn run<const D: usize, const S: usize>(
     deadline.log_limit(&mut log);
     let mut run = Run {
         session,
+        loaded,
         job,
+        began_on,
         simulation,
         certificates,
         landed: 0,
@@ -127,7 +131,10 @@ enum Ended {
 
 struct Run<'a, const D: usize, const S: usize> {
     session: &'a Session,
+    loaded: &'a Loaded,
     job: &'a Job,
+    /// The mesh on which the run began, if its errors are to be estimated.
+    began_on: Option<Mesh<D>>,
     simulation: Simulation<D, S>,
     certificates: Certificates,
     /// Logged lines about the times that steps landed on.
@@ -398,6 +405,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             warnings.into_iter().for_each(|warning| self.log.warning(warning));
         });
         self.keep_first(&mut result, warnings);
+        let errors = if result == Ok(Exit::Done) { self.errors() } else { Ok(Errors::default()) };
+        let errors = errors.unwrap_or_else(|error| {
+            self.keep_first::<()>(&mut result, Err(error));
+            Errors::default()
+        });
         let (status, error) = match &result {
             Ok(Exit::Done) => ("completed", None),
             Ok(_) => ("stopped", None),
@@ -406,7 +418,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let body = &self.simulation.body;
         let surface_has_mass = body.has_form(Form::Mass) && body.redistributed_mass.is_none();
         let covered = body.covered();
-        let summary = self.summary(status, error, restarted_from);
+        let summary = self.summary(status, error, restarted_from, errors);
         let written = self.session.agree(summary).and_then(|mut summary| {
             summary.range_warnings(surface_has_mass, covered).for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
@@ -418,6 +430,26 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         self.keep_first(&mut result, written);
         let closed = self.session.agree(self.outputs.close());
         result.and_then(|exit| closed.map(|()| exit))
+    }
+
+    /// Estimates the errors of the state at the end, if the job asks for them. Collective.
+    fn errors(&mut self) -> Result<Errors, Agreed> {
+        let Self { session, loaded, began_on: Some(mesh), simulation, log, deadline, .. } = self else {
+            return Ok(Errors::default());
+        };
+        let of_mesh = error_of_mesh(session, &loaded.job, simulation)?;
+        log.quiet_line("errors     the run is repeated with other steps");
+        let is_interrupted = || session.stop_requested().is_some() || deadline.passed(session).is_some();
+        let of_steps = error_of_steps(session, loaded, (mesh, simulation), is_interrupted)?;
+        if let Err(reason) = &of_steps {
+            log.line(format!("errors     those of the steps are unknown: {reason}"));
+        }
+        Ok(Errors {
+            error_of_mesh: of_mesh,
+            vibrates: vibrates(&simulation.totals),
+            error_of_steps: of_steps.as_ref().ok().map(|error| error.relative),
+            order_of_steps: of_steps.ok().map(|error| error.order),
+        })
     }
 
     /// Keeps the first error as the result; a later one is logged.
@@ -434,6 +466,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         status: &'static str,
         error: Option<String>,
         restarted_from: Option<String>,
+        errors: Errors,
     ) -> Result<Summary> {
         let (session, Simulation { body, state, scheme, totals, .. }) = (self.session, &self.simulation);
         let stress = body.stress(state)?;
@@ -465,6 +498,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             newton_iterations: totals.newton_iterations,
             linear_iterations: totals.linear_iterations,
             restarted_from,
+            errors,
             start_state: self.start_state.clone(),
             final_von_mises: session.largest([von_mises])[0],
             peaks: totals.peaks,

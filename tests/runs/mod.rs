@@ -10,6 +10,7 @@ mod check_values;
 mod contact;
 mod effects;
 mod elasticity;
+mod errors;
 mod example;
 mod failures;
 mod formulas;

@@ -269,7 +269,7 @@ impl Factor {
 
 /// The stress of a cell at a place in barycentric coordinates: its only one, or the linear function of those at its points, which are
 /// those of [`cell_rule`].
-fn stress_at<const D: usize, const S: usize>(own: &[Mandel<S>], place: &[f64; 4]) -> Mandel<S> {
+pub fn stress_at<const D: usize, const S: usize>(own: &[Mandel<S>], place: &[f64; 4]) -> Mandel<S> {
     if let [only] = own {
         return *only;
     }

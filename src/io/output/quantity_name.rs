@@ -43,7 +43,7 @@ impl<'a> TableQuantity<'a> {
 }
 
 /// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 25] = [
+const OF_SUMMARY: [&str; 28] = [
     "ranks",
     "dimension",
     "cells",
@@ -62,6 +62,9 @@ const OF_SUMMARY: [&str; 25] = [
     "final_von_mises",
     "max_von_mises",
     "max_strain",
+    "error_of_mesh",
+    "error_of_steps",
+    "order_of_steps",
     "max_inclusion_residual",
     "max_residual",
     "max_energy_imbalance",

@@ -30,7 +30,9 @@ const MEMBERS: [(&str, &str, &str); 13] = [
 ];
 
 /// Those after the figures of fields.
-const MORE_MEMBERS: [(&str, &str, &str); 16] = [
+const MORE_MEMBERS: [(&str, &str, &str); 18] = [
+    ("error_of_mesh", "estimated error of the stress at the end by the mesh, relative", ""),
+    ("error_of_steps", "estimated error of stress and velocity at the end by the steps, relative", ""),
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_residual", "largest residual of the equations, as a share of the forces", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),

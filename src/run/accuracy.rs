@@ -1,0 +1,293 @@
+//! The error of a run by its time steps: the run is repeated with longer steps, without output.
+//!
+//! `S_1` is the state at the end of the run, `S_2` that of steps twice as long, `S_4` that of steps four times as long. Their distances show
+//! the order `p`, and Richardson's extrapolation the error of `S_1`,
+//!
+//! ```text
+//! e = F |S_1 - S_2| / (2^p - 1),    2^p = |S_2 - S_4| / |S_1 - S_2|
+//! ```
+//!
+//! with the safety factor `F = 1.25` of the grid convergence index (P. J. Roache, Journal of Fluids Engineering 116 (1994) 405-413). Adaptive
+//! steps do not become exactly twice as long: the ratios of the numbers of steps stand for 2. The distance is that of energy: of stresses in
+//! the compliance norm and of velocities in the mass norm.
+//!
+//! Where longer steps are refused or are not fewer, the run is repeated once with steps half as long instead, and `p` is 1:
+//! `e = F 2 |S_1 - S_1/2|`.
+
+use super::{
+    setup::{Setup, setup},
+    simulation::{Prepared, Simulation},
+};
+use crate::{
+    error::{Exit, Result},
+    fem::{
+        body::Body,
+        effect::{ELASTIC, Form, KINETIC},
+    },
+    io::output::{error_indicator::ErrorIndicator, history::Totals},
+    job::{Job, Loaded, Material},
+    laws::digits::Digits,
+    linear_algebra::tensor::{Mandel, add_scaled, larger},
+    mesh::Mesh,
+    parallel::{agreement::Agreed, session::Session},
+};
+use serde::Serialize;
+
+/// Safety factor.
+const SAFETY: f64 = 1.25;
+/// That of the error indicator.
+const SAFETY_OF_INDICATOR: f64 = 1.5;
+/// A body vibrates whose kinetic energy is more than this share of its elastic energy.
+const VIBRATING: f64 = 1e-2;
+/// The step of repetitions over that of the run.
+const LONGER: [f64; 2] = [2.0, 4.0];
+/// The same where longer steps say nothing.
+const SHORTER: f64 = 0.5;
+/// The least order that is assumed: of states that do not approach each other.
+const LEAST_ORDER: f64 = 0.7;
+/// Numbers of steps with a smaller ratio say nothing about the steps.
+const LEAST_RATIO: f64 = 1.25;
+/// The largest order that is looked for, and the halvings of its interval.
+const LARGEST_ORDER: f64 = 8.0;
+const BISECTIONS: u32 = 40;
+/// The largest tolerance of adaptive steps.
+const LARGEST_TOLERANCE: f64 = 0.5;
+/// Share of the largest norm in the run below which the one at the end does not count as smaller.
+const LEAST_SHARE: f64 = 0.05;
+
+/// The estimated error of the steps.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorOfSteps {
+    /// The error of stress and velocity at the end over `norm`.
+    pub relative: f64,
+    /// The order that the repetitions show, at most that of the scheme; 1 where they show none.
+    pub order: f64,
+    /// The norm of stress and velocity at the end in J^(1/2), in two dimensions (J/m)^(1/2); at least a twentieth of the largest in the run.
+    pub norm: f64,
+}
+
+/// The estimated errors of the state at the end of a run, by their names in `summary.json`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub(super) struct Errors {
+    /// That of the stress by the mesh, or its least value where the body vibrates; absent where it is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_of_mesh: Option<f64>,
+    /// Whether the body vibrates.
+    #[serde(skip)]
+    pub vibrates: bool,
+    /// That of stress and velocity by the steps; absent where it is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_of_steps: Option<f64>,
+    /// The order of the latter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order_of_steps: Option<f64>,
+}
+
+/// Stress and velocity at the end of a run.
+pub struct EndState<const S: usize> {
+    velocity: Vec<f64>,
+    stress: Vec<Mandel<S>>,
+    /// Number of steps.
+    pub steps: u64,
+    /// Largest sum of kinetic and elastic energy after any step, where that is known.
+    most: f64,
+}
+
+impl<const S: usize> EndState<S> {
+    /// The state that a simulation has reached.
+    pub fn of<const D: usize>(simulation: &Simulation<D, S>) -> Result<Self> {
+        let Simulation { body, state, .. } = simulation;
+        Ok(Self {
+            velocity: state.velocity.local()?.to_vec(),
+            stress: body.stress_at_points(state)?,
+            steps: state.step,
+            most: 0.0,
+        })
+    }
+
+    /// Steps a simulation to its end; `None` if it is interrupted. Collective.
+    pub fn reached<const D: usize>(
+        session: &Session,
+        mut simulation: Simulation<D, S>,
+        mut is_interrupted: impl FnMut() -> bool,
+    ) -> Result<Option<Self>, Agreed> {
+        let mut most: f64 = 0.0;
+        while simulation.advance(session)?.is_some() {
+            if is_interrupted() {
+                return Ok(None);
+            }
+            most = larger(most, simulation.totals.energy[KINETIC] + simulation.totals.energy[ELASTIC]);
+        }
+        Ok(Some(Self { most, ..session.agree(Self::of(&simulation))? }))
+    }
+
+    /// The distance to another state of the body in the norm of energy; without one the norm. Collective.
+    pub fn distance<const D: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+        other: Option<&Self>,
+    ) -> Result<f64, Agreed> {
+        let (mut velocity, mut stress) = (self.velocity.clone(), self.stress.clone());
+        if let Some(other) = other {
+            velocity.iter_mut().zip(&other.velocity).for_each(|(v, w)| *v -= w);
+            stress.iter_mut().zip(&other.stress).for_each(|(s, t)| *s = add_scaled(s, -1.0, t));
+        }
+        let form = match body.has_form(Form::Elasticity) {
+            _ if body.has_form(Form::Mass) => Some(Form::Mass),
+            false => Some(Form::Viscosity),
+            true => None,
+        };
+        let mut forces = vec![0.0; velocity.len()];
+        form.into_iter().for_each(|form| body.add_form(form, &velocity, &mut forces));
+        let of_velocity: f64 = forces.iter().zip(&velocity).map(|(f, v)| f * v).sum();
+        let mut of_stress = 0.0;
+        let points = body.geometry.points();
+        for (at, cell) in body.geometry.cells().enumerate() {
+            let Some(tensor) = body.tensor(Form::Elasticity, cell.material()) else { continue };
+            for point in 0..points {
+                of_stress += cell.point(point).volume * tensor.inverse_square(&stress[at * points + point]);
+            }
+        }
+        Ok(session.sum([of_velocity + of_stress])[0].max(0.0).sqrt())
+    }
+}
+
+/// The job with other steps: the errors of adaptive steps grow with the square of their length.
+pub fn with_steps(loaded: &Loaded, factor: f64) -> Loaded {
+    let mut loaded = loaded.clone();
+    let time = &mut loaded.job.time;
+    time.step *= factor;
+    if let Some(adaptive) = &mut time.adaptive {
+        adaptive.smallest_step *= factor;
+        adaptive.largest_step *= factor;
+        adaptive.tolerance = (adaptive.tolerance * factor * factor).min(LARGEST_TOLERANCE);
+    }
+    loaded
+}
+
+/// Estimates the error of the steps of a run that began on `mesh` and has reached its end; `Err` says why it is unknown. Collective.
+pub fn error_of_steps<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    (mesh, simulation): (&Mesh<D>, &Simulation<D, S>),
+    mut is_interrupted: impl FnMut() -> bool,
+) -> Result<std::result::Result<ErrorOfSteps, String>, Agreed> {
+    let body = &simulation.body;
+    let end = session.agree(EndState::of(simulation))?;
+    let mut repeat = |factor: f64| {
+        repeated::<D, S>(session, &with_steps(loaded, factor), mesh.clone(), &mut is_interrupted)
+    };
+    let mut states = [repeat(LONGER[0])?, Err("not needed".into())];
+    let is_longer = |state: &EndState<S>| end.steps as f64 > LEAST_RATIO * state.steps as f64;
+    if states[0].as_ref().is_ok_and(is_longer) {
+        states[1] = repeat(LONGER[1])?;
+    } else {
+        states[0] = repeat(SHORTER)?;
+    }
+    let [near, far] = states;
+    let near = match near {
+        Ok(near) => near,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let most = far.iter().map(|far| far.most).fold(near.most, larger);
+    let norm = end.distance(session, body, None)?.max(LEAST_SHARE * (2.0 * most).sqrt());
+    let ratio = |one: &EndState<S>, other: &EndState<S>| one.steps as f64 / other.steps as f64;
+    let distance = end.distance(session, body, Some(&near))?;
+    let first = ratio(&end, &near);
+    let (order, share) = if first < 1.0 {
+        (1.0, 1.0 / (1.0 - first))
+    } else {
+        let order = match &far {
+            Ok(far) => observed_order(
+                [distance, near.distance(session, body, Some(far))?],
+                [first, ratio(&near, far)],
+            ),
+            Err(_) => 1.0,
+        };
+        let order = order.clamp(LEAST_ORDER, f64::from(loaded.job.time.scheme.order()));
+        (order, 1.0 / (first.powf(order) - 1.0))
+    };
+    let error = if distance > 0.0 { SAFETY * share * distance / norm } else { 0.0 };
+    Ok(Ok(ErrorOfSteps { relative: larger(error, loaded.job.solver.tolerance), order, norm }))
+}
+
+/// The state at the end of a job; `Err` says why there is none. Collective.
+fn repeated<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    mesh: Mesh<D>,
+    is_interrupted: impl FnMut() -> bool,
+) -> Result<std::result::Result<EndState<S>, String>, Agreed> {
+    let run = || -> Result<Option<EndState<S>>, Agreed> {
+        let Setup { body, state, scheme, .. } = session.agree(setup::<D, S>(session, loaded, mesh))?;
+        let simulation = Simulation::start(session, &loaded.job, Prepared { body, state, scheme }, None)?;
+        EndState::reached(session, simulation, is_interrupted)
+    };
+    match run() {
+        Ok(Some(state)) => Ok(Ok(state)),
+        Ok(None) => Ok(Err("interrupted".into())),
+        Err(error) if error.exit() == Exit::Internal => Err(error),
+        Err(error) => Ok(Err(format!("with steps of {} s: {error}", Digits(loaded.job.time.step)))),
+    }
+}
+
+/// The order at which states approach each other, given the distances of neighbours and the ratios of their numbers of steps, the finer ones
+/// first; 1 where the ratios are too small to say, 0 where the states do not approach each other.
+fn observed_order([near, far]: [f64; 2], [first, second]: [f64; 2]) -> f64 {
+    if near == 0.0 || second < LEAST_RATIO {
+        return 1.0;
+    }
+    let grows =
+        |order: f64| first.powf(order) * (second.powf(order) - 1.0) < (first.powf(order) - 1.0) * far / near;
+    let [mut low, mut high] = [0.0, LARGEST_ORDER];
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        *if grows(middle) { &mut low } else { &mut high } = middle;
+    }
+    low
+}
+
+/// Estimates the relative error of the stress at the end of a run by its mesh, at most 1; `None` where the stress has no norm of linear
+/// elasticity. In a body that vibrates, errors of waves add to it, which the indicator does not see. Collective.
+pub fn error_of_mesh<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    Simulation { body, state, .. }: &Simulation<D, S>,
+) -> Result<Option<f64>, Agreed> {
+    let is_linear =
+        |material: &Material| material.elasticity.as_ref().is_some_and(|law| law.expression.is_none());
+    if !job.materials().all(|(_, material)| is_linear(material)) {
+        return Ok(None);
+    }
+    let indicated = || {
+        let stress = body.stress_at_points(state)?;
+        ErrorIndicator::new(session, body)?.of(session, body, &stress)
+    };
+    Ok(Some((SAFETY_OF_INDICATOR * session.agree(indicated())?.relative).min(1.0)))
+}
+
+/// Whether a body with these energies vibrates.
+pub fn vibrates(totals: &Totals) -> bool {
+    totals.energy[KINETIC] > VIBRATING * totals.energy[ELASTIC]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_that_halve_their_distance_at_each_doubling_are_of_first_order() {
+        let close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        close(observed_order([1.0, 2.0], [2.0, 2.0]), 1.0);
+        close(observed_order([1.0, 4.0], [2.0, 2.0]), 2.0);
+        // Steps that are 1, 3 and 6 times as long have errors of 1, 9 and 36.
+        close(observed_order([8.0, 27.0], [3.0, 2.0]), 2.0);
+        assert!(observed_order([1.0, 1.0], [2.0, 2.0]) < 1e-9, "they keep their distance");
+        assert!(observed_order([1.0, 0.5], [2.0, 2.0]) < 1e-9, "they part");
+        close(observed_order([0.0, 1.0], [2.0, 2.0]), 1.0);
+        close(observed_order([1.0, 2.0], [2.0, 1.1]), 1.0);
+        assert!(observed_order([f64::NAN, 1.0], [2.0, 2.0]) < 1e-9);
+    }
+}

@@ -1,0 +1,49 @@
+//! Estimated errors against known ones.
+
+use crate::{case::Case, results::Results};
+
+/// Stress relaxes in a block that is held, as `exp(-t / 0.5 s)`, with these steps.
+fn relaxing(scheme: &str, step: f64) -> Case {
+    Case::of("stress_relaxation.toml")
+        .set("time.scheme", &format!("{scheme:?}"))
+        .set("time.step", &step.to_string())
+        .set("output.error_estimate", "true")
+        .without("check")
+}
+
+/// The estimated error of the steps holds the true one and is at most three times as large.
+#[track_caller]
+fn assert_holds(results: &Results) {
+    // After 100 steps of lagged_euler the stress has the share 0.98^100, and this norm.
+    let reached = results.number("final_von_mises") / 1.8376304711 * 0.98f64.powi(100);
+    let (estimated, actual) = (results.number("error_of_steps"), (1.0 - (-2f64).exp() / reached).abs());
+    assert!(estimated >= actual && estimated <= 3.0 * actual, "{estimated} for {actual}");
+    assert!(results.number("error_of_mesh") < 1e-10, "the stress is uniform");
+}
+
+#[test]
+fn steps_twice_and_four_times_as_long_show_the_error_of_the_steps() {
+    let case = relaxing("lagged_euler", 0.01).set("checkpoint.at", "[0.5]");
+    let outcome = case.run_with(1, &["--quiet"]);
+    outcome.expect(0);
+    let results = case.results();
+    assert_holds(&results);
+    let order = results.number("order_of_steps");
+    assert!((0.9..=1.0).contains(&order), "{order}");
+    let log = results.text("run.log");
+    assert!(log.contains("errors     by the steps 2.") && log.contains("half of it takes 2"), "{log}");
+    let straight = results.number("error_of_steps");
+    case.run_with(2, &["--restart", &case.folder().join("out/checkpoint-50.h5").display().to_string()])
+        .expect(0);
+    let restarted = case.results().number("error_of_steps");
+    assert!((restarted - straight).abs() < 1e-9 * straight, "{restarted} {straight}");
+    assert_holds(&relaxing("bdf2", 0.05).run_and_keep(1).results());
+}
+
+#[test]
+fn a_run_of_one_step_is_repeated_with_shorter_ones() {
+    let case = relaxing("implicit_euler", 1.0).run_and_keep(1);
+    assert_holds(&case.results());
+    let plain = relaxing("implicit_euler", 1.0).set("output.error_estimate", "false").run_and_keep(1);
+    assert!(plain.results().summary()["error_of_steps"].is_null());
+}
