@@ -37,7 +37,7 @@ const FUNCTIONS: &[&str] = &[
     "SNESLineSearchSetType",
     "SNESVISetVariableBounds",
     "SNESSetDivergenceTolerance",
-    "Mat(CreateSeqDense|CholeskyFactor|MatTransposeMult|Solve|CreateVecs)",
+    "Mat(CreateSeqDense|CholeskyFactor|LUFactor|MatTransposeMult|Solve|CreateVecs)",
     "MatDense(Get|Restore)Array(Read)?",
     "(madvise|dlsym)",
     "cholmod_(l_)?(start|finish|amd|metis|analyze_p|free_factor)",

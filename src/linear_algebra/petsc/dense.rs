@@ -2,23 +2,39 @@ use super::{DistributedVector, check, index, reference::Reference, sys};
 use crate::error::{Error, Result};
 use std::ptr;
 
-/// Cholesky factors of a dense matrix that is stored completely on this rank.
+/// Factors of a dense matrix that is stored completely on this rank.
 #[derive(Debug)]
-pub struct DenseCholesky {
+pub struct LocalFactor {
     factor: Reference<sys::_p_Mat>,
     /// Right-hand side and solution.
     vectors: [DistributedVector; 2],
 }
 
-impl DenseCholesky {
-    /// Factors a symmetric positive definite matrix, given column by column.
-    pub fn new(size: usize, columns: &[f64]) -> Result<Self> {
+impl LocalFactor {
+    /// Cholesky factors of a symmetric positive definite matrix, given column by column.
+    pub fn cholesky(size: usize, columns: &[f64]) -> Result<Self> {
         let factor = sequential(size, columns)?;
         let raw = factor.get();
         // SAFETY: live matrix; without a row permutation none is read.
         unsafe {
             check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
             check(sys::MatCholeskyFactor(raw, ptr::null_mut(), ptr::null()))?;
+        }
+        Self::of(factor)
+    }
+
+    /// LU factors of a matrix, given column by column.
+    pub fn lu(size: usize, columns: &[f64]) -> Result<Self> {
+        let factor = sequential(size, columns)?;
+        // SAFETY: live matrix; LAPACK chooses the pivots itself and reads no permutation.
+        check(unsafe { sys::MatLUFactor(factor.get(), ptr::null_mut(), ptr::null_mut(), ptr::null()) })?;
+        Self::of(factor)
+    }
+
+    fn of(factor: Reference<sys::_p_Mat>) -> Result<Self> {
+        let raw = factor.get();
+        // SAFETY: live matrix.
+        unsafe {
             let right_hand_side = Reference::new(|vector| sys::MatCreateVecs(raw, vector, ptr::null_mut()))?;
             let solution = Reference::new(|vector| sys::MatCreateVecs(raw, ptr::null_mut(), vector))?;
             Ok(Self { factor, vectors: [right_hand_side, solution].map(|raw| DistributedVector { raw }) })

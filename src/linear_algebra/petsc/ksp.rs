@@ -52,18 +52,26 @@ impl LinearOutcome {
         linear_reason(self.reason)
     }
 
+    /// Whether it has reached the maximum number of iterations.
+    pub fn ran_out(self) -> bool {
+        self.reason == TOO_MANY
+    }
+
     /// The combined outcome of two consecutive solves.
-    pub(super) fn followed_by(self, next: Self) -> Self {
+    pub fn followed_by(self, next: Self) -> Self {
         Self { iterations: self.iterations + next.iterations, ..next }
     }
 }
+
+/// PETSc's reason for a solve that has reached the maximum number of iterations.
+pub(super) const TOO_MANY: i32 = -3;
 
 /// PETSc's `KSPConvergedReason` as text.
 pub(super) fn linear_reason(reason: i32) -> &'static str {
     match reason {
         1.. => "converged",
         0 => "still iterating",
-        -3 => "too many linear iterations",
+        TOO_MANY => "too many linear iterations",
         -4 => "the linear residual grew beyond the divergence limit",
         -5 | -6 => "breakdown of the Krylov method",
         -8 => "the preconditioner is not positive definite",

@@ -2,6 +2,7 @@ use super::{
     DistributedVector, Ksp, LinearOutcome, Matrix, ProjectedOperator, ProjectedOutcome,
     callback::Callback,
     check,
+    ksp::TOO_MANY,
     library::communicator,
     projected_operator::{multiply, precondition, project},
     reduced::ReducedMatrix,
@@ -31,6 +32,7 @@ pub struct ProjectedKsp {
     reduced: Option<ReducedMatrix>,
     block: usize,
     tolerances: (f64, f64, usize),
+    most: usize,
     /// The smallest right-hand side since the tolerances were set.
     smallest: f64,
     refresh_threshold: usize,
@@ -42,9 +44,6 @@ pub struct ProjectedKsp {
 
 /// PETSc's reasons for negative curvature in CG: of the preconditioner, of the matrix.
 const INDEFINITE: [i32; 2] = [-8, -10];
-
-/// PETSc's reason for a solve that has reached the maximum number of iterations.
-const TOO_MANY: i32 = -3;
 
 /// Dimension of the complement from which a preconditioner is built for the subspace. With a smaller complement the
 /// preconditioner of the whole space needs at most as many additional iterations as the complement has dimensions.
@@ -69,6 +68,7 @@ impl ProjectedKsp {
             reduced: None,
             block,
             tolerances: (1e-5, 0.0, 10_000),
+            most: usize::MAX,
             smallest: f64::INFINITY,
             refresh_threshold: usize::MAX,
             first: true,
@@ -173,6 +173,11 @@ impl ProjectedKsp {
         Ok([false, worth && stale])
     }
 
+    /// Later solves take at most so many iterations, and not more than [`ProjectedKsp::set_tolerances`] allows.
+    pub fn limit_iterations(&mut self, most: usize) {
+        self.most = most;
+    }
+
     /// Solves `P B x = r` with a symmetric `P B` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an
     /// error.
     ///
@@ -271,6 +276,10 @@ impl ProjectedKsp {
         outcome
     }
 
+    fn iterations(&self) -> usize {
+        self.tolerances.2.min(self.most)
+    }
+
     /// The residual norm at which a solve stops, and its ratio to the right-hand side.
     fn target(&mut self, right_hand_side: &DistributedVector) -> Result<(f64, f64)> {
         let norm = right_hand_side.norm()?;
@@ -291,7 +300,7 @@ impl ProjectedKsp {
             return Ok(outcome);
         }
         let (_, share) = self.target(right_hand_side)?;
-        let gmres = self.gmres(share, self.tolerances.2)?;
+        let gmres = self.gmres(share, self.iterations())?;
         let second = gmres.solve(right_hand_side, solution)?;
         Ok(ProjectedOutcome { linear: outcome.linear.followed_by(second), ..outcome })
     }
@@ -303,7 +312,7 @@ impl ProjectedKsp {
         stale: bool,
     ) -> Result<ProjectedOutcome> {
         let (target, _) = self.target(right_hand_side)?;
-        let iterations = self.tolerances.2;
+        let iterations = self.iterations();
         let first = if stale { self.refresh_threshold.min(iterations) } else { iterations };
         let mut outcome = ProjectedOutcome { linear: NOTHING, indefinite: false, refreshed: false };
         if first > 0 {
@@ -331,7 +340,7 @@ impl ProjectedKsp {
         stale: bool,
     ) -> Result<ProjectedOutcome> {
         let (_, share) = self.target(right_hand_side)?;
-        let iterations = self.tolerances.2;
+        let iterations = self.iterations();
         let first = if stale { self.refresh_threshold.min(iterations).max(1) } else { iterations };
         let linear = self.gmres(share, first)?.solve(right_hand_side, solution)?;
         let outcome = ProjectedOutcome { linear, indefinite: false, refreshed: false };

@@ -1,9 +1,9 @@
 //! The matrix of a step, condensed to the motions on which contact laws act.
 
-use super::equations::{NodeByNode, StepMatrix};
+use super::equations::{Linearised, LinearisedAction, NodeByNode, StepMatrix};
 use crate::{
     error::Result,
-    linear_algebra::petsc::{DenseCholesky, DistributedVector, MISSING_DIRECTIONS, times_own_transpose},
+    linear_algebra::petsc::{DistributedVector, LocalFactor, MISSING_DIRECTIONS, times_own_transpose},
     parallel::{
         exchange::Gathering,
         session::{Session, World},
@@ -87,8 +87,10 @@ pub(super) struct Subspace {
     additions: Vec<f64>,
     /// `S` as a full matrix, in the order of the motions, once it was needed; its lower half.
     product: Vec<f64>,
-    factor: Option<DenseCholesky>,
+    factor: Option<LocalFactor>,
     is_active: bool,
+    /// Factors of linearised equations, which precondition better than those on the subspace.
+    linearised: Option<LocalFactor>,
 }
 
 impl Subspace {
@@ -103,6 +105,7 @@ impl Subspace {
             product,
             factor: None,
             is_active: false,
+            linearised: None,
         }))
     }
 }
@@ -261,7 +264,7 @@ impl CondensedMatrix {
     }
 
     /// Factors `P (S + B) P + k (I - P)` with the blocks of `P` and of the additions `B`, in the order of the motions.
-    fn factor_on_subspace(&self, subspace: &mut Subspace) -> Result<DenseCholesky> {
+    fn factor_on_subspace(&self, subspace: &mut Subspace) -> Result<LocalFactor> {
         let size = self.positions.len();
         if subspace.product.is_empty() {
             self.write_product(&mut subspace.product)?;
@@ -292,7 +295,49 @@ impl CondensedMatrix {
                 }
             }
         }
-        DenseCholesky::new(size, &full)
+        LocalFactor::cholesky(size, &full)
+    }
+
+    /// Factors `R (S + C) P + k (I - P)` with the blocks of the forces `C`, the reduction `R` and the projection `P`, in the order of the
+    /// motions.
+    fn factor_linearised(
+        &self,
+        product: &[f64],
+        springs: &[f64],
+        [forces, reduction, projection]: &[Vec<f64>; 3],
+    ) -> Result<LocalFactor> {
+        let size = self.positions.len();
+        let mut full = product.to_vec();
+        let mean = (0..size).map(|at| full[at * size + at]).sum::<f64>() / size as f64;
+        springs.iter().enumerate().for_each(|(at, spring)| full[at * size + at] -= spring);
+        let mut first = 0;
+        for node in &self.nodes {
+            let blocks = first..first + node.len() * node.len();
+            first = blocks.end;
+            for (entry, value) in forces[blocks].iter().enumerate() {
+                let (row, column) = (node.start + entry / node.len(), node.start + entry % node.len());
+                full[column * size + row] += value;
+            }
+        }
+        first = 0;
+        for node in &self.nodes {
+            let blocks = first..first + node.len() * node.len();
+            first = blocks.end;
+            let [reduction, projection] = [reduction, projection].map(|all| &all[blocks.clone()]);
+            for line in 0..size {
+                multiply_entries(&mut full, reduction, node.clone().map(|at| line * size + at));
+            }
+            for line in 0..size {
+                multiply_entries(&mut full, projection, node.clone().map(|at| at * size + line));
+            }
+            for (i, row) in node.clone().enumerate() {
+                for (j, column) in node.clone().enumerate() {
+                    let identity = f64::from(u8::from(i == j));
+                    full[column * size + row] += mean * (identity - projection[i * node.len() + j]);
+                }
+            }
+        }
+        LocalFactor::lu(size, &full)
     }
 
     /// The blocks of nodes, node after node of all ranks.
@@ -306,6 +351,11 @@ impl CondensedMatrix {
     }
 }
 
+/// Numbers of motions up to which linearised equations are factored.
+const LARGEST_LINEARISED: usize = 4096;
+/// Iterations that cost as much as the factors of linearised equations: at least so many, and one for so many motions.
+const LEAST_ITERATIONS: usize = 64;
+const UNKNOWNS_AN_ITERATION: usize = 4;
 /// Share of the largest entry of a block at which a pivot counts as zero.
 const ROUNDING: f64 = 1e-12;
 /// Largest number of components of a node.
@@ -334,7 +384,8 @@ impl StepMatrix for CondensedMatrix {
         let [amounts, ordered] = &mut workspace.ordered_amounts;
         let mut subspace = self.subspace.borrow_mut();
         match &mut *subspace {
-            Subspace { factor: Some(factor), is_active: true, .. } => {
+            Subspace { linearised: Some(factor), .. }
+            | Subspace { factor: Some(factor), is_active: true, .. } => {
                 ordered.iter_mut().zip(&self.positions).for_each(|(amount, &place)| *amount = amounts[place]);
                 factor.solve(ordered)?;
                 self.positions.iter().zip(ordered).for_each(|(&place, amount)| amounts[place] = *amount);
@@ -344,9 +395,38 @@ impl StepMatrix for CondensedMatrix {
         self.write(amounts, z)
     }
 
+    fn factor_pays_after(&self) -> Option<usize> {
+        let size = self.positions.len();
+        (size <= LARGEST_LINEARISED).then(|| LEAST_ITERATIONS.max(size / UNKNOWNS_AN_ITERATION))
+    }
+
+    fn set_linearised(&self, act: LinearisedAction<'_>) -> Result<bool> {
+        let subspace = &mut *self.subspace.borrow_mut();
+        let workspace = &mut *self.workspace.borrow_mut();
+        subspace.linearised = None;
+        let mut blocks = [const { Vec::new() }; 3];
+        let maps = [Linearised::Forces, Linearised::Reduction, Linearised::Projection];
+        for (blocks, map) in blocks.iter_mut().zip(maps) {
+            self.write_blocks(&mut |column| act(map, column), &mut subspace.work_vector, workspace)?;
+            blocks.clone_from(&workspace.blocks);
+        }
+        if subspace.product.is_empty() {
+            self.write_product(&mut subspace.product)?;
+        }
+        let mut springs = Vec::new();
+        if let Some(own) = &self.springs {
+            springs.resize(self.positions.len(), 0.0);
+            workspace.gathering.gather(&workspace.world, own, &mut springs);
+        }
+        // Of a singular matrix there are none.
+        subspace.linearised = self.factor_linearised(&subspace.product, &springs, &blocks).ok();
+        Ok(subspace.linearised.is_some())
+    }
+
     fn set_subspace(&self, project: NodeByNode<'_>) -> Result<bool> {
         let subspace = &mut *self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
+        subspace.linearised = None;
         self.write_blocks(project, &mut subspace.work_vector, workspace)?;
         let blocks = &workspace.blocks;
         let missing = |(count, block): (usize, &[f64])| -> f64 {

@@ -13,6 +13,20 @@ use crate::{
 /// A linear map that replaces the values of each contact node by others.
 pub(super) type NodeByNode<'a> = &'a mut dyn FnMut(&mut DistributedVector) -> Result<()>;
 
+/// What linearised equations `R (K + C) P` do at contact nodes, node by node.
+#[derive(Debug, Clone, Copy)]
+pub enum Linearised {
+    /// `C`: the forces of laws.
+    Forces,
+    /// `R`: eliminates forces that are unknowns.
+    Reduction,
+    /// `P`: removes motions that are known.
+    Projection,
+}
+
+/// Applies one of them to a vector.
+pub(super) type LinearisedAction<'a> = &'a mut dyn FnMut(Linearised, &mut DistributedVector) -> Result<()>;
+
 /// The constant matrix `K` of a step.
 pub trait StepMatrix {
     /// `y = K x`. Collective.
@@ -39,6 +53,17 @@ pub trait StepMatrix {
     /// Sets forces in addition to the matrix for the preconditioner of later solves, given what replaces velocities by these forces;
     /// returns whether the subspace is to be set again for it. Collective.
     fn set_additions(&self, _add: NodeByNode<'_>) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// The number of iterations after which factors of linearised equations cost less than further ones; `None` if there are none.
+    fn factor_pays_after(&self) -> Option<usize> {
+        None
+    }
+
+    /// Preconditions later solves on the present subspace by factors of these linearised equations; returns whether there are any.
+    /// Collective.
+    fn set_linearised(&self, _act: LinearisedAction<'_>) -> Result<bool> {
         Ok(false)
     }
 
@@ -504,12 +529,19 @@ impl<const D: usize> ContactEquations<'_, D> {
             let rebuilt = self.matrix.set_subspace(&mut |column| operator.project(column))?;
             self.counts.refreshed += usize::from(rebuilt);
         }
-        let outcome = if coupled {
-            self.counts.coupled += 1;
-            self.linear_solver.solve_unsymmetric(&mut operator, open, velocity)?
-        } else {
-            solve(self.linear_solver, &mut operator, open, velocity)?
-        };
+        self.counts.coupled += usize::from(coupled);
+        let solve = if coupled { ProjectedKsp::solve_unsymmetric } else { solve };
+        let most = self.matrix.factor_pays_after();
+        self.linear_solver.limit_iterations(most.unwrap_or(usize::MAX));
+        let mut outcome = solve(self.linear_solver, &mut operator, open, velocity)?;
+        self.linear_solver.limit_iterations(usize::MAX);
+        if most.is_some() && outcome.linear.ran_out() {
+            let rebuilt = self.matrix.set_linearised(&mut |map, column| operator.act(map, column))?;
+            self.counts.refreshed += usize::from(rebuilt);
+            let first = outcome.linear;
+            outcome = solve(self.linear_solver, &mut operator, open, velocity)?;
+            outcome.linear = first.followed_by(outcome.linear);
+        }
         self.counts.linear_iterations += outcome.linear.iterations;
         self.counts.last_iterations = outcome.linear.iterations;
         self.counts.indefinite += usize::from(outcome.indefinite);
@@ -553,6 +585,23 @@ impl<const D: usize> ReducedJacobian<'_, D> {
         }
         self.obstacles.add_changes(self.session, y)?;
         add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)
+    }
+
+    /// Replaces a vector by what the equations do with it at contact nodes.
+    fn act(&mut self, map: Linearised, x: &mut DistributedVector) -> Result<()> {
+        match map {
+            Linearised::Forces => {
+                let mut velocity = x.like()?;
+                velocity.copy_from(x)?;
+                x.fill(0.0)?;
+                if let Some(cells) = &mut self.cells {
+                    cells.add_derivative(&velocity, x)?;
+                }
+                add_contact(self.ghosted, self.contacts, &velocity, x, Contact::add_slopes)
+            }
+            Linearised::Reduction => self.reduce(x),
+            Linearised::Projection => self.project(x),
+        }
     }
 
     /// `x = P Q x`.
