@@ -263,6 +263,48 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(all)
     }
 
+    /// How far the nodes of pairs have slid along each other since they were formed, as a share of the size of facets, at this displacement
+    /// with ghosts; of nodes that face nothing, how far the bodies may have moved relative to each other. Collective.
+    pub fn slip(&self, session: &Session, displacement: &[f64]) -> Result<f64, Agreed> {
+        let Some(paired) = &self.paired_displacement else { return Ok(0.0) };
+        let seen = self.seen_by_contacts(displacement);
+        let paired = session.agree(paired.local())?;
+        let mut most: f64 = 0.0;
+        for pair in self.pairs.iter().filter(|pair| pair.slides) {
+            let contact = &self.contacts[pair.contact];
+            // Largest motions in either direction of each axis, of nodes that face nothing and of the other body.
+            let mut far = [[[f64::NEG_INFINITY; 2]; D]; 2];
+            let mut add = |side: usize, node: usize| {
+                for (axis, far) in far[side].iter_mut().enumerate() {
+                    let moved = displacement[node * D + axis] - paired[node * D + axis];
+                    *far = [larger(far[0], -moved), larger(far[1], moved)];
+                }
+            };
+            let mut least = f64::INFINITY;
+            for (node, size) in contact.facing_nothing() {
+                add(0, node);
+                least = least.min(size);
+            }
+            let facets = pair.against.iter().flat_map(|facet| self.mesh.facet_nodes(*facet));
+            facets.for_each(|node| add(1, node as usize));
+            let [slip, size] = session.largest([contact.slip(&seen), -least]);
+            let mut square = 0.0;
+            for axis in 0..D {
+                let [back, forth] = session.largest(far[0][axis]);
+                let [other_back, other_forth] = session.largest(far[1][axis]);
+                square += larger(back + other_forth, forth + other_back).max(0.0).powi(2);
+            }
+            most = larger(most, larger(slip, square.sqrt() / -size));
+        }
+        Ok(most)
+    }
+
+    /// Number of nodes of pairs that face the other body. Collective.
+    pub fn faced_nodes(&self, session: &Session) -> usize {
+        let nodes = self.pairs.iter().flat_map(|pair| &pair.nodes);
+        session.total(nodes.filter(|node| !node.masters.is_empty()).count())
+    }
+
     /// Finds anew what the nodes of pairs face that slide along each other, at this displacement with ghosts. Collective.
     pub fn form_pairs(&mut self, session: &Session, displacement: &DistributedVector) -> Result<(), Agreed> {
         if let Some(paired) = &mut self.paired_displacement {

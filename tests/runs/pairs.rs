@@ -81,6 +81,37 @@ fn a_body_that_slides_between_guides_rests_on_another_one() {
     }
 }
 
+/// A block from this place on, 10 mm above a plate; supports move both.
+fn arriving(place: f64, [block, plate]: [&str; 2]) -> Case {
+    Case::written_as(&format!(
+        "mesh.rectangle = [
+            {{ name = 'block', corner = [{place}, 0.01], size = [0.3, 0.1], cells = [3, 1] }},
+            {{ name = 'plate', corner = [0.0, -0.1], size = [0.6, 0.1], cells = [8, 1] }},
+         ]
+         material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0.0 }} }}
+         support = [{{ on = ['block.top'], velocity = {block} }}, {{ on = ['plate.bottom'], velocity = {plate} }}]
+         contact = [{{ on = ['block.bottom'], against = ['plate.top'], sliding = 'finite', normal.unilateral = {{}} }}]
+         time = {{ end = 2.0, step = 0.05, scheme = 'implicit_euler' }}"
+    ))
+}
+
+/// Beside the plate at first, either body comes to the other one by 0.5 m along it and 30 mm towards it.
+#[test]
+fn a_body_that_comes_to_lie_above_another_one_lands_on_it() {
+    let still = "[0.0, 0.0]";
+    let force = |place: f64, ways: [&str; 2], ranks: usize| {
+        let case = arriving(place, ways).run_and_keep(ranks);
+        case.results().table("resultants.csv").only("source", "contact block.bottom").last("force_y")
+    };
+    let above = force(0.2, ["[0.0, '-0.03*(t >= 1)']", still], 1);
+    assert!(above > 25_000.0, "{above} N");
+    let ways = [["['-0.5*(t < 1)', '-0.03*(t >= 1)']", still], [still, "['0.5*(t < 1)', '0.03*(t >= 1)']"]];
+    for (ways, ranks) in ways.into_iter().zip([1, 2]) {
+        let force = force(0.7, ways, ranks);
+        assert!((force - above).abs() < 1e-6 * above, "{force} N instead of {above} N");
+    }
+}
+
 /// All nodes of both sides that supports move along the boundary, those at its ends, have a sliding velocity that is relative.
 #[test]
 fn bodies_that_supports_move_along_their_contact_rub_by_their_relative_velocity() {

@@ -29,10 +29,7 @@ use crate::{
         state::State,
     },
     job::{Accept, Scheme},
-    linear_algebra::{
-        petsc::{DistributedVector, Precision},
-        tensor::larger,
-    },
+    linear_algebra::petsc::{DistributedVector, Precision},
     parallel::session::Session,
 };
 use std::time::Instant;
@@ -536,20 +533,15 @@ impl Stepper {
         body: &mut Body<D, S>,
         state: &State,
     ) -> Result<()> {
-        if body.paired_displacement.is_none() {
+        if body.slip(session, &*state.displacement.local()?)? <= SLIP_BETWEEN_PAIRINGS {
             return Ok(());
         }
-        let slip = {
-            let displacement = state.displacement.local()?;
-            let seen = body.seen_by_contacts(&displacement);
-            let slides = body.pairs.iter().filter(|pair| pair.slides);
-            slides.map(|pair| body.contacts[pair.contact].slip(&seen)).fold(0.0, larger)
-        };
-        if session.largest([slip])[0] <= SLIP_BETWEEN_PAIRINGS {
-            return Ok(());
-        }
+        let faced = body.faced_nodes(session);
         let before = body.energy_of_contacts(state.time, &state.displacement)?;
         body.form_pairs(session, &state.displacement)?;
+        if faced + body.faced_nodes(session) == 0 {
+            return Ok(());
+        }
         let after = body.energy_of_contacts(state.time, &state.displacement)?;
         self.energy_of_pairing += session.sum([after - before])[0];
         self.pairings += 1;

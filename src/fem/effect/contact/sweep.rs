@@ -128,6 +128,12 @@ impl<const D: usize> Contact<D> {
         facing.map(|point| slip(point, displacement)).fold(0.0, larger)
     }
 
+    /// The nodes of the points on this rank that face nothing of the other body, with the sizes in m of the facets there.
+    pub fn facing_nothing(&self) -> impl Iterator<Item = (usize, f64)> {
+        let points = self.points.iter().filter(|point| !point.distance.is_finite());
+        points.map(|point| (point.node(), point.facet_size))
+    }
+
     /// Lets the points of a contact that slides along another body face it anew, at displacements that are relative to it.
     pub fn face(&mut self, nodes: &[PairedNode<D>], displacement: &[f64]) {
         for (at, node) in nodes.iter().enumerate() {
