@@ -199,6 +199,25 @@ fn a_step_that_fails_leaves_temperature_and_motion_as_they_were() {
 }
 
 #[test]
+fn an_adaptive_step_whose_temperature_is_not_found_is_repeated_with_a_shorter_one() {
+    // A short flux out of the body takes more heat than there is where a step holds it for long.
+    let pulse =
+        || heated().set("heat.1.flux", "'-1e4*exp(-((t - 0.0625)/0.001)^2)'").set("time.end", "0.125");
+    let words = "the temperature at the end of the step is -";
+    pulse().run_with(1, &[]).expect(1).says(words);
+    let adaptive = |smallest: f64| {
+        let keys = format!("{{ tolerance = 0.9, smallest_step = {smallest}, largest_step = 0.0625 }}");
+        pulse().set("time.adaptive", &keys)
+    };
+    adaptive(0.03).run_with(1, &[]).expect(1).says(words);
+    let results = adaptive(1e-4).run_and_keep(2);
+    let results = results.results();
+    assert!(results.number("rejected_steps") >= 1.0 && results.number("max_heat_imbalance") < 1e-10);
+    let lengths = results.table("history.csv").numbers("dt");
+    assert!(lengths.iter().all(|length| *length > 2e-3), "no shorter than it must be: {lengths:?}");
+}
+
+#[test]
 fn heat_without_effect_and_parts_that_facets_do_not_follow_are_warned_of() {
     let heat = "[{ on = ['left'], temperature = 300 }, { on = ['left'], flux = 5 }, { on = ['top'], where = 'x < 0.4', flux = 5 },
                  { on = ['left', 'right'], where = 'y > 0.5', convection = { coefficient = 1, ambient = 300 } },

@@ -139,9 +139,8 @@ impl<const D: usize> Adaptive<D> {
         }
         loop {
             let (step, landing) = self.choose_step(session, state, target);
-            let is_shortest = self.level_of(step) <= self.lowest;
             match self.attempt(session, stepper, body, state, step) {
-                Ok((mut outcome, error, found)) if is_shortest || error <= self.settings.tolerance => {
+                Ok((mut outcome, error, found)) if self.is_acceptable(step, error) => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
                     outcome.landed_on = landing.name.filter(|_| step.time == landing.time);
                     self.step_level.keep_largest(&found);
@@ -155,12 +154,21 @@ impl<const D: usize> Adaptive<D> {
                     }
                     self.reject(step, self.level_within_tolerance(step, error));
                 }
-                Err(error) if error.is_failure() && !is_shortest => {
+                Err(error) if error.is_failure() && !self.is_shortest(step) => {
                     self.reject(step, self.level_of(step) - 1)
                 }
                 Err(error) => return Err(error),
             }
         }
+    }
+
+    fn is_shortest(&self, step: Step) -> bool {
+        self.level_of(step) <= self.lowest
+    }
+
+    /// Whether a step with this relative error may be committed.
+    fn is_acceptable(&self, step: Step, error: f64) -> bool {
+        self.is_shortest(step) || error <= self.settings.tolerance
     }
 
     /// Whether no step has moved or stressed the body yet.
@@ -180,7 +188,7 @@ impl<const D: usize> Adaptive<D> {
                 .time_dependent_data
                 .as_ref()
                 .map_or(0.0, |data| data.deviation_from_linear(session, step));
-            if deviation <= self.settings.tolerance || self.level_of(step) <= self.lowest {
+            if self.is_acceptable(step, deviation) {
                 return (step, landing);
             }
             self.shorten(step, self.level_within_tolerance(step, deviation));
@@ -198,8 +206,8 @@ impl<const D: usize> Adaptive<D> {
         end.filter(|end| end.time < target.time - TIME_TOLERANCE * length).unwrap_or(target)
     }
 
-    /// Solves a step without committing it. Returns its relative error and the norms at its end. A step whose error is NaN
-    /// has failed. Collective.
+    /// Solves a step without committing it. Returns its relative error and the norms at its end. A step whose error is NaN, or that
+    /// could be committed but for its temperature, has failed. Collective.
     fn attempt<const S: usize>(
         &self,
         session: &Session,
@@ -218,7 +226,11 @@ impl<const D: usize> Adaptive<D> {
                 step.time
             ))
         };
-        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, step_error)) })
+        session.agree(if error.is_nan() { Err(failed()) } else { Ok(()) })?;
+        if self.is_acceptable(step, error) {
+            session.agree(stepper.find_temperature(session, body, state, step))?;
+        }
+        Ok((outcome, error, step_error))
     }
 
     /// Finds reference norms of velocity and stress for a body at rest from a trial step of the largest length, or to the end of

@@ -65,6 +65,8 @@ pub struct Stepper {
     force_scale: ForceScale,
     /// The temperature, of bodies with heat.
     heat: Option<HeatStep>,
+    /// The energies of heat in the last attempted step, over all ranks, once its temperature is found.
+    heat_of_step: Option<Energy>,
     /// The work in J of thermal expansion at the start of the step, from then until it is accepted.
     thermal_work: Option<f64>,
     trial: DistributedVector,
@@ -141,6 +143,7 @@ impl Stepper {
             moving_supports: MovingSupports::new(body, state)?,
             force_scale: ForceScale::new(body, &state.velocity)?,
             heat: HeatStep::new(session, body)?,
+            heat_of_step: None,
             thermal_work: None,
             trial: state.velocity.like()?,
             converged: if body.coupling.is_some() { Some(state.velocity.like()?) } else { None },
@@ -289,21 +292,6 @@ impl Stepper {
         }
     }
 
-    /// Finds the temperature at the end of the step just solved; gives the energies of heat. Collective.
-    fn solve_heat<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        state: &State,
-        step: Step,
-    ) -> Result<Energy> {
-        let Some(heat) = &mut self.heat else { return Ok(Energy::default()) };
-        self.trial.update_ghosts()?;
-        session.agree(body.release_heat(state, &self.trial))?;
-        let averages = self.integrator.averages_powers();
-        Ok(heat.solve(session, body, step, averages)?.map_values(|values| session.sum(values)))
-    }
-
     /// Solves a step of the body at its temperature at the start. Collective.
     fn solve_expanded<const D: usize, const S: usize>(
         &mut self,
@@ -320,7 +308,7 @@ impl Stepper {
             self.thermal_work = Some(session.sum([work])[0]);
         }
         self.prepare_matrix(session, body, step)?;
-        self.is_finished = false;
+        (self.is_finished, self.heat_of_step) = (false, None);
         let start = Instant::now();
         let stage = self.stages.history.enter()?;
         self.write_right_hand_side(session, body, state, step)?;
@@ -458,6 +446,41 @@ impl Stepper {
         Ok(())
     }
 
+    /// Finds the temperature at the end of the last attempted step, unless it is known. Collective.
+    pub fn find_temperature<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        if self.heat.is_none() || self.heat_of_step.is_some() {
+            return Ok(());
+        }
+        self.finish(body, state, step)?;
+        let found = self.solve_heat(session, body, state, step);
+        if found.is_err() {
+            self.contract(body);
+        }
+        self.heat_of_step = Some(found?);
+        Ok(())
+    }
+
+    /// Finds the temperature at the end of the step just solved; gives the energies of heat. Collective.
+    fn solve_heat<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<Energy> {
+        let Some(heat) = &mut self.heat else { return Ok(Energy::default()) };
+        self.trial.update_ghosts()?;
+        session.agree(body.release_heat(state, &self.trial))?;
+        let averages = self.integrator.averages_powers();
+        Ok(heat.solve(session, body, step, averages)?.map_values(|values| session.sum(values)))
+    }
+
     /// Commits the last attempted step, and completes its outcome. Collective.
     pub fn accept<const D: usize, const S: usize>(
         &mut self,
@@ -482,11 +505,7 @@ impl Stepper {
         for motion in driven(body) {
             of_obstacles += motion.energy_of_step(state.time);
         }
-        let of_heat = self.solve_heat(session, body, state, step);
-        if of_heat.is_err() {
-            self.contract(body);
-        }
-        let of_heat = of_heat?;
+        self.find_temperature(session, body, state, step)?;
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         keep_closeness(body, state)?;
@@ -518,7 +537,7 @@ impl Stepper {
         self.clock.balance += balancing.elapsed();
         outcome.energy[NUMERICAL] += std::mem::take(&mut self.energy_of_pairing);
         outcome.energy[THERMAL_WORK] += self.thermal_work.take().unwrap_or_default();
-        outcome.energy += of_heat;
+        outcome.energy += self.heat_of_step.take().unwrap_or_default();
         if let Some(heat) = &self.heat {
             heat.commit(body)?;
         }
