@@ -6,11 +6,12 @@
 
 use std::ops::Range;
 
-use super::evaluate::COUNT;
+use super::evaluate::{COUNT, Values};
 use super::functions::{Meaning, Names, comparison, meaning, names, smooth_of_two};
 use super::interval::{Interval, Real};
-use super::program::{Binary, Instruction, Program, Table, Unary, Variable};
+use super::program::{Binary, Instruction, Machine, Program, Table, Unary, Variable};
 use crate::laws::nearest::nearest;
+use crate::linear_algebra::tensor::larger;
 
 /// Longest permitted expression in bytes, without and with tables.
 const LONGEST: [usize; 2] = [10_000, 1 << 20];
@@ -98,11 +99,12 @@ pub(super) fn refuse_long(text: &str) -> Result<(), Fault> {
 /// The program that evaluates `text`, an expression in these variables, in which these names stand for numbers.
 pub(super) fn compile(text: &str, variables: &[Variable], names: &Names) -> Result<Compiled, Fault> {
     refuse_long(text)?;
-    let (program, tables, named) = (Vec::new(), Vec::new(), Vec::new());
-    let mut parser = Parser { text, variables, names, at: 0, depth: 0, program, tables, named };
+    let (program, tables, named, operands) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut parser = Parser { text, variables, names, at: 0, depth: 0, program, tables, named, operands };
     parser.value()?;
     match parser.peek() {
         None => {
+            parser.operands.iter().try_for_each(|whole| whole.refuse_infinite(text))?;
             let program = Program::new(parser.program, parser.tables);
             Ok(Compiled { program, named: parser.named })
         }
@@ -119,17 +121,28 @@ pub(super) fn compile(text: &str, variables: &[Variable], names: &Names) -> Resu
     }
 }
 
-/// The value of instructions without variables and tables; `None` if they have some, or if the value is not a number.
-fn constant(instructions: &[Instruction]) -> Option<f64> {
-    if let [Instruction::Number(number)] = instructions {
-        return Some(*number);
+/// A part of an expression: an entry of the stack when the program runs.
+struct Operand {
+    /// Its value, if it has no variables and tables.
+    value: Option<f64>,
+    /// The largest of its numbers that are not finite, which the text contains as such; 0 if there is none.
+    infinite: f64,
+    /// Its place in the text.
+    at: Range<usize>,
+}
+
+impl Operand {
+    /// Refuses a value that is not finite although its numbers are, as in 1/0 or sqrt(-1).
+    fn refuse_infinite(&self, text: &str) -> Result<(), Fault> {
+        let is_meant = |value: f64| self.infinite.is_nan() || (self.infinite > 0.0 && !value.is_nan());
+        match self.value.filter(|value| !value.is_finite() && !is_meant(*value)) {
+            None => Ok(()),
+            Some(value) => {
+                let message = format!("`{}` is {value}, not a finite number", &text[self.at.clone()]);
+                Err(Fault::new(self.at.clone(), message, "correct the expression"))
+            }
+        }
     }
-    let varies = |one: &Instruction| matches!(one, Instruction::Variable(_) | Instruction::Interpolate(_));
-    if instructions.iter().any(varies) {
-        return None;
-    }
-    let program = Program::new(instructions.to_vec(), Vec::new());
-    Some(program.evaluate(&[0.0; COUNT])).filter(|value| !value.is_nan())
 }
 
 struct Parser<'a> {
@@ -141,9 +154,50 @@ struct Parser<'a> {
     program: Vec<Instruction>,
     tables: Vec<Table>,
     named: Vec<(Range<usize>, f64)>,
+    /// The entries of the stack after the program so far.
+    operands: Vec<Operand>,
 }
 
 impl Parser<'_> {
+    /// Adds an instruction that stands here in the text. Parts of the text that vary with its variables have operands that are finite.
+    fn push(&mut self, instruction: Instruction, at: Range<usize>) -> Result<(), Fault> {
+        self.program.push(instruction);
+        let first = self.operands.len() - instruction.operands();
+        let operands = &self.operands[first..];
+        let values = Values(&[0.0; COUNT]);
+        let value = match (&instruction, operands) {
+            (Instruction::Number(number), _) => Some(*number),
+            (Instruction::Unary(function), [Operand { value: Some(a), .. }]) => Some((function.value)(*a)),
+            (
+                Instruction::Binary(function),
+                [Operand { value: Some(a), .. }, Operand { value: Some(b), .. }],
+            ) => Some((function.value)(*a, *b)),
+            (
+                Instruction::Ternary(function),
+                [
+                    Operand { value: Some(a), .. },
+                    Operand { value: Some(b), .. },
+                    Operand { value: Some(c), .. },
+                ],
+            ) => Some({ values }.ternary(function, [*a, *b, *c])),
+            _ => None,
+        };
+        if value.is_none() {
+            operands.iter().try_for_each(|operand| operand.refuse_infinite(self.text))?;
+        }
+        let own = value.filter(|value| operands.is_empty() && !value.is_finite()).map_or(0.0, f64::abs);
+        let whole = Operand {
+            value,
+            infinite: operands.iter().map(|operand| operand.infinite).fold(own, larger),
+            at: operands
+                .iter()
+                .fold(at, |all, Operand { at, .. }| all.start.min(at.start)..all.end.max(at.end)),
+        };
+        self.operands.truncate(first);
+        self.operands.push(whole);
+        Ok(())
+    }
+
     fn value(&mut self) -> Result<(), Fault> {
         self.sum()?;
         let operator = match self.peek() {
@@ -151,12 +205,12 @@ impl Parser<'_> {
             Some('>') => [ABOVE, AT_LEAST],
             _ => return Ok(()),
         };
+        let sign = self.at;
         self.at += 1;
         let with_equality = self.text[self.at..].starts_with('=');
         self.at += usize::from(with_equality);
         self.sum()?;
-        self.program.push(Instruction::Binary(operator[usize::from(with_equality)]));
-        Ok(())
+        self.push(Instruction::Binary(operator[usize::from(with_equality)]), sign..sign)
     }
 
     /// Enters another level.
@@ -178,9 +232,10 @@ impl Parser<'_> {
                 Some('-') => SUBTRACT,
                 _ => break,
             };
+            let sign = self.at;
             self.at += 1;
             self.product()?;
-            self.program.push(Instruction::Binary(operator));
+            self.push(Instruction::Binary(operator), sign..sign)?;
         }
         self.depth -= 1;
         Ok(())
@@ -194,24 +249,27 @@ impl Parser<'_> {
                 Some('/') => DIVIDE,
                 _ => return Ok(()),
             };
+            let sign = self.at;
             self.at += 1;
             if operator == MULTIPLY && self.text[self.at..].starts_with('*') {
                 return Err(self.here("two stars in a row", "powers are written x^2"));
             }
             self.signed()?;
-            self.program.push(Instruction::Binary(operator));
+            self.push(Instruction::Binary(operator), sign..sign)?;
         }
     }
 
     fn signed(&mut self) -> Result<(), Fault> {
         let mut negative = false;
+        self.take_while(char::is_whitespace);
+        let start = self.at;
         while let Some(sign @ ('+' | '-')) = self.peek() {
             negative ^= sign == '-';
             self.at += 1;
         }
         self.power()?;
         if negative {
-            self.program.push(Instruction::Unary(NEGATE));
+            self.push(Instruction::Unary(NEGATE), start..start)?;
         }
         Ok(())
     }
@@ -219,11 +277,12 @@ impl Parser<'_> {
     fn power(&mut self) -> Result<(), Fault> {
         self.atom()?;
         if self.peek() == Some('^') {
+            let sign = self.at;
             self.at += 1;
             self.descend()?;
             self.signed()?;
             self.depth -= 1;
-            self.program.push(Instruction::Binary(POWER));
+            self.push(Instruction::Binary(POWER), sign..sign)?;
         }
         Ok(())
     }
@@ -242,7 +301,9 @@ impl Parser<'_> {
                 let open = self.at;
                 self.at += 1;
                 self.value()?;
-                self.close(open)
+                self.close(open)?;
+                self.operands.iter_mut().last().into_iter().for_each(|inner| inner.at = open..self.at);
+                Ok(())
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_ascii_alphabetic() || c == '_' => self.name(),
@@ -262,10 +323,7 @@ impl Parser<'_> {
             }
         }
         match self.text[start..self.at].parse::<f64>() {
-            Ok(number) if number.is_finite() => {
-                self.program.push(Instruction::Number(number));
-                Ok(())
-            }
+            Ok(number) if number.is_finite() => self.push(Instruction::Number(number), start..self.at),
             _ => {
                 let message = format!("`{}` is not a number", &self.text[start..self.at]);
                 Err(Fault::new(start..self.at, message, "write it as in 0.5 or 1e-3"))
@@ -294,7 +352,7 @@ impl Parser<'_> {
                 Err(Fault::new(span, "an infinite number in a law", help))
             }
             Some(Meaning::Value(value)) => {
-                self.program.push(value);
+                self.push(value, span.clone())?;
                 if let Some(number) = number {
                     // The number in parentheses takes a level.
                     self.descend()?;
@@ -308,15 +366,12 @@ impl Parser<'_> {
                 Err(Fault::new(span, format!("the function `{name}` has no arguments"), help))
             }
             Some(Meaning::One(function)) => {
-                self.arguments(&span, 1, 1, |_| {})?;
-                self.program.push(Instruction::Unary(function));
-                Ok(())
+                self.arguments(&span, [1, 1], None)?;
+                self.push(Instruction::Unary(function), span.start..self.at)
             }
-            Some(Meaning::Two(function)) => self.arguments(&span, 2, 2, |program| {
-                program.push(Instruction::Binary(function));
-            }),
+            Some(Meaning::Two(function)) => self.arguments(&span, [2, 2], Some(function)),
             Some(Meaning::Three(function)) => {
-                self.arguments(&span, 3, 3, |_| {})?;
+                self.arguments(&span, [3, 3], None)?;
                 if name == "pulse"
                     && let [.., Instruction::Number(start), Instruction::Number(end)] = self.program[..]
                     && end < start
@@ -324,13 +379,10 @@ impl Parser<'_> {
                     let message = format!("the pulse ends at {end}, before its start at {start}");
                     return Err(Fault::new(span, message, "write pulse(t, start, end)"));
                 }
-                self.program.push(Instruction::Ternary(function));
-                Ok(())
+                self.push(Instruction::Ternary(function), span.start..self.at)
             }
             Some(Meaning::Points) => self.points(&span),
-            Some(Meaning::Many(function)) => self.arguments(&span, 2, usize::MAX, |program| {
-                program.push(Instruction::Binary(function));
-            }),
+            Some(Meaning::Many(function)) => self.arguments(&span, [2, usize::MAX], Some(function)),
         }
     }
 
@@ -346,13 +398,12 @@ impl Parser<'_> {
         Fault { is_unknown_name: true, ..Fault::new(span, message, help) }
     }
 
-    /// A parenthesised list of `least` to `most` arguments; `then` is called after each argument except the first.
+    /// A parenthesised list of `least` to `most` arguments, with this function of the ones before and each of them except the first.
     fn arguments(
         &mut self,
         name: &Range<usize>,
-        least: usize,
-        most: usize,
-        then: impl Fn(&mut Vec<Instruction>),
+        [least, most]: [usize; 2],
+        function: Option<Binary>,
     ) -> Result<(), Fault> {
         let open = self.at;
         self.at += 1;
@@ -361,18 +412,20 @@ impl Parser<'_> {
         while self.peek() == Some(',') {
             self.at += 1;
             self.value()?;
-            then(&mut self.program);
+            if let Some(function) = function {
+                self.push(Instruction::Binary(function), name.clone())?;
+            }
             count += 1;
         }
         self.close(open)?;
         if (least..=most).contains(&count) {
             return Ok(());
         }
-        let function = &self.text[name.clone()];
+        let called = &self.text[name.clone()];
         let wanted = if least == most { least.to_string() } else { format!("at least {least}") };
         Err(Fault::new(
             name.start..self.at,
-            format!("`{function}` has {count} argument{}", if count == 1 { "" } else { "s" }),
+            format!("`{called}` has {count} argument{}", if count == 1 { "" } else { "s" }),
             format!("it takes {wanted}"),
         ))
     }
@@ -387,7 +440,8 @@ impl Parser<'_> {
             self.at += 1;
             let (start, first) = (self.at, self.program.len());
             self.sum()?;
-            let Some(number) = constant(&self.program[first..]) else {
+            let point = self.operands.pop().filter(|point| point.refuse_infinite(self.text).is_ok());
+            let Some(number) = point.and_then(|point| point.value).filter(|number| !number.is_nan()) else {
                 let message = "the points of a table must be numbers";
                 return Err(Fault::new(start..self.at, message, "write interpolate(t, t1, v1, t2, v2, ...)"));
             };
@@ -406,7 +460,7 @@ impl Parser<'_> {
                 format!("the points of a table must ascend: {} is not above {}", pair[1][0], pair[0][0]);
             return Err(Fault::new(span, message, "for a jump, put two points close together"));
         }
-        self.program.push(Instruction::Interpolate(self.tables.len()));
+        self.push(Instruction::Interpolate(self.tables.len()), span)?;
         self.tables.push(points.into());
         Ok(())
     }

@@ -27,7 +27,8 @@ impl Program {
     }
 }
 
-struct Values<'a>(&'a Arguments);
+/// Numbers.
+pub(super) struct Values<'a>(pub(super) &'a Arguments);
 
 impl Machine for Values<'_> {
     type Entry = f64;

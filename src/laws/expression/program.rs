@@ -166,6 +166,18 @@ pub(super) enum Instruction {
     Interpolate(usize),
 }
 
+impl Instruction {
+    /// How many of the topmost values it replaces by its own.
+    pub(super) fn operands(&self) -> usize {
+        match self {
+            Self::Number(_) | Self::Variable(_) => 0,
+            Self::Unary(_) | Self::Interpolate(_) => 1,
+            Self::Binary(_) => 2,
+            Self::Ternary(_) => 3,
+        }
+    }
+}
+
 /// Points with ascending first coordinates, at least one.
 pub(super) type Table = Box<[[f64; 2]]>;
 
@@ -377,12 +389,7 @@ impl PartialEq for Binary {
 fn stack_depth(program: &[Instruction]) -> usize {
     let (mut now, mut most) = (0_usize, 0);
     for instruction in program {
-        match instruction {
-            Instruction::Number(_) | Instruction::Variable(_) => now += 1,
-            Instruction::Unary(_) | Instruction::Interpolate(_) => {}
-            Instruction::Binary(_) => now -= 1,
-            Instruction::Ternary(_) => now -= 2,
-        }
+        now = now + 1 - instruction.operands();
         most = most.max(now);
     }
     most

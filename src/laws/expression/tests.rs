@@ -68,6 +68,14 @@ fn faults_point_into_the_text() {
         ("interpolate(t, 0, 1, 0, 2)", 0..26, "0 is not above 0", "jump"),
         ("interpolate(t, 0, x)", 17..19, "numbers", "v1"),
         ("interpolate(t, 0, 0/0)", 17..21, "numbers", "v1"),
+        ("interpolate(t, 0, 1e308*10)", 17..26, "numbers", "v1"),
+        ("1 + x*(1e308*10)", 6..16, "`(1e308*10)` is inf", "correct"),
+        ("1e300*1e300*t", 0..11, "`1e300*1e300` is inf", "correct"),
+        ("t^2 - 1/0", 6..9, "`1/0` is inf", "correct"),
+        ("max(x, -ln(0), 1)", 7..13, "`-ln(0)` is inf", "correct"),
+        ("if(t < 1, 2, sqrt(1 - 2))", 13..24, "`sqrt(1 - 2)` is NaN", "correct"),
+        (" 0*inf + pi", 1..11, "is NaN", "correct"),
+        ("interpolate(1/0, 0, 1)", 12..15, "`1/0` is inf", "correct"),
         ("interpolate(t, 0, interpolate(1, 0, 1))", 17..38, "numbers", "v1"),
         ("1 + T", 4..5, "unknown name `T`", "did you mean `t`?"),
         ("sine(x)", 0..4, "unknown name `sine`", "did you mean `sin`?"),
@@ -84,6 +92,19 @@ fn faults_point_into_the_text() {
         assert_eq!(fault.at, at, "{text}: {fault:?}");
         assert!(fault.message.contains(message), "{text}: {fault:?}");
         assert!(fault.help.contains(help), "{text}: {fault:?}");
+    }
+}
+
+#[test]
+fn parts_that_are_not_finite_and_do_not_count_are_allowed() {
+    for (text, number) in [
+        ("-inf", f64::NEG_INFINITY),
+        ("if(t < 1, inf, 2)", f64::INFINITY),
+        ("if(1 > 2, 1/0, 3)", 3.0),
+        ("min(inf, 2*3)", 6.0),
+        ("1/(1/0)", 0.0),
+    ] {
+        assert_eq!(value(text), number, "{text}");
     }
 }
 

@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn expressions_without_a_value_are_refused() {
         let exact = ExactFields {
-            displacement: expressions(&["1/0*x", "0"]),
+            displacement: expressions(&["sqrt(t - 2)*x", "0"]),
             velocity: Vec::new(),
             stress: Vec::new(),
         };
