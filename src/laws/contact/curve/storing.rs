@@ -8,6 +8,13 @@ use crate::laws::quadrature::means;
 
 /// Integrals are exact up to this share of that of the absolute value, about the rounding of values.
 const EXACT: f64 = 1e-13;
+/// Functions whose coefficients of Legendre polynomials have fallen below this share of them are integrated within `EXACT` by ten points.
+const SMOOTH: f64 = 1e-9;
+/// Largest rounding errors of a function as a share of it, and the share of the error of a part that both of its halves then have at least.
+const NOISE: f64 = 1e-6;
+const STEADY: f64 = 1.0 / 16.0;
+/// Ways longer than this share of the penetration have a mean that is a difference of potentials without loss of digits.
+const LONG: f64 = 0.05;
 /// Length of the first part in m, and ratio of the lengths of parts.
 const NEAREST: f64 = 1e-12;
 const GROWTH: f64 = 4.0;
@@ -17,45 +24,75 @@ const SMALL: f64 = 1e-6;
 const DEPTH: usize = 10;
 const KEPT_DEPTH: usize = 6;
 
-/// The integral of a smooth function from `a` to `b`, and that of its absolute value, by ten points.
-fn gauss(function: &dyn Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
-    let [mean, size] = means(function, [a, b]);
-    [mean * (b - a), size * (b - a).abs()]
+/// A part of an integral: its ends, its integral by ten points, and those of its halves.
+struct Part {
+    ends: [f64; 2],
+    whole: f64,
+    halves: [f64; 2],
 }
 
-/// A smooth function that is integrated by halves until they agree within `slack`.
+impl Part {
+    fn middle(&self) -> f64 {
+        0.5 * (self.ends[0] + self.ends[1])
+    }
+
+    fn sum(&self) -> f64 {
+        self.halves[0] + self.halves[1]
+    }
+
+    fn error(&self) -> f64 {
+        (self.sum() - self.whole).abs()
+    }
+}
+
+/// A smooth function that is integrated by halves until they agree within rounding errors.
 struct Halved<'a> {
     function: &'a dyn Fn(f64) -> f64,
-    slack: f64,
+    /// The size of the sum that errors are compared with.
+    size: f64,
 }
 
-impl<'a> Halved<'a> {
-    /// From `a` to `b`, as a part of a sum of the size `scale`; with the integral by ten points.
-    fn of(function: &'a dyn Fn(f64) -> f64, [a, b]: [f64; 2], scale: f64) -> (Self, f64) {
-        let [sum, size] = gauss(function, a, b);
-        (Self { function, slack: EXACT * size.max(scale) }, sum)
+impl Halved<'_> {
+    fn part(&self, ends: [f64; 2], whole: f64) -> Part {
+        let middle = 0.5 * (ends[0] + ends[1]);
+        let half = |[a, b]: [f64; 2]| means(self.function, [a, b])[0] * (b - a);
+        Part { ends, whole, halves: [half([ends[0], middle]), half([middle, ends[1]])] }
     }
 
-    /// The integral over a part with the integral `whole` by ten points, which is halved this often at most; visits in their order the places
-    /// where parts are halved.
-    fn integral(&self, [a, b]: [f64; 2], whole: f64, depth: usize, visit: &mut dyn FnMut(f64)) -> f64 {
-        let middle = 0.5 * (a + b);
-        let halves = [gauss(self.function, a, middle), gauss(self.function, middle, b)].map(|[sum, _]| sum);
-        let sum = halves[0] + halves[1];
-        let error = (sum - whole).abs();
-        if depth == 0 || error <= self.slack || error.is_nan() {
-            return sum;
+    /// The integral over a part that is halved this often at most; visits in their order the places where parts are halved.
+    fn integral(&self, part: &Part, depth: usize, visit: &mut dyn FnMut(f64)) -> f64 {
+        let (middle, error) = (part.middle(), part.error());
+        if depth == 0 || error <= EXACT * self.size || error.is_nan() {
+            return part.sum();
         }
-        let before = self.integral([a, middle], halves[0], depth - 1, visit);
+        let parts = [
+            self.part([part.ends[0], middle], part.halves[0]),
+            self.part([middle, part.ends[1]], part.halves[1]),
+        ];
+        // What is left on both sides alike is rounding errors of the function.
+        if error <= NOISE * self.size && parts.iter().all(|half| half.error() > STEADY * error) {
+            return parts[0].sum() + parts[1].sum();
+        }
+        let before = self.integral(&parts[0], depth - 1, visit);
         visit(middle);
-        before + self.integral([middle, b], halves[1], depth - 1, visit)
+        before + self.integral(&parts[1], depth - 1, visit)
     }
 }
 
-/// The integral of a smooth function from `a` to `b`, as a part of a sum of the size `scale`, by this many halvings at most.
-fn integral(function: &dyn Fn(f64) -> f64, ends: [f64; 2], (scale, depth): (f64, usize)) -> f64 {
-    let (halved, whole) = Halved::of(function, ends, scale);
-    halved.integral(ends, whole, depth, &mut |_| ())
+/// The integral of a smooth function over a range, as a part of a sum of the size `scale`, by this many halvings at most; visits in their
+/// order the places where the range is halved.
+fn integral(
+    function: &dyn Fn(f64) -> f64,
+    ends: [f64; 2],
+    (scale, depth): (f64, usize),
+    visit: &mut dyn FnMut(f64),
+) -> f64 {
+    let ([mean, size, last], length) = (means(function, ends), ends[1] - ends[0]);
+    if last <= SMOOTH * size {
+        return mean * length;
+    }
+    let halved = Halved { function, size: scale.max(size * length.abs()) };
+    halved.integral(&halved.part(ends, mean * length), depth, visit)
 }
 
 /// A curve over the penetration in m, with its potential.
@@ -123,17 +160,17 @@ impl StoringCurve {
     /// Where potentials are to be kept between a knot and such a penetration, in order: a curve that waves is integrated over a short way.
     fn ends_between(&self, [knot, potential]: [f64; 2], penetration: f64) -> Vec<f64> {
         let ends = [knot, penetration];
-        let pressure = self.pressure_between(ends);
-        let (halved, whole) = Halved::of(&pressure, ends, potential.abs());
         let mut kept = Vec::new();
-        halved.integral(ends, whole, KEPT_DEPTH, &mut |at| kept.push(at));
+        let keep = &mut |at| kept.push(at);
+        integral(&self.pressure_between(ends), ends, (potential.abs(), KEPT_DEPTH), keep);
         kept
     }
 
     /// The potential in J/m² at such a penetration from that at the knot.
     fn potential_from(&self, [knot, potential]: [f64; 2], penetration: f64) -> f64 {
         let ends = [knot, penetration];
-        potential + integral(&self.pressure_between(ends), ends, (potential.abs(), DEPTH - KEPT_DEPTH))
+        let most = (potential.abs(), DEPTH - KEPT_DEPTH);
+        potential + integral(&self.pressure_between(ends), ends, most, &mut |_| ())
     }
 }
 
@@ -167,21 +204,24 @@ impl StoringGraph for StoringCurve {
         let (low, high) = (before.min(after), before.max(after));
         let branch = self.curve.branch(low, NodeContext::AT_THE_GAP);
         let end = self.curve.corners.get(branch).map_or(f64::INFINITY, |corner| corner[0]);
-        if end < high {
+        // A curve that waves is integrated once, between its knots; over a short way the difference of potentials is rounding errors.
+        let is_long = high - low > LONG * low.abs().max(high.abs());
+        let kept = self.knots.partition_point(|knot| knot[0] <= low);
+        if end < high || (is_long && self.knots.get(kept + 1).is_some_and(|knot| knot[0] < high)) {
             let mean = (self.potential(high) - self.potential(low)) / (high - low);
             let own = self.curve.pressure(after, NodeContext::AT_THE_GAP);
             return [mean, (own - mean) / advance];
         }
         let at = |share: f64| before + share * advance;
-        let mean =
-            integral(&|share| self.curve.pressure_on_branch(branch, at(share)), [0.0, 1.0], (0.0, DEPTH));
+        let pressure = |share: f64| self.curve.pressure_on_branch(branch, at(share));
+        let mean = integral(&pressure, [0.0, 1.0], (0.0, DEPTH), &mut |_| ());
         let own = self.curve.pressure_on_branch(branch, after);
         let change = own - mean;
         if change.abs() > SMALL * own.abs().max(mean.abs()) {
             return [mean, change / advance];
         }
         // An integral, too, has no rounding of a difference; the function is nearly constant.
-        let [slope, _] = gauss(&|share| share * self.curve.on_branch(branch, at(share))[1], 0.0, 1.0);
+        let [slope, ..] = means(|share| share * self.curve.on_branch(branch, at(share))[1], [0.0, 1.0]);
         [mean, slope]
     }
 }
