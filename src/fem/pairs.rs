@@ -7,7 +7,7 @@ use crate::{
         mortar::{Contribution, Facet, contributions},
         surface_points,
     },
-    linear_algebra::tensor::{Vector, add_scaled, dot, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, norm},
     mesh::Mesh,
     parallel::{
         agreement::Agreed,
@@ -204,9 +204,9 @@ impl<const D: usize> Pair<D> {
         let masters = gather_facets(session, mesh, places, &self.against)?;
         let depth = DEEPEST * longest_side(session, places);
         let mut all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
+        let at = gather_places(session, mesh, places, [&self.on, &self.against])?;
         if mesh.order() == 2 {
-            let faced = gather_places(session, mesh, places, [&self.on, &self.against])?;
-            all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &faced));
+            all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
         let own: BTreeSet<u32> = slaves.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
         let mut lawless = self.lawless.clone();
@@ -217,7 +217,7 @@ impl<const D: usize> Pair<D> {
                 covered.filter(|(_, sum)| !sum.carries_a_law()).map(|(node, _)| *node).collect();
             let further = gather(session.world(), &bearing)?;
             if further.is_empty() {
-                return Ok(paired(mesh, sums));
+                return Ok(paired(mesh, sums, &at));
             }
             lawless.extend(further);
         }
@@ -288,6 +288,10 @@ pub fn shares<const D: usize>(mesh: &Mesh<D>, pairs: &[Pair<D>]) -> Vec<MasterSh
 const LEAST_SHARE: f64 = 1e-3;
 /// The same as a share of the integral of its shape function.
 const LEAST_STRETCH: f64 = 0.05;
+/// How far the mean of the places that a node faces may be beside its normal, as a share of the distances between them, to be shifted there;
+/// and the least part of these distances that one direction has beside the others.
+const LARGEST_SHIFT: f64 = 0.1;
+const LEAST_SPREAD: f64 = 1e-3;
 /// The deepest penetration of undeformed bodies at which they face each other, as a share of the longest side of the box around them; it
 /// is larger where facets are.
 const DEEPEST: f64 = 0.05;
@@ -317,24 +321,20 @@ fn gather_facets<const D: usize>(
     Ok(nodes.chunks_exact(per_facet).zip(corners).map(|(nodes, at)| Facet::new(nodes.to_vec(), at)).collect())
 }
 
-/// The places in m of the nodes of these own facets and of these facets of all ranks, by global numbers. Collective.
+/// The places in m of the nodes of these facets of all ranks, by global numbers. Collective.
 fn gather_places<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     places: &[Vector<D>],
-    [own, of_all]: [&[u32]; 2],
+    facets: [&[u32]; 2],
 ) -> Result<BTreeMap<u32, Vector<D>>, Agreed> {
-    let of = |facets: &[u32]| -> BTreeMap<u32, Vector<D>> {
-        let nodes = facets.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-        nodes.map(|node| (mesh.global_node(node), places[node as usize])).collect()
-    };
-    let sent = of(of_all);
-    let numbers: Vec<u32> = sent.keys().copied().collect();
-    let values: Vec<f64> = sent.into_values().flatten().collect();
+    let nodes = facets.into_iter().flatten().flat_map(|facet| mesh.facet_nodes(*facet));
+    let own: BTreeMap<u32, Vector<D>> =
+        nodes.map(|node| (mesh.global_node(node), places[node as usize])).collect();
+    let numbers: Vec<u32> = own.keys().copied().collect();
+    let values: Vec<f64> = own.into_values().flatten().collect();
     let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);
-    let mut all = of(own);
-    all.extend(numbers.into_iter().zip(values.as_chunks().0.iter().copied()));
-    Ok(all)
+    Ok(numbers.into_iter().zip(values.as_chunks().0.iter().copied()).collect())
 }
 
 /// The integral of a multiplier times the distance between two quadratic surfaces, which bulge between the corners of their facets as far as
@@ -417,26 +417,77 @@ fn sum_of_contributions<const D: usize>(
     Ok(sums)
 }
 
-/// The nodes of this rank with these sums that carry a law.
-fn paired<const D: usize>(mesh: &Mesh<D>, sums: BTreeMap<u32, Sum>) -> Vec<PairedNode<D>> {
+/// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m.
+fn paired<const D: usize>(
+    mesh: &Mesh<D>,
+    sums: BTreeMap<u32, Sum>,
+    places: &BTreeMap<u32, Vector<D>>,
+) -> Vec<PairedNode<D>> {
     sums.into_iter()
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
         .filter(|(_, sum)| sum.whole > 0.0 && sum.carries_a_law())
         .map(|(node, sum)| {
             let normal: Vector<D> = std::array::from_fn(|i| sum.normal[i]);
             let length = norm(&normal);
+            let normal = normal.map(|n| n / length);
             let shares = sum.masters.into_iter().map(|(master, value)| (master, value / sum.weight));
+            let mut masters: Vec<(u32, f64)> = shares.collect();
+            face_along_normal(&mut masters, &sum.neighbours, (&places[&node], &normal), places);
             PairedNode {
                 node: mesh.owned_node(node) as u32,
-                normal: normal.map(|n| n / length),
+                normal,
                 weight: sum.weight,
                 distance: sum.gap / sum.weight,
-                masters: shares.collect(),
+                masters,
                 neighbours: sum.neighbours.into_iter().collect(),
                 stretch: 1.0 + sum.passed / sum.weight,
             }
         })
         .collect()
+}
+
+/// Changes the shares of the masters on the other side least so that the mean of all places by their shares lies on the normal through the
+/// node: a normal force then has no moment on both bodies, and a rotation of both bodies together opens nothing. Of flat surfaces it lies
+/// there; of curved ones it is beside the normal by a power of the size of facets.
+fn face_along_normal<const D: usize>(
+    masters: &mut [(u32, f64)],
+    neighbours: &BTreeSet<u32>,
+    (node, normal): (&Vector<D>, &Vector<D>),
+    places: &BTreeMap<u32, Vector<D>>,
+) {
+    let beside = |place: &Vector<D>, from: &Vector<D>| {
+        let way = add_scaled(place, -1.0, from);
+        add_scaled(&way, -dot(&way, normal), normal)
+    };
+    let mean = |shares: &mut dyn Iterator<Item = (u32, f64)>| {
+        shares.fold([0.0; D], |sum, (master, share)| add_scaled(&sum, share, &beside(&places[&master], node)))
+    };
+    let off = mean(&mut masters.iter().copied());
+    let faced: Vec<u32> =
+        masters.iter().map(|(master, _)| *master).filter(|master| !neighbours.contains(master)).collect();
+    let count = faced.len() as f64;
+    let centre = add_scaled(node, 1.0, &mean(&mut faced.iter().map(|master| (*master, 1.0 / count))));
+    let arms: Vec<Vector<D>> = faced.iter().map(|master| beside(&places[master], &centre)).collect();
+    let squares: f64 = arms.iter().map(|arm| dot(arm, arm)).sum();
+    // Surfaces that are far from parallel remain as they are.
+    let is_near = dot(&off, &off) < LARGEST_SHIFT * LARGEST_SHIFT * squares;
+    if !is_near {
+        return;
+    }
+    // The symmetric matrix sum_b arm_b arm_b', regular by the normal, to which all arms are at right angles.
+    let row = |i: usize| {
+        let along = normal.map(|n| squares * normal[i] * n);
+        arms.iter().fold(along, |sum, arm| add_scaled(&sum, arm[i], arm))
+    };
+    let rows: [Vector<D>; D] = std::array::from_fn(row);
+    let sizes = rows.map(|row| norm(&row));
+    let units: [Vector<D>; D] = std::array::from_fn(|i| rows[i].map(|x| x / sizes[i]));
+    let Some(duals) = dual_basis(&units, LEAST_SPREAD) else { return };
+    let factors = (0..D).fold([0.0; D], |sum, i| add_scaled(&sum, -off[i] / sizes[i], &duals[i]));
+    let mut arms = arms.iter();
+    for (_, share) in masters.iter_mut().filter(|(master, _)| !neighbours.contains(master)) {
+        *share += arms.next().map_or(0.0, |arm| dot(arm, &factors));
+    }
 }
 
 #[cfg(test)]
@@ -467,6 +518,53 @@ mod tests {
         assert_eq!((both[1].weight, both[1].gap), (0.5, 3.0));
         let sum: f64 = both[1].masters.iter().map(|(_, value)| value).sum();
         assert_eq!(sum, both[1].weight, "a common motion of both sides opens nothing");
+    }
+
+    /// Quadratic facets of a quarter of a circle of 2 m, from this node on, with the places of their nodes; outward or inward.
+    fn arc(count: u32, first: u32, outward: bool) -> (Vec<Facet<2>>, BTreeMap<u32, Vector<2>>) {
+        let at = |number: u32| {
+            let angle = std::f64::consts::FRAC_PI_2 * f64::from(number) / f64::from(2 * count);
+            [2.0 * angle.cos(), 2.0 * angle.sin()]
+        };
+        let places = (0..=2 * count).map(|number| (first + number, at(number))).collect();
+        let facet = |number: u32| {
+            let [a, b] = if outward { [0, 2] } else { [2, 0] }.map(|end| 2 * number + end);
+            Facet::new(vec![first + a, first + b, first + 2 * number + 1], [at(a), at(b)])
+        };
+        ((0..count).map(facet).collect(), places)
+    }
+
+    #[test]
+    fn nodes_on_curved_surfaces_face_places_on_their_normals() {
+        let (slaves, mut places) = arc(7, 0, true);
+        let (masters, of_masters) = arc(5, 100, false);
+        places.extend(of_masters);
+        let mut of_nodes: BTreeMap<u32, (Vector<2>, Vec<(u32, f64)>)> = BTreeMap::new();
+        for one in contributions(&slaves, &masters, [0.1, f64::INFINITY]) {
+            let (normal, shares) = of_nodes.entry(one.node).or_default();
+            *normal = add_scaled(normal, one.weight, &one.normal);
+            shares.extend(one.masters);
+        }
+        assert_eq!(of_nodes.len(), 15);
+        let mut most = [0.0f64; 2];
+        for (node, (normal, mut shares)) in of_nodes {
+            let weight: f64 = shares.iter().map(|(_, value)| value).sum();
+            shares.iter_mut().for_each(|(_, value)| *value /= weight);
+            let normal = normal.map(|n| n / norm(&normal));
+            let moment = |shares: &[(u32, f64)]| {
+                let way = shares.iter().fold([0.0; 2], |sum, (master, share)| {
+                    add_scaled(&sum, *share, &add_scaled(&places[master], -1.0, &places[&node]))
+                });
+                (way[0] * normal[1] - way[1] * normal[0]).abs()
+            };
+            let before = shares.clone();
+            face_along_normal(&mut shares, &BTreeSet::new(), (&places[&node], &normal), &places);
+            most = [most[0].max(moment(&before)), most[1].max(moment(&shares))];
+            assert!((shares.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-14);
+            let changes = shares.iter().zip(&before).map(|(one, other)| (one.1 - other.1).abs());
+            assert!(changes.fold(0.0, f64::max) < 0.01, "{before:?} {shares:?}");
+        }
+        assert!(most[0] > 1e-4 && most[1] < 1e-15, "{most:?}");
     }
 
     #[test]
