@@ -441,15 +441,19 @@ impl<const D: usize> Pair<D> {
         found
     }
 
-    /// Differences of the displacements and velocities at the end above ten times this share.
+    /// Differences of the displacements and velocities at the end above ten times this share. The accuracy of displacements limits that of
+    /// the velocities of a body at rest: they are changes of displacements over a step.
     fn motions(&self, share: f64) -> Vec<String> {
         let [metre, _, second] = self.frame.units;
         let mut found = Vec::new();
+        let step = self.results[0].history["dt"].last().copied().unwrap_or(f64::INFINITY);
         for (number, (probe, _)) in PROBES.iter().enumerate() {
+            let mut moved = 0.0;
             for (at, unit) in [metre, metre / second].into_iter().enumerate() {
                 let [plain, other] = self.results.each_ref().map(|results| results.probes[number][at]);
                 let expected = turned(self.frame.angle, plain);
-                let size = expected.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let size = expected.iter().map(|x| x * x).sum::<f64>().sqrt().max(moved / step);
+                moved = size;
                 for i in 0..D {
                     let got = other[i] / unit;
                     if exceeds((got - expected[i]).abs(), 10.0 * share * size.max(1e-6)) {
