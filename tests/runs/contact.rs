@@ -809,3 +809,19 @@ fn a_force_presses_an_obstacle_on_a_block_that_contact_alone_holds() {
         "a foundation that does not yield takes up no work"
     );
 }
+
+#[test]
+fn a_law_that_falls_somewhere_holds_a_body_where_it_bears_the_loads() {
+    // 1000 Pa press the body through the drop from 500 to 400 Pa at 1 mm to 2.6 mm, where the law bears them.
+    let job = "[mesh.rectangle]\nsize = [1, 0.5]\ncells = [4, 2]\n\
+        [material]\nhypothesis = 'plane_strain'\nelasticity = { youngs_modulus = 1e6, poisson_ratio = 0.3 }\n\
+        [[support]]\non = ['left']\nfix = ['x']\n[[traction]]\non = ['top']\nvalue = [0, '-1000*t']\n\
+        [[contact]]\non = ['bottom']\nnormal.displacement_graph = { points = [[0, 0], [1e-3, 500], [2e-3, 400]], slope_after = 1e6 }\n\
+        [time]\nscheme = 'implicit_euler'\nend = 1\nstep = 0.1\n[[output.probe]]\nname = 'foot'\npoint = [1, 0]\n";
+    Case::written_as(job).run_with(1, &[]).expect(2).says("may have several solutions");
+    let case = Case::written_as(job).set("solver.accept", "['uniqueness']");
+    let results = case.run(1);
+    let foot = results.table("probes.csv").last("displacement_y");
+    assert!((foot + 2.6e-3).abs() < 1e-8, "{foot}");
+    assert!(results.number("max_energy_imbalance") < 1e-9);
+}

@@ -58,9 +58,9 @@ pub fn contact_nodes<const D: usize>(
 
 impl<const D: usize> Contact<D> {
     /// Nodes of this rank with directions along which the contact can resist a motion of a body at rest: the normal, unless the law
-    /// never presses or descends, and the tangents of friction.
+    /// never presses, and the tangents of friction.
     pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
-        let presses = !self.law.is_zero() && self.law.monotonicity_constant(1.0) == 0.0;
+        let presses = !self.law.is_zero();
         let rubs = self.friction.as_ref().is_some_and(|friction| presses || !friction.law.follows_pressure());
         let normals = presses.then(|| self.normal_directions()).into_iter().flatten();
         normals.chain(rubs.then(|| self.tangential_directions()).into_iter().flatten()).collect()
