@@ -590,3 +590,27 @@ fn a_boundary_that_is_held_along_its_plane_rubs_and_wears() {
         assert_eq!(straight.results().text(name), stopped.results().text(name), "{name}");
     }
 }
+
+#[test]
+fn quasistatic_friction_that_falls_faster_than_the_body_resists_has_a_solution_in_each_step() {
+    let job = "[[mesh.rectangle]]\nname = 'block'\ncorner = [0.1, 0]\nsize = [0.4, 0.2]\ncells = [5, 3]\n\
+        [[mesh.rectangle]]\nname = 'base'\ncorner = [-0.1, -0.2]\nsize = [1.2, 0.2]\ncells = [17, 3]\n\
+        [material]\nhypothesis = 'plane_strain'\nelasticity = { youngs_modulus = 1e6, poisson_ratio = 0.3 }\n\
+        [[support]]\non = ['base.bottom']\nfix = 'all'\n[[support]]\non = ['block.top']\nfix = ['x']\n\
+        [[traction]]\non = ['block.top']\nvalue = [0, -1000]\n\
+        [[contact]]\non = ['block.bottom']\nagainst = ['base.top']\nnormal.unilateral = {}\n\
+        friction.expression.coefficient = '0.2 + 0.1*exp(-v/0.05)'\n\
+        [time]\nscheme = 'implicit_euler'\nend = 1e-4\nstep = 1e-4\n";
+    // The load spreads the block at once, at speeds between which the coefficient falls by 0.1 s/m times 1 kPa per 0.05 m/s.
+    for step in [1e-4, 5e-5] {
+        let case = Case::written_as(job).set("time.step", &step.to_string());
+        let results = case.run(1);
+        assert!(
+            results.number("max_energy_imbalance") < 1e-10
+                && results.number("max_inclusion_residual") < 1e-10
+        );
+        let forces = results.table("resultants.csv");
+        let contact = forces.only("source", "contact block.bottom").last("force_y");
+        assert!((contact - 400.0).abs() < 1e-6, "{contact} N");
+    }
+}

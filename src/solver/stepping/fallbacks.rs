@@ -27,12 +27,14 @@ pub(super) enum Search {
     ShortDescent,
     /// The same from a solution with friction points that yield at first, and less and less until they obey their law.
     Yielding,
+    /// The same from solutions with friction bounds at the sliding speeds of the last one.
+    Falling,
 }
 
 impl Search {
     /// Whether steps lower an energy.
     pub(super) fn minimises(self) -> bool {
-        matches!(self, Self::Descent | Self::ShortDescent | Self::Yielding)
+        matches!(self, Self::Descent | Self::ShortDescent | Self::Yielding | Self::Falling)
     }
 }
 
@@ -66,10 +68,11 @@ impl Conditions {
     /// pressure. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
     /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge. Friction
     /// points yield after these full steps for a light obstacle on a stiff body, which points that stick and slide in turn move to and
-    /// fro; and at last for bodies that nothing but little friction holds, or whose points all stick at once.
+    /// fro; and at last for bodies that nothing but little friction holds, or whose points all stick at once. Where friction falls faster
+    /// with the sliding speed than the body resists, bounds follow the speeds from one solution to the next.
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         use FrictionIteration::{FixedPoint, Newton};
-        use Search::{Backtracking, Descent, Equilibrated, FullSteps, Yielding};
+        use Search::{Backtracking, Descent, Equilibrated, Falling, FullSteps, Yielding};
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
         let rubs = self.rubs && !self.rubs_obstacles;
@@ -91,6 +94,7 @@ impl Conditions {
             (follows_bounds, Descent, 1.0, Newton),
             (fixes_bounds, Descent, 1.0, FixedPoint),
             (rubs, Yielding, 1.0, FixedPoint),
+            (self.rubs, Falling, 1.0, FixedPoint),
         ]
         .into_iter()
         .filter(move |(is_wanted, search, ..)| *is_wanted && self.allows(*search))
@@ -107,7 +111,7 @@ impl Conditions {
             Search::FullSteps | Search::Yielding => !self.has_user_search,
             Search::Equilibrated => self.interior_is_linear,
             Search::Backtracking => true,
-            Search::Descent | Search::ShortDescent => self.softens && !self.has_user_search,
+            Search::Descent | Search::ShortDescent | Search::Falling => self.softens && !self.has_user_search,
         }
     }
 }
@@ -150,6 +154,15 @@ mod tests {
         let tresca = Conditions { rubs: true, ..FRICTIONLESS };
         assert!([coulomb, tresca].into_iter().all(|rubs| searches(rubs).last() == Some(&Search::Yielding)));
         assert!(!searches(FRICTIONLESS).contains(&Search::Yielding));
+    }
+
+    #[test]
+    fn bounds_follow_the_speeds_at_last_where_friction_falls() {
+        let falls = Conditions { rubs: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
+        assert_eq!(searches(falls).last(), Some(&Search::Falling));
+        for other in [Conditions { softens: false, ..falls }, Conditions { rubs: false, ..falls }] {
+            assert!(!searches(other).contains(&Search::Falling));
+        }
     }
 
     #[test]

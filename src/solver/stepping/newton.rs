@@ -1,6 +1,7 @@
 //! Newton's method for the contact equations of one step.
 
 mod acceptance;
+mod falling;
 mod yielding;
 
 use super::{
@@ -127,8 +128,15 @@ impl Newton {
         for fallback in conditions.fallbacks() {
             loop {
                 self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
-                if fallback.search == Search::Yielding {
-                    self.solve_yielding(problem, &mut equations)?;
+                match fallback.search {
+                    Search::Yielding => self.solve_yielding(problem, &mut equations)?,
+                    Search::Falling => {
+                        self.solve_falling(problem, &mut equations)?;
+                        let contacts = &mut problem.body.contacts;
+                        write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
+                        self.set_graph_parameters(contacts, system.scales, fallback);
+                    }
+                    _ => {}
                 }
                 match self.solve_with_bounds(problem, &mut equations, fallback)? {
                     None if self.suits_friction(problem) => {
@@ -157,6 +165,8 @@ impl Newton {
     ) -> Result<()> {
         let (session, contacts, system) = (problem.session, &mut problem.body.contacts, equations.system);
         self.start.copy_from(equations.velocity)?;
+        // An attempt that ended with an error may have left them fixed.
+        contacts.iter_mut().for_each(Contact::free_speeds);
         let multiply = |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
         self.obstacles.start(session, contacts, equations.velocity, system.tolerance, multiply)?;
         self.set_linear_tolerances(equations, 1.0)?;

@@ -111,6 +111,8 @@ impl<const D: usize> Friction<D> {
                 },
                 history: law.first_histories(),
                 pressure: 0.0,
+                speed: 0.0,
+                fixed_speed: None,
                 traction: [0.0; D],
                 held_traction: [0.0; D],
                 tangent: Tangent::free(),
@@ -189,6 +191,12 @@ impl<const D: usize> Friction<D> {
         if self.status(point, sliding) == FrictionStatus::Sticks { 0.0 } else { norm(sliding) }
     }
 
+    /// Fixes the bounds of laws with one at rest at the sliding speeds of the last evaluation, or no longer.
+    pub(super) fn fix_speeds(&mut self, fixed: bool) {
+        let fixed = fixed && self.law.jumps_at_rest();
+        self.points.iter_mut().for_each(|point| point.fixed_speed = fixed.then_some(point.speed));
+    }
+
     /// Uses the pressures of `points` in the bounds.
     pub(super) fn update_pressures(&mut self, points: &[Point<D>]) {
         self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
@@ -215,9 +223,10 @@ impl<const D: usize> Friction<D> {
                 [0.0; D]
             } else {
                 let whole_speed = found.speed.hypot(held_speed);
-                let per_speed = self.law.bound(whole_speed, point.pressure, point.context) / whole_speed;
+                let per_speed = point.bound(&self.law, whole_speed) / whole_speed;
                 held.map(|w| per_speed * w)
             };
+            point.speed = found.speed.hypot(held_speed);
             let shares = if found.traction == 0.0 {
                 // Without traction the velocity is bitwise equal to the unknown.
                 [1.0, 0.0]
@@ -572,6 +581,8 @@ mod tests {
             context: SlidingContext::default(),
             history: [4e-4, 1e-4],
             pressure: 10.0,
+            speed: 0.0,
+            fixed_speed: None,
             traction: tangent.map(|x| traction * x),
             held_traction: [0.0; 2],
             tangent: Tangent::free(),

@@ -76,6 +76,16 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Fixes the friction bounds at the sliding speeds of the points.
+    pub fn fix_speeds(&mut self) {
+        self.friction.iter_mut().for_each(|friction| friction.fix_speeds(true));
+    }
+
+    /// Lets friction bounds follow the sliding speeds again.
+    pub fn free_speeds(&mut self) {
+        self.friction.iter_mut().for_each(|friction| friction.fix_speeds(false));
+    }
+
     /// Advances the histories of friction and wear by the current step, at its velocities with ghosts.
     pub fn advance_histories(&mut self, velocity: &[f64]) {
         let blend = self.blend.to_end();

@@ -2,7 +2,7 @@
 
 use super::point::Vectors::{self, Body, Newton};
 use crate::{
-    laws::contact::{FrictionLaw, SlidingContext, Slip},
+    laws::contact::{FrictionLaw, SlidingContext, Slip, Tresca},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
 };
 
@@ -37,6 +37,9 @@ pub(super) struct TangentialPoint<const D: usize> {
     pub history: [f64; 2],
     /// The contact pressure in Pa that determines the bound.
     pub pressure: f64,
+    /// The sliding speed in m/s at the last evaluation, and that at which the bound is fixed while a step is solved, if it is.
+    pub speed: f64,
+    pub fixed_speed: Option<f64>,
     /// The free part of `q` in Pa at the last evaluation.
     pub traction: Vector<D>,
     /// The part of `q` in Pa at the last evaluation that supports take up.
@@ -106,9 +109,16 @@ impl<const D: usize> TangentialPoint<D> {
         }
     }
 
+    /// The bound in Pa at a sliding speed in m/s, or at the one at which it is fixed.
+    pub(super) fn bound(&self, law: &FrictionLaw, speed: f64) -> f64 {
+        law.bound(self.fixed_speed.unwrap_or(speed), self.pressure, self.context)
+    }
+
     /// The point with `c v + q = s` of the graph of its law in series with a viscous element, whose velocity is `give` times the
     /// traction: `v = V(q) + give q` and thus `s / (1 + c give) = c' V + q`, `c' = c / (1 + c give)`. It has no jump at rest.
     pub(super) fn resolve(&self, law: &FrictionLaw, [c, give]: [f64; 2], s: f64, held_speed: f64) -> Slip {
+        let fixed = self.fixed_speed.map(|_| FrictionLaw::Tresca(Tresca { bound: self.bound(law, 0.0) }));
+        let law = fixed.as_ref().unwrap_or(law);
         let share = 1.0 + c * give;
         let found = law.resolve_beside(s / share, c / share, self.pressure, self.context.beside(held_speed));
         if give == 0.0 {

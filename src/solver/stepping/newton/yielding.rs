@@ -34,8 +34,7 @@ impl Newton {
         let mut reached = None;
         let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
         set_give(problem.body, ratio);
-        write_unknowns(&problem.body.contacts, equations.velocity)?;
-        write_velocities(&mut problem.body.contacts, equations.velocity)?;
+        self.evaluate(problem, equations)?;
         self.fix_bounds(problem, system)?;
         loop {
             set_give(problem.body, ratio);
@@ -64,6 +63,16 @@ impl Newton {
         }
         problem.body.contacts.iter_mut().for_each(|contact| contact.set_give(0.0));
         Ok(())
+    }
+
+    /// Evaluates the contacts at the velocity from which they are solved. Collective.
+    pub(super) fn evaluate<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+    ) -> Result<()> {
+        write_unknowns(&problem.body.contacts, equations.velocity)?;
+        write_velocities(&mut problem.body.contacts, equations.velocity)
     }
 
     /// The equations with the tolerance of solutions with points that yield.
