@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # The first word of a quantity in [check] and the table that it names, with the column of the name behind it.
 TABLES = {"history": "", "resultant": "source", "probe": "probe", "profile": "profile"}
 # Words of a quantity that only studies compute.
-OF_STUDIES = ("mean", "amplitude", "period")
+OF_STUDIES = ("mean", "amplitude", "period", "arrival")
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class Results:
     def quantity(self, name: str) -> float:
         """A number by its name in `[check]`, in SI units: `max_von_mises`, `history.COLUMN`, `probe.NAME.max.COLUMN`, ..
 
-        Means over time, amplitudes and periods are quantities of `clarke.sweep`.
+        Means over time, amplitudes, periods and arrivals are quantities of `clarke.sweep`.
         """
         word, _, rest = name.partition(".")
         if word not in TABLES:

@@ -154,7 +154,7 @@ def _unit(response: str, is_plane: bool) -> str:
     word, _, rest = WINDOW.sub("", response).partition(".")
     if word not in TABLES:
         return declared.unit("summary.json", response.split(".")[-1], is_plane)
-    if ".period." in rest:
+    if ".period." in rest or ".arrival." in rest:
         return "s"
     file = "history.csv" if word == "history" else f"{word}s.csv"
     return declared.unit(file, rest.rpartition(".")[2], is_plane)

@@ -3,13 +3,16 @@
 use super::{columns::RunTable, field_list::FIELDS, resultants::source_names};
 use crate::{job::Job, laws::nearest::nearest};
 
+/// What is formed of the values of a run.
+const OVER_TIME: [&str; 6] = ["max", "min", "mean", "amplitude", "period", "arrival"];
+
 /// A quantity of a table, by its name.
 pub(crate) struct TableQuantity<'a> {
     /// The table.
     pub table: &'static RunTable,
     /// The probe, source or boundary, which may contain dots; absent for a table without names.
     pub of: Option<&'a str>,
-    /// The extremum, `mean`, `amplitude`, `period` or `first`.
+    /// The extremum, `mean`, `amplitude`, `period`, `arrival` or `first`.
     pub side: Option<&'a str>,
     /// The column.
     pub column: &'a str,
@@ -23,9 +26,7 @@ impl<'a> TableQuantity<'a> {
         let (before, column) = rest.rsplit_once('.').unwrap_or(("", rest));
         let (of, side) = match before.rsplit_once('.') {
             _ if table.keys.is_empty() => (None, Some(before).filter(|side| !side.is_empty())),
-            Some((of, side @ ("max" | "min" | "mean" | "amplitude" | "period" | "first"))) => {
-                (Some(of), Some(side))
-            }
+            Some((of, side)) if side == "first" || OVER_TIME.contains(&side) => (Some(of), Some(side)),
             _ => (Some(before), None),
         };
         Some(Self { table, of, side, column })
@@ -33,12 +34,12 @@ impl<'a> TableQuantity<'a> {
 
     /// Whether there may be a name, and the table has this side.
     fn has_form(&self) -> bool {
-        let sides: &[Option<&str>] = if self.table.word == "profile" {
-            &[Some("max"), Some("min"), Some("first")]
-        } else {
-            &[None, Some("max"), Some("min"), Some("mean"), Some("amplitude"), Some("period")]
+        let has_side = match self.side {
+            None => self.table.word != "profile",
+            Some(side) if self.table.word == "profile" => ["max", "min", "first"].contains(&side),
+            Some(side) => OVER_TIME.contains(&side),
         };
-        sides.contains(&self.side) && self.of != Some("")
+        has_side && self.of != Some("")
     }
 }
 
@@ -99,7 +100,7 @@ const OBJECTS: [(&str, &[&str]); 6] = [
 /// What names a quantity.
 const FORMS: &str = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
                      resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also history.max.COLUMN and \
-                     resultant.SOURCE.max.COLUMN; .min., .mean., .amplitude. or .period. in place of .max., of profiles .min. or .first.)";
+                     resultant.SOURCE.max.COLUMN; .min., .mean., .amplitude., .period. or .arrival. in place of .max., of profiles .min. or .first.)";
 
 /// A job whose runs have quantities.
 #[derive(Clone, Copy)]
@@ -264,6 +265,7 @@ on = 'bottom'
             "probe.middle.velocity_y",
             "probe.middle.amplitude.displacement_x",
             "history.period.kinetic_energy",
+            "probe.middle.arrival.velocity_x",
             "resultant.support left.moment_z",
             "resultant.contact bottom.max.largest_pressure",
             "profile.bottom.first.contact_pressure",
@@ -295,6 +297,7 @@ on = 'bottom'
                 "the job has nothing that gives `profile.bottom.max.gap` a value",
                 "it may be x",
             ),
+            ("profile.bottom.arrival.contact_pressure", "is not a quantity", "profile.BOUNDARY.max.COLUMN"),
             ("profile.bottom.contact_pressure", "is not a quantity", "profile.BOUNDARY.max.COLUMN"),
             ("history.", "there is no quantity", "it may be step"),
             ("", "is not a quantity", "history.COLUMN"),

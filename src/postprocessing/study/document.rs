@@ -190,7 +190,8 @@ pub struct Response {
     /// probe.NAME.COLUMN or resultant.SOURCE.COLUMN at the end; history.max.COLUMN, probe.NAME.max.COLUMN or
     /// resultant.SOURCE.max.COLUMN over all steps; profile.BOUNDARY.max.COLUMN over the boundary at the end. .min. and, of profiles,
     /// .first. in place of .max. Also, of histories, probes and resultants, .mean. over time, .amplitude., half of the difference
-    /// between maximum and minimum, and .period. in s, the mean time between crossings of the mean in the same direction. Probes and profiles are those of the base job.
+    /// between maximum and minimum, .period. in s, the mean time between crossings of the mean in the same direction, and .arrival. in s,
+    /// the time at which the magnitude first reaches a hundredth of its largest. Probes and profiles are those of the base job.
     #[schemars(length(min = 1), example = "probe.tip.displacement_y")]
     pub of: String,
     /// Start of a window of time: only steps that end in it count. Of histories, probes and resultants. Absent: the start of the run.

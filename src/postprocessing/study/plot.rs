@@ -223,7 +223,8 @@ pub(super) fn unit_of_response(name: &str, dimension: usize) -> &'static str {
     // Without a window of time.
     let name = name.split(" (").next().unwrap_or(name);
     let (source, column) = (name.split('.').next(), name.rsplit('.').next().unwrap_or(name));
-    if TableQuantity::parse(name).is_some_and(|quantity| quantity.side == Some("period")) {
+    if TableQuantity::parse(name).is_some_and(|quantity| matches!(quantity.side, Some("period" | "arrival")))
+    {
         return "s";
     }
     if let Some(table) = source.and_then(RunTable::of) {

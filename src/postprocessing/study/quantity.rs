@@ -9,6 +9,8 @@ use std::path::Path;
 
 /// Relative distance of a time to the bounds of a window at which it is still inside, because ends of steps are rounded.
 const ROUNDING: f64 = 1e-9;
+/// Share of the largest magnitude of values at which they have arrived.
+const ARRIVED: f64 = 0.01;
 
 /// A window of simulated time in s; an absent bound is that of the run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -36,20 +38,20 @@ impl Window {
 pub(super) enum RunQuantity {
     /// Its value.
     Number(f64),
-    /// The values do not oscillate, so that they have no period.
-    NoPeriod,
+    /// There is no such time: the values do not oscillate, or are all 0.
+    NoTime,
 }
 
 /// The quantity in the output folder of a run, if it exists.
 ///
 /// A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table: `history.COLUMN`,
 /// `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN`, `.min.` or `.first.` over the
-/// boundary or at its first point, at the last output. With `.max.`, `.min.`, `.mean.`, `.amplitude.` or `.period.` before the column,
-/// the others are over all steps.
+/// boundary or at its first point, at the last output. With `.max.`, `.min.`, `.mean.`, `.amplitude.`, `.period.` or `.arrival.`
+/// before the column, the others are over all steps.
 pub fn quantity(folder: &Path, name: &str) -> Option<f64> {
     match quantity_in(folder, name, Window::default())? {
         RunQuantity::Number(number) => Some(number),
-        RunQuantity::NoPeriod => None,
+        RunQuantity::NoTime => None,
     }
 }
 
@@ -67,18 +69,20 @@ pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<R
         let rows = times.iter().zip(numbers(field)?).filter(|(time, _)| Some(*time) == times.last());
         return extreme(side?, rows.map(|(_, value)| value)).map(RunQuantity::Number);
     }
-    let is_over_time = matches!(side, Some("mean" | "period"));
+    let is_over_time = matches!(side, Some("mean" | "period" | "arrival"));
     if window.is_whole() && !is_over_time {
         return over_steps(side, &numbers(field)?).map(RunQuantity::Number);
     }
     let rows = numbers("time")?.into_iter().zip(numbers(field)?).filter(|(time, _)| window.contains(*time));
     let (times, values): (Vec<f64>, Vec<f64>) = rows.unzip();
-    if side == Some("period") {
-        let level = mean(&times, &values)?;
-        return Some(period(&times, &values, level).map_or(RunQuantity::NoPeriod, RunQuantity::Number));
-    }
-    let value = if side == Some("mean") { mean(&times, &values) } else { over_steps(side, &values) };
-    value.map(RunQuantity::Number)
+    let level = mean(&times, &values)?;
+    let time = match side {
+        Some("period") => period(&times, &values, level),
+        Some("arrival") => arrival(&times, &values),
+        Some("mean") => return Some(RunQuantity::Number(level)),
+        _ => return over_steps(side, &values).map(RunQuantity::Number),
+    };
+    Some(time.map_or(RunQuantity::NoTime, RunQuantity::Number))
 }
 
 /// The last value, an extremum or the amplitude.
@@ -89,6 +93,17 @@ fn over_steps(side: Option<&str>, values: &[f64]) -> Option<f64> {
         Some("amplitude") => Some((side_of("max")? - side_of("min")?) / 2.0),
         Some(side) => side_of(side),
     }
+}
+
+/// The time at which values, linear between the times, first reach a hundredth of their largest magnitude; `None` if all are 0.
+fn arrival(times: &[f64], values: &[f64]) -> Option<f64> {
+    let level = ARRIVED * values.iter().map(|value| value.abs()).reduce(larger)?;
+    let at = values.iter().position(|value| level > 0.0 && value.abs() >= level)?;
+    let Some(before) = at.checked_sub(1) else {
+        return times.first().copied();
+    };
+    let [low, high] = [before, at].map(|at| values[at].abs());
+    Some(times[before] + (times[at] - times[before]) * (level - low) / (high - low))
 }
 
 /// The mean over time of values that are linear between the times.
@@ -206,6 +221,26 @@ mod tests {
     }
 
     #[test]
+    fn values_arrive_where_they_reach_a_hundredth_of_their_largest_magnitude() {
+        let folder = tempfile::tempdir().expect("folder");
+        let text = "step,time,work,rest\n1,1,0,0\n2,2,-0.005,0\n3,4,-0.105,0\n4,5,1,0\n5,6,-3,0\n";
+        std::fs::write(folder.path().join("history.csv"), text).expect("written");
+        let value = |name: &str, from: Option<f64>, to: Option<f64>| {
+            quantity_in(folder.path(), name, Window { from, to })
+        };
+        for (from, to, expected) in
+            [(None, None, 2.5), (None, Some(4.0), 1.21), (Some(4.0), None, 4.0), (Some(4.0), Some(5.0), 4.0)]
+        {
+            let Some(RunQuantity::Number(found)) = value("history.arrival.work", from, to) else {
+                panic!("no arrival from {from:?} to {to:?}")
+            };
+            assert!((found - expected).abs() < 1e-12, "{found} from {from:?} to {to:?}");
+        }
+        assert_eq!(value("history.arrival.rest", None, None), Some(RunQuantity::NoTime));
+        assert_eq!(value("history.arrival.work", Some(7.0), None), None, "no steps");
+    }
+
+    #[test]
     fn a_period_is_that_between_crossings_of_the_mean_in_a_window() {
         let folder = tempfile::tempdir().expect("folder");
         let rows = (0..40_i32).map(|n| {
@@ -219,12 +254,8 @@ mod tests {
             quantity_in(folder.path(), "history.period.work", Window { from, to })
         };
         assert_eq!(value(Some(5.0), None), Some(RunQuantity::Number(2.0)));
-        assert_eq!(
-            value(None, None),
-            Some(RunQuantity::NoPeriod),
-            "the jump crosses the mean of the run once"
-        );
-        assert_eq!(value(None, Some(4.0)), Some(RunQuantity::NoPeriod), "nothing moves");
+        assert_eq!(value(None, None), Some(RunQuantity::NoTime), "the jump crosses the mean of the run once");
+        assert_eq!(value(None, Some(4.0)), Some(RunQuantity::NoTime), "nothing moves");
         assert_eq!(value(Some(20.0), None), None, "no steps");
         assert_eq!(quantity(folder.path(), "history.period.work"), None);
         assert_eq!(quantity(folder.path(), "history.period.nothing"), None);

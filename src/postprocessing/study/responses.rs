@@ -13,9 +13,9 @@ use crate::{
 };
 use std::path::Path;
 
-/// Marks of responses: that a run has the quantity with a value, or without one because its values do not oscillate.
+/// Marks of responses: that a run has the quantity with a value, or without one because its values do not oscillate or are all 0.
 const VALUE: f64 = 1.0;
-const NO_PERIOD: f64 = 2.0;
+const NO_TIME: f64 = 2.0;
 
 /// Adds the responses of the completed runs; a quantity that a run does not have is an error of this run. Collective.
 pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
@@ -31,7 +31,7 @@ pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
             let (mark, value) = match value {
                 None => continue,
                 Some(RunQuantity::Number(value)) => (VALUE, value),
-                Some(RunQuantity::NoPeriod) => (NO_PERIOD, 0.0),
+                Some(RunQuantity::NoTime) => (NO_TIME, 0.0),
             };
             found[place(at, name)] = mark;
             found[place(at, name) + 1] = value;
@@ -42,12 +42,14 @@ pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
         let mark = |name: usize| found[place(at, name)];
         let value = |name: usize| (mark(name) == VALUE).then(|| found[place(at, name) + 1]);
         run.response = (0..names.len()).map(value).collect();
-        let still = names.iter().enumerate().filter(|(name, _)| mark(*name) == NO_PERIOD);
+        let still = names.iter().enumerate().filter(|(name, _)| mark(*name) == NO_TIME);
         run.notes.extend(still.map(|(_, response)| {
-            format!(
-                "`{}` has no period: its values cross their mean less than twice in the same direction",
-                response.name()
-            )
+            let why = if response.of.contains(".arrival.") {
+                "arrival: its values are all 0"
+            } else {
+                "period: its values cross their mean less than twice in the same direction"
+            };
+            format!("`{}` has no {why}", response.name())
         }));
         let missing = names.iter().enumerate().find(|(name, _)| mark(*name) == 0.0);
         if let Some((_, response)) = missing.filter(|_| run.status == "completed" && run.error.is_none()) {
