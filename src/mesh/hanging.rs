@@ -39,9 +39,12 @@ pub(super) fn refuse_hanging_nodes<const D: usize>(
         let mut carrier = 0;
         let hangs = tree.around(point, |facet| {
             carrier = facet as usize;
-            !mesh.facets[carrier].contains(&node)
-                && touches(point, &mesh.facet_corners(carrier))
-                && !names.is_of_another_surface(node, carrier)
+            let nodes = &mesh.facets[carrier];
+            !nodes.contains(&node)
+                && around(point, &mesh.facet_corners(carrier)).is_some_and(|corners| {
+                    let near = nodes.iter().zip(corners).filter(|(_, is_near)| *is_near);
+                    !names.is_of_another_surface(node, carrier, near.map(|(near, _)| *near))
+                })
         });
         if hangs {
             return Err(Error::Refused(format!(
@@ -57,8 +60,8 @@ pub(super) fn refuse_hanging_nodes<const D: usize>(
     Ok(())
 }
 
-/// Whether a point lies on a facet, away from its corners.
-fn touches<const D: usize>(point: &Vector<D>, corners: &[Vector<D>; D]) -> bool {
+/// If a point lies on a facet, away from its corners, for each corner whether it bounds the facet or edge on which the point lies.
+fn around<const D: usize>(point: &Vector<D>, corners: &[Vector<D>; D]) -> Option<[bool; D]> {
     let length = longest_edge(corners);
     let edge = |i: usize| add_scaled(&corners[i], -1.0, &corners[0]);
     let offset = add_scaled(point, -1.0, &corners[0]);
@@ -78,5 +81,7 @@ fn touches<const D: usize>(point: &Vector<D>, corners: &[Vector<D>; D]) -> bool 
     for (i, share) in share.iter().enumerate().skip(1) {
         distance = add_scaled(&distance, -share, &edge(i));
     }
-    norm(&distance) <= TOUCHING * length && share.iter().all(|s| (-TOUCHING..1.0 - TOUCHING).contains(s))
+    let touches =
+        norm(&distance) <= TOUCHING * length && share.iter().all(|s| (-TOUCHING..1.0 - TOUCHING).contains(s));
+    touches.then(|| share.map(|s| s > TOUCHING))
 }

@@ -30,9 +30,17 @@ impl SurfaceNames {
         differ(&self.of_nodes[a as usize], &self.of_nodes[b as usize])
     }
 
-    /// Whether a node on a facet is one of another surface.
-    pub(super) fn is_of_another_surface(&self, node: u32, facet: usize) -> bool {
-        differ(&self.of_nodes[node as usize], &self.of_facets[facet])
+    /// Whether a node on a facet, on its part between these of its nodes, is one of another surface: that part may be an edge of the
+    /// facet and of a boundary.
+    pub(super) fn is_of_another_surface(
+        &self,
+        node: u32,
+        facet: usize,
+        between: impl Iterator<Item = u32>,
+    ) -> bool {
+        let of_node = &self.of_nodes[node as usize];
+        let shared = between.map(|near| self.of_nodes[near as usize].clone()).reduce(|a, b| &a & &b);
+        differ(of_node, &self.of_facets[facet]) || shared.is_some_and(|shared| differ(of_node, &shared))
     }
 }
 

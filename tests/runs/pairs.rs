@@ -198,6 +198,113 @@ fn uniform_stress_passes_through_meshes_that_do_not_match() {
     }
 }
 
+/// Two blocks of tetrahedra with meshes that do not match, one on the other along a plane that is perpendicular to no axis; all their facets
+/// are at odd angles but those on the sides, of which that at the right and that at the back have no name.
+fn write_tilted_blocks(path: &Path, [along_x, along_y]: [f64; 2]) {
+    let (mut nodes, mut facets, mut cells) = (String::new(), Vec::new(), Vec::new());
+    let mut count = 0;
+    for (block, [nx, ny, nz]) in [(0, [3, 4, 2]), (1, [5, 3, 2])] {
+        let first = count + 1;
+        let at = |i: usize, j: usize, k: usize| first + i + (nx + 1) * (j + (ny + 1) * k);
+        for (k, j, i) in (0..=nz).flat_map(|k| (0..=ny).flat_map(move |j| (0..=nx).map(move |i| (k, j, i)))) {
+            let [u, v, w] = [(i, nx), (j, ny), (k, nz)].map(|(at, of)| at as f64 / of as f64);
+            let turn = block as f64;
+            let x = u + 0.06 * u * (1.0 - u) * (2.3 * v + turn).sin();
+            let y = v + 0.05 * v * (1.0 - v) * (1.7 * u - turn).sin();
+            let middle = 0.5 + along_x * (x - 0.5) + along_y * (y - 0.5);
+            let z = if block == 0 { middle * w } else { middle + (1.0 - middle) * w };
+            count += 1;
+            nodes += &format!("{count} {x:?} {y:?} {z:?}\n");
+        }
+        for (i, j, k) in (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k)))) {
+            for [a, b, c] in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+                let mut corner = [i, j, k];
+                let mut nodes = vec![at(i, j, k)];
+                for axis in [a, b, c] {
+                    corner[axis] += 1;
+                    nodes.push(at(corner[0], corner[1], corner[2]));
+                }
+                // Of an odd permutation.
+                if (a + 1) % 3 != b {
+                    nodes.swap(2, 3);
+                }
+                cells.push((9 + block, nodes));
+            }
+        }
+        let mut side = |name: usize, [p, q, r, s]: [usize; 4]| {
+            facets.push((4 * block + name, vec![p, q, r]));
+            facets.push((4 * block + name, vec![p, r, s]));
+        };
+        for i in 0..nx {
+            for j in 0..ny {
+                side(1, [at(i, j, 0), at(i + 1, j, 0), at(i + 1, j + 1, 0), at(i, j + 1, 0)]);
+                side(2, [at(i, j, nz), at(i + 1, j, nz), at(i + 1, j + 1, nz), at(i, j + 1, nz)]);
+            }
+        }
+        for k in 0..nz {
+            (0..ny)
+                .for_each(|j| side(3, [at(0, j, k), at(0, j + 1, k), at(0, j + 1, k + 1), at(0, j, k + 1)]));
+            (0..nx)
+                .for_each(|i| side(4, [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 0, k + 1), at(i, 0, k + 1)]));
+        }
+    }
+    let mut text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n10\n".to_owned();
+    for (block, name) in ["lower", "upper"].iter().enumerate() {
+        let sides = ["bottom", "top", "left", "front"].iter().enumerate();
+        sides.for_each(|(at, side)| text += &format!("2 {} \"{name}.{side}\"\n", 4 * block + at + 1));
+        text += &format!("3 {} \"{name}\"\n", 9 + block);
+    }
+    let total = facets.len() + cells.len();
+    text += &format!("$EndPhysicalNames\n$Nodes\n{count}\n{nodes}$EndNodes\n$Elements\n{total}\n");
+    for (number, (group, nodes)) in facets.iter().chain(&cells).enumerate() {
+        let nodes = nodes.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let kind = if nodes.len() == 3 { 2 } else { 4 };
+        text += &format!("{} {kind} 2 {group} {group} {}\n", number + 1, nodes.join(" "));
+    }
+    std::fs::write(path, text + "$EndElements\n").expect("written");
+}
+
+#[test]
+fn uniform_stress_passes_through_tilted_meshes_with_opposite_forces_and_moments() {
+    let slopes = [0.1, 0.07];
+    // Of the stress of -5 Pa along z.
+    let pressure = 5.0 / (1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1]);
+    for (order, side, ranks) in [("1", "on", 1), ("1", "against", 2), ("2", "on", 2), ("2", "against", 1)] {
+        let case = cubes()
+            .without("mesh.box")
+            .set("mesh.file", "'blocks.msh'")
+            .without("region")
+            .set("material.elasticity.poisson_ratio", "0.0")
+            .set("support", "[{ on = ['lower.bottom'], fix = 'all' }]")
+            .set("contact.0.friction", "{ coulomb = { coefficient = 2 } }")
+            .set("contact.0.side", &format!("'{side}'"))
+            .set("output.profile", "[{ on = 'upper.bottom' }, { on = 'lower.top' }]")
+            .set("mesh.order", order)
+            .without("check");
+        write_tilted_blocks(&case.folder().join("blocks.msh"), slopes);
+        let case = case.run_and_keep(ranks);
+        let results = case.results();
+        for found in pressures(&results) {
+            let off = found - pressure;
+            assert!(off.abs() < 1e-10, "order {order}, side {side}: {found} Pa, {off:e} off");
+        }
+        let table = results.table("resultants.csv");
+        for column in ["force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"] {
+            let [on, against] = ["contact upper.bottom", "against lower.top"]
+                .map(|source| *table.only("source", source).numbers(column).last().expect("a row"));
+            assert!((on + against).abs() < 1e-10, "order {order}, side {side}: {column} {on} and {against}");
+        }
+        let table = table.only("source", "contact upper.bottom");
+        // The whole stress passes: 5 N through the area of 1 m2 seen from above, in its middle.
+        for (column, expected) in
+            [("force_x", 0.0), ("force_z", 5.0), ("moment_x", 2.5), ("moment_y", -2.5), ("moment_z", 0.0)]
+        {
+            let found = *table.numbers(column).last().expect("a row");
+            assert!((found - expected).abs() < 1e-10, "order {order}, side {side}: {column} {found}");
+        }
+    }
+}
+
 /// The integral over x of a column of the last profile along a boundary, by the rule that contact has there: of linear cells the trapezoidal
 /// rule, of quadratic ones Simpson's.
 fn integral(results: &Results, (boundary, column): (&str, &str), order: &str) -> f64 {
