@@ -2,11 +2,12 @@
 
 use super::{
     Boundary, GlobalMesh,
-    shape::{centroid, facet_of},
+    shape::{centroid, facet_normal, facet_of},
     tags::place,
 };
 use crate::error::{Error, Result};
 use crate::job::number_of_group;
+use crate::linear_algebra::tensor::{Vector, add_scaled, norm};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// The name of the boundary on the other side of a fault.
@@ -145,24 +146,47 @@ impl<'a, const D: usize> Fault<'a, D> {
         self.facets[facet].iter().any(|node| self.split.contains_key(node))
     }
 
-    /// For each group of sides, whether it carries the law: in each connected part, the side of the first facet does.
-    fn carriers(&self) -> HashMap<usize, bool> {
-        let mut carries: HashMap<usize, bool> = HashMap::new();
+    /// For each group of sides, whether it carries the law: in each connected part, the side below the other one does. That of the first
+    /// facet does where neither is.
+    fn carriers(&self, mesh: &GlobalMesh<D>) -> HashMap<usize, bool> {
+        // The two groups of each part, that of its first facet first, and the sum of the outward normals of its facets.
+        let mut parts: Vec<([usize; 2], Vector<D>)> = Vec::new();
         for facet in 0..self.facets.len() {
             let [first, second] = [0, 1].map(|side| self.group([facet, side]));
-            let known = carries.get(&first).copied().or_else(|| carries.get(&second).map(|carries| !carries));
-            let first_carries = known.unwrap_or(true);
-            carries.insert(first, first_carries);
-            carries.insert(second, !first_carries);
+            let normal = facet_normal(&mesh.corners_of(self.cells[facet][0]));
+            match parts.iter_mut().find(|(groups, _)| groups.contains(&first) || groups.contains(&second)) {
+                Some((groups, sum)) => {
+                    let sign = if groups[0] == first || groups[1] == second { 1.0 } else { -1.0 };
+                    *sum = add_scaled(sum, sign, &normal);
+                }
+                None => parts.push(([first, second], normal)),
+            }
         }
-        carries
+        let sides = parts.into_iter().flat_map(|([first, second], normal)| {
+            let first_carries = !points_down(&normal);
+            [(first, first_carries), (second, !first_carries)]
+        });
+        sides.collect()
     }
 }
 
+/// Whether the last component of a normal that is not rounding is negative.
+fn points_down<const D: usize>(normal: &Vector<D>) -> bool {
+    let rounding = 1e-9 * norm(normal);
+    normal.iter().rev().find(|component| component.abs() > rounding).is_some_and(|component| *component < 0.0)
+}
+
 impl<const D: usize> GlobalMesh<D> {
+    /// The corners of the facet of a cell opposite to one of its nodes.
+    fn corners_of(&self, (cell, opposite): (usize, usize)) -> [Vector<D>; D] {
+        facet_of::<D>(&self.cells[cell * (D + 1)..(cell + 1) * (D + 1)], opposite)
+            .map(|node| self.nodes[node as usize])
+    }
+
     /// Splits the mesh along the facets inside the body that have this name: their nodes become two, except on the edge of the surface
-    /// inside the body, where cells stay joined. The sides become two boundaries: one with this name, and [`other_side`]. Refused where
-    /// the surface branches, meets another fault, has one side only, or has no node that can become two.
+    /// inside the body, where cells stay joined. The sides become two boundaries: that below the surface, left of a vertical one, has this
+    /// name, the other one that of [`other_side`]. Refused where the surface branches, meets another fault, has one side only, or has no
+    /// node that can become two.
     pub fn split_along(&mut self, name: &str) -> Result<()> {
         let named = |name: &str| self.inner_groups.iter().position(|group| group.name == name);
         let Some(at) = named(name).or_else(|| named(number_of_group(name)?)) else { return Ok(()) };
@@ -172,7 +196,7 @@ impl<const D: usize> GlobalMesh<D> {
             return Err(Error::Refused(format!("the fault \"{name}\", around {place}, meets another fault")));
         }
         let fault = Fault::new(self, name, facets)?;
-        let carriers = fault.carriers();
+        let carriers = fault.carriers(self);
         let carries = |side: Side| carriers[&fault.group(side)];
         self.double_nodes(&fault, carries);
         self.add_sides(&fault, carries);
@@ -307,6 +331,39 @@ mod tests {
         assert_eq!(split(with_fault(cube(), |x| x[2] == 0.5)), [9, 8, 8]);
         // One half of the plane: its edge inside the body stays whole.
         assert_eq!(split(with_fault(cube(), |x| x[2] == 0.5 && x[0] <= 0.5)), [3, 4, 4]);
+    }
+
+    /// The sum of the outward normals of the side that has the name of the fault, of a mesh and of that with its cells in reverse order.
+    fn outward<const D: usize>(mesh: &GlobalMesh<D>) -> [Vector<D>; 2] {
+        let mut reversed = mesh.clone();
+        reversed.cells = mesh.cells.chunks_exact(D + 1).rev().flatten().copied().collect();
+        let last = reversed.cells.len() / (D + 1) - 1;
+        reversed.facet_cells.iter_mut().for_each(|cell| *cell = last as u32 - *cell);
+        [mesh.clone(), reversed].map(|mut mesh| {
+            mesh.split_along("fault").unwrap();
+            let own = mesh.boundaries.iter().find(|boundary| boundary.name == "fault").unwrap();
+            let normals = own.facets.iter().map(|facet| facet_normal(&mesh.facet_corners(*facet as usize)));
+            normals.fold([0.0; D], |sum, normal| add_scaled(&sum, 1.0, &normal))
+        })
+    }
+
+    #[test]
+    fn the_side_below_or_left_of_a_fault_has_its_name_in_any_order_of_cells() {
+        let square = rectangle([1.0, 1.0], [4, 4], Diagonal::Left, [1.0; 2]).unwrap();
+        for (on_it, expected) in [
+            ((|x| x[1] == 0.5) as fn(&[f64; 2]) -> bool, [0.0, 1.0]),
+            (|x| x[0] == 0.5, [1.0, 0.0]),
+            // A fault that falls to the right.
+            (|x| x[0] + x[1] == 1.0, [1.0, 1.0]),
+        ] {
+            assert_eq!(outward(&with_fault(square.clone(), on_it)), [expected; 2]);
+        }
+        let cube = || box_mesh([1.0; 3], [2, 2, 2], [1.0; 3]).unwrap();
+        assert_eq!(outward(&with_fault(cube(), |x| x[2] == 0.5)), [[0.0, 0.0, 1.0]; 2]);
+        assert_eq!(outward(&with_fault(cube(), |x| x[1] == 0.5)), [[0.0, 1.0, 0.0]; 2]);
+        // Two faults: each has its lower side.
+        let two = with_fault(square, |x| x[1] == 0.25 || x[1] == 0.75);
+        assert_eq!(outward(&two), [[0.0, 2.0]; 2]);
     }
 
     #[test]

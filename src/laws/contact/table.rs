@@ -69,8 +69,10 @@ impl Side {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// The names of the boundaries.
-    #[schemars(length(min = 1), example = ["bottom"])]
+    /// The names of the boundaries. A named line, in 3D a named surface, inside the body of a mesh file is a fault: the mesh is split along
+    /// it, except at its ends. Tractions and profiles know its two sides by its own name, the side below, left of a vertical fault, and
+    /// by "other side of" and its name.
+    #[schemars(length(min = 1), example = ["bottom"], example = ["fault"])]
     pub on: Vec<String>,
     /// The names of the boundaries of other bodies that the boundaries `on` may touch, instead of a rigid obstacle. The law acts at nodes
     /// of one side, which `side` chooses, on their velocity and displacement relative to the surface that they face along their normals in
