@@ -264,7 +264,8 @@ pub fn error_of_mesh<const D: usize, const S: usize>(
         let stress = body.stress_at_points(state)?;
         ErrorIndicator::new(session, body)?.of(session, body, &stress)
     };
-    Ok(Some((SAFETY_OF_INDICATOR * session.agree(indicated())?.relative).min(1.0)))
+    let relative = SAFETY_OF_INDICATOR * session.agree(indicated())?.relative;
+    Ok(Some(relative.clamp(job.solver.tolerance, 1.0)))
 }
 
 /// Whether a body with these energies vibrates.

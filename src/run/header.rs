@@ -141,10 +141,11 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
 /// Logs the estimated errors, and what half of them would take.
 fn errors(log: &mut Log, summary: &Summary) {
     let Errors { error_of_mesh, vibrates, error_of_steps, order_of_steps } = summary.errors;
-    let percent = |error: f64| {
-        let unit = 10f64.powf(error.log10().floor() - 1.0);
-        format!("{} %", Digits(100.0 * (error / unit).round() * unit))
+    let two_digits = |number: f64| {
+        let unit = 10f64.powf(number.log10().floor() - 1.0);
+        Digits((number / unit).round() * unit)
     };
+    let percent = |error: f64| format!("{} %", two_digits(100.0 * error));
     if let Some(error) = error_of_mesh {
         let (least, waves) = if vibrates {
             ("at least ", ": the body vibrates, and errors of waves add to it")
@@ -158,7 +159,7 @@ fn errors(log: &mut Log, summary: &Summary) {
         log.line(format!(
             "errors     by the steps {} of stress and velocity at the end; half of it takes {} times as many steps",
             percent(error),
-            Digits(times)
+            two_digits(times)
         ));
     }
 }

@@ -89,7 +89,10 @@ fn arriving(place: f64, [block, plate]: [&str; 2]) -> Case {
             {{ name = 'plate', corner = [0.0, -0.1], size = [0.6, 0.1], cells = [8, 1] }},
          ]
          material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0.0 }} }}
-         support = [{{ on = ['block.top'], velocity = {block} }}, {{ on = ['plate.bottom'], velocity = {plate} }}]
+         support = [
+            {{ on = ['block.top'], fix = 'all', velocity = {block} }},
+            {{ on = ['plate.bottom'], fix = 'all', velocity = {plate} }},
+         ]
          contact = [{{ on = ['block.bottom'], against = ['plate.top'], sliding = 'finite', normal.unilateral = {{}} }}]
          time = {{ end = 2.0, step = 0.05, scheme = 'implicit_euler' }}"
     ))

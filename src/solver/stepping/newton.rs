@@ -73,6 +73,9 @@ const MAX_FIXED_POINT_ITERATIONS: usize = 200;
 
 const NO_MINIMUM: &str = "no minimum of the energy was found";
 
+/// Fallbacks that are tried before a body that contact alone holds starts from elsewhere: without any pressure, the equations are singular.
+const FIRST_FALLBACKS: usize = 2;
+
 impl Newton {
     /// Newton's method for unknowns with the layout of `like`.
     pub(super) fn new<const D: usize>(
@@ -125,7 +128,8 @@ impl Newton {
         }
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let mut failure = String::new();
-        for fallback in conditions.fallbacks() {
+        let most = if system.is_first_try { FIRST_FALLBACKS } else { usize::MAX };
+        for fallback in conditions.fallbacks().take(most) {
             loop {
                 self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
                 match fallback.search {

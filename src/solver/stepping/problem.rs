@@ -50,6 +50,8 @@ pub(super) struct System<'a> {
     pub tolerance: f64,
     /// The residual that rounding errors leave.
     pub floor: Floor,
+    /// Whether the step is tried from another start, too, if few fallbacks do not solve it.
+    pub is_first_try: bool,
     /// The velocity of the converged state.
     pub converged: &'a DistributedVector,
     /// The parameters of each contact's graphs, along the normal and of friction: equal to the resistance of the body to motions of

@@ -55,6 +55,8 @@ pub(super) struct StepSolver {
     matrix_norm: f64,
     /// The velocity from which a step with a factor in single precision was started.
     start: Option<DistributedVector>,
+    /// The velocity from which the last step was first started in which contact alone holds a body.
+    first_start: Option<DistributedVector>,
     /// Products with the matrix since the count of traffic was restarted, without those of PETSc's Krylov solver for linear steps.
     products: Cell<u64>,
     /// Matrices with preconditioners that are not in use.
@@ -94,6 +96,7 @@ impl StepSolver {
             prepared: None,
             matrix_norm: 0.0,
             start: None,
+            first_start: None,
             products: Cell::new(0),
             cache: None,
             springs: Springs::default(),

@@ -57,14 +57,22 @@ enum Change {
     FromSprings,
     /// The same, but moved as a rigid body to where the contacts bear the loads.
     OnContacts,
+    /// Where contact alone holds a body, the step starts as it did at first, with all fallbacks of Newton's method.
+    AllFallbacks,
     /// The tolerance is the residual that rounding errors of the solution leave.
     Relaxed,
 }
 
 impl Change {
     /// All changes in their order. Each attempt keeps those before.
-    const ALL: [Self; 5] =
-        [Self::Nothing, Self::DoublePrecision, Self::FromSprings, Self::OnContacts, Self::Relaxed];
+    const ALL: [Self; 6] = [
+        Self::Nothing,
+        Self::DoublePrecision,
+        Self::FromSprings,
+        Self::OnContacts,
+        Self::AllFallbacks,
+        Self::Relaxed,
+    ];
 }
 
 /// How accurately a step is solved, in N.
@@ -79,6 +87,8 @@ struct Accuracy {
     /// Whether that holds only after something is pressed on: where contact alone holds a body, a direction may be any rigid motion, whose
     /// rounding errors hide that nothing holds it.
     awaits_pressure: bool,
+    /// Whether few fallbacks of Newton's method are tried, because others start from elsewhere.
+    is_first_try: bool,
     /// The forces to which its residual is compared: not below those of which rounding errors are the tolerance.
     reference: f64,
 }
@@ -111,6 +121,12 @@ impl StepSolver {
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
         let mut accuracy = self.accuracy(problem, trial)?;
+        if self.springs.are_needed() {
+            match &mut self.first_start {
+                Some(start) => start.copy_from(trial)?,
+                none => none.insert(trial.like()?).copy_from(trial)?,
+            }
+        }
         let mut failure = None;
         for change in Change::ALL {
             if !self.apply(change, problem, trial, &mut accuracy)? {
@@ -160,10 +176,19 @@ impl StepSolver {
                     return Ok(false);
                 }
                 self.start_from_springs(problem, trial)?;
-                accuracy.awaits_pressure = false;
+                (accuracy.awaits_pressure, accuracy.is_first_try) = (false, false);
                 Ok(true)
             }
             Change::OnContacts => Ok(self.springs.are_needed() && self.start_on_contacts(problem, trial)?),
+            Change::AllFallbacks => {
+                let Some(start) = self.first_start.as_ref().filter(|_| self.springs.are_needed()) else {
+                    return Ok(false);
+                };
+                trial.copy_from(start)?;
+                restore_pressures(problem.body, problem.state)?;
+                accuracy.awaits_pressure = true;
+                Ok(true)
+            }
             Change::Relaxed => {
                 // The start value may be much smaller than the solution, especially at rest.
                 let mut solution = trial.like()?;
@@ -379,7 +404,15 @@ impl StepSolver {
         // No rounding errors of a flight.
         let far = if self.springs.are_needed() { farthest(problem) } else { f64::INFINITY };
         let floor = Floor { slope, largest: (LARGEST_FLOOR * all).max(STAGNANT * product).min(slope * far) };
-        Ok(Accuracy { tolerance, size: all, floor, awaits_pressure: self.springs.are_needed(), reference })
+        let is_held_by_contact = self.springs.are_needed();
+        Ok(Accuracy {
+            tolerance,
+            size: all,
+            floor,
+            awaits_pressure: is_held_by_contact,
+            is_first_try: is_held_by_contact,
+            reference,
+        })
     }
 
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
@@ -405,10 +438,10 @@ impl Accuracy {
         matrix: &'a dyn StepMatrix,
         scales: &'a [[f64; 2]],
     ) -> System<'a> {
-        let Self { tolerance, floor, awaits_pressure, .. } = self;
+        let Self { tolerance, floor, awaits_pressure, is_first_try, .. } = self;
         let floor = if awaits_pressure { Floor::default() } else { floor };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
-        System { matrix, right_hand_side, tolerance, floor, converged, scales }
+        System { matrix, right_hand_side, tolerance, floor, is_first_try, converged, scales }
     }
 }
 
