@@ -6,7 +6,7 @@ use crate::{
         coupling::{Coupling, add_between, seen_by_contacts},
         effect::{
             Contact, ContactNode, Effect, Energy, Evaluation, Heat, Outcome, Step, SurfaceEffect, Tangents,
-            Term, VISCOPLASTIC, contact_nodes,
+            Term, contact_nodes,
         },
         space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, nodal_forces, offsets},
     },
@@ -113,10 +113,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
             if !is_evaluated {
                 cells.evaluate(called, needs, batch, &mut outcome);
             }
-            let effects = cells.effects.iter();
-            effects.for_each(|effect| effect.add_step_energy(evaluation, step, batch, energy));
-            if !of_flow.is_empty() {
-                cells.add_energy_of_flow(step, batch, &mut of_flow);
+            for effect in cells.effects.iter() {
+                effect.add_step_energy(evaluation, step, batch, energy);
+                if !of_flow.is_empty()
+                    && let Some(taken) = effect.energy_of_flow(evaluation, step, batch)
+                {
+                    let of_cells = &mut of_flow[batch.first_cell..];
+                    of_cells.iter_mut().zip(&taken[..batch.count]).for_each(|(sum, taken)| *sum += taken);
+                }
             }
         });
         if let Some(heat) = &mut self.heat {
@@ -150,22 +154,6 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
         let needs = self.effects.iter().filter_map(|effect| effect.phases(self.evaluation).end);
         let called = Called::of(&*self.effects, self.evaluation, |p| p.end.is_some());
         (called, needs.reduce(Needs::or).unwrap_or_default())
-    }
-
-    /// Adds the energy in J that flow takes up in each cell of a batch in a solved step.
-    fn add_energy_of_flow(&self, step: Step, batch: &mut Batch<'_, D, S>, of_cells: &mut [f64]) {
-        let whole = batch.integrity.clone();
-        let flowing = self.effects.iter().filter(|effect| matches!(effect.term(), Term::Flow(_)));
-        for effect in flowing {
-            for lane in 0..batch.count {
-                batch.integrity = whole.clone();
-                batch.integrity.weaken(std::array::from_fn(|other| f64::from(u8::from(other == lane))));
-                let mut energy = Energy::default();
-                effect.add_step_energy(self.evaluation, step, batch, &mut energy);
-                of_cells[batch.first_cell + lane] += energy[VISCOPLASTIC];
-            }
-        }
-        batch.integrity = whole;
     }
 
     /// Lets the cells of a batch flow and be damaged at the end of a step.

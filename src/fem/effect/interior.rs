@@ -1,5 +1,8 @@
 use super::{Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, Term};
-use crate::fem::space::{Batch, Needs};
+use crate::{
+    fem::space::{Batch, Needs},
+    linear_algebra::simd::LANES,
+};
 
 /// Phases of a step in which an effect takes part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -79,6 +82,11 @@ pub trait Effect<const D: usize, const S: usize> {
     /// and the scheme's own terms of the elastic energy. The batch has the strains and elastic stresses before the step and after it,
     /// the strain rate, and what cells bear.
     fn add_step_energy(&self, _at: Evaluation, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
+
+    /// The energy in J that flow takes up in each cell of such a batch; `None` if nothing flows there.
+    fn energy_of_flow(&self, _at: Evaluation, _step: Step, _batch: &Batch<D, S>) -> Option<[f64; LANES]> {
+        None
+    }
 
     /// Adds the stress without viscosity at the end of a step that was solved and not yet committed, and the error that its trial
     /// histories make in this stress, given the histories before. Effects that weaken also weaken the batch as their trial history has it.

@@ -4,15 +4,15 @@
 //! finds: what does not yield keeps `H_n = H_{n-1}`. A cell that did not flow in the step before starts with implicit Euler, as a run
 //! does.
 
-use super::{VISCOPLASTIC, ViscoplasticFlow, beyond_back_stress};
+use super::{ViscoplasticFlow, beyond_back_stress};
 use crate::{
     fem::{
-        effect::{Blend, Energy, NUMERICAL, Outcome, Step},
+        effect::{Blend, Outcome, Step},
         space::Batch,
     },
     laws::material::{Extrapolated, Flow, FlowLaw, Isotropic, Tangent},
     linear_algebra::{
-        simd::{LANES, Pack, sum},
+        simd::{LANES, Pack},
         tensor::{Mandel, add_scaled, dot},
     },
 };
@@ -75,16 +75,16 @@ impl<const S: usize> ViscoplasticFlow<S> {
         }
     }
 
-    /// Adds the dissipation of flow in a solved step, and the numerical terms of the scheme.
-    pub(super) fn add_energy_of_implicit_flow<const D: usize>(
+    /// The dissipation of flow in a solved step, and the numerical terms of the scheme, in each cell of a batch.
+    pub(super) fn energies_of_implicit_flow<const D: usize>(
         &self,
         blend: Blend,
         step: Step,
         batch: &Batch<D, S>,
-        energy: &mut Energy,
-    ) {
-        let Some(law) = self.laws.get(batch.material) else { return };
-        let Some(histories) = self.stress.both(batch.number) else { return };
+    ) -> [[f64; LANES]; 2] {
+        let none = [[0.0; LANES]; 2];
+        let Some(law) = self.laws.get(batch.material) else { return none };
+        let Some(histories) = self.stress.both(batch.number) else { return none };
         let taken = Taken {
             elasticity: law.elasticity(),
             length: step.length,
@@ -94,9 +94,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
         let strains = [&batch.strain_before, &batch.strain, &batch.strain_rate];
         let share = batch.integrity.shares();
         let weights = std::array::from_fn(|lane| share[lane] * batch.cells.volume[lane]);
-        let [viscoplastic, numerical] = energies(&taken, strains, histories, &weights);
-        energy[VISCOPLASTIC] += viscoplastic;
-        energy[NUMERICAL] += numerical;
+        energies(&taken, strains, histories, &weights)
     }
 }
 
@@ -111,7 +109,7 @@ struct Taken<'a> {
     least: f64,
 }
 
-/// The energy that cells of these weights dissipate, and the terms of the scheme, given the strains before and after the step and its
+/// The energies that cells of these weights dissipate, and the terms of the scheme, given the strains before and after the step and its
 /// rate, and converged and trial histories.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn energies<const S: usize>(
@@ -119,7 +117,7 @@ fn energies<const S: usize>(
     [strain_before, strain, rate]: [&Pack<S>; 3],
     [converged, trial]: [&Pack<S>; 2],
     weights: &[f64; LANES],
-) -> [f64; 2] {
+) -> [[f64; LANES]; 2] {
     let Taken { elasticity, length, is_trapezoidal, least } = *taken;
     let [mut viscoplastic, mut numerical] = [[0.0; LANES]; 2];
     for lane in 0..LANES {
@@ -138,7 +136,7 @@ fn energies<const S: usize>(
         let own = dot(&stress, &mismatch) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - work);
         numerical[lane] = weights[lane] * own;
     }
-    [sum(&viscoplastic), sum(&numerical)]
+    [viscoplastic, numerical]
 }
 
 /// The stresses on which the law acts in a batch if nothing flowed, and where they may flow.

@@ -2,13 +2,16 @@ mod explicit;
 mod implicit;
 
 use super::{
-    Curvature, ELASTIC, Effect, Energy, EnergyKind, Evaluation, FlowProperties, HistoryStore, Outcome,
-    Phases, Quantity, Role, Step, StressError, Term, cell_history::CellHistory, linear, quantity,
+    Curvature, ELASTIC, Effect, Energy, EnergyKind, Evaluation, FlowProperties, HistoryStore, NUMERICAL,
+    Outcome, Phases, Quantity, Role, Step, StressError, Term, cell_history::CellHistory, linear, quantity,
 };
 use crate::{
     fem::space::{Batch, Geometry, Integrity, Needs},
     laws::material::{ByMaterial, Flow, FlowLaw},
-    linear_algebra::{simd::Pack, tensor::add_scaled},
+    linear_algebra::{
+        simd::{LANES, Pack, sum},
+        tensor::add_scaled,
+    },
 };
 
 /// Absorbed by viscoplastic flow: dissipated, or stored by hardening.
@@ -113,8 +116,15 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
 
     fn add_step_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         if let Evaluation::End(blend) = at {
-            self.add_energy_of_implicit_flow(blend, step, batch, energy);
+            let [viscoplastic, numerical] = self.energies_of_implicit_flow(blend, step, batch);
+            energy[VISCOPLASTIC] += sum(&viscoplastic);
+            energy[NUMERICAL] += sum(&numerical);
         }
+    }
+
+    fn energy_of_flow(&self, at: Evaluation, step: Step, batch: &Batch<D, S>) -> Option<[f64; LANES]> {
+        let Evaluation::End(blend) = at else { return None };
+        Some(self.energies_of_implicit_flow(blend, step, batch)[0])
     }
 
     fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
