@@ -150,6 +150,9 @@ impl Newton {
                     None => {}
                     Some(reason) => {
                         failure = reason;
+                        // Where a load comes at once, the pressures at the start of the step tell nothing of how fast friction falls.
+                        let contacts = &problem.body.contacts;
+                        write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
                         self.go_back(problem, &mut equations)?;
                         if !self.follow_obstacles(problem, &equations)? {
                             break;
@@ -511,7 +514,9 @@ fn write_steepest_decreases<const D: usize>(session: &Session, contacts: &[Conta
         false => 0.0,
     };
     out.clear();
-    out.extend(contacts.iter().map(steepest_decrease));
+    // That of an attempt that left all bounds is none.
+    let known = |decrease: f64| if decrease.is_finite() { decrease } else { 0.0 };
+    out.extend(contacts.iter().map(steepest_decrease).map(known));
 }
 
 /// Writes the branches of all contact points at velocities with ghosts.
