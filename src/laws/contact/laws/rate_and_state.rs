@@ -156,6 +156,18 @@ impl RateAndState {
     }
 }
 
+impl RateAndState {
+    /// What `c v` and the friction at a pressure exceed the parameter `s` by, as a function of the logarithm of the velocity `v`.
+    fn excess(&self, [s, c, pressure]: [f64; 3], context: SlidingContext) -> impl Fn(f64) -> Evaluated {
+        move |logarithm| {
+            let speed = logarithm.exp();
+            let [coefficient, slope] = self.at(speed, context);
+            let value = c * speed + pressure * coefficient - s;
+            [value, speed * (c + pressure * slope), 4.0 * f64::EPSILON * s]
+        }
+    }
+}
+
 impl FrictionBound for RateAndState {
     fn coefficient(&self, speed: f64, at: SlidingContext) -> f64 {
         self.at(speed, at)[0]
@@ -237,45 +249,49 @@ impl FrictionBound for RateAndState {
             return at(s / c);
         }
         // The coefficient is at most its slope at rest times the velocity, and the state at most that of rest.
-        let [mut low, mut high] =
-            [(s / (c + pressure * self.at(0.0, context)[1])).ln().max(LEAST), (s / c).ln()];
-        let mut now = high;
-        for _ in 0..ITERATIONS {
-            let speed = now.exp();
-            let [coefficient, slope] = self.at(speed, context);
-            let open = c * speed + pressure * coefficient - s;
-            if open > 0.0 {
-                high = now;
-            } else {
-                low = now;
-            }
-            let newton = now - open / (speed * (c + pressure * slope));
-            let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
-            let change = (next - now).abs();
-            now = next;
-            if change <= 1e-15 * (1.0 + now.abs()) {
-                break;
-            }
-        }
-        at(now.exp())
+        let bracket = [(s / (c + pressure * self.at(0.0, context)[1])).ln().max(LEAST), (s / c).ln()];
+        at(root_between(bracket, self.excess([s, c, pressure], context)).exp())
     }
 }
 
-/// The `w > 0` with `w + ln w = y`, by Newton's method, which converges from either start without leaving the positive numbers.
-fn exponential_root(y: f64) -> f64 {
-    if y < -LEAST_LOG {
-        return y.exp();
-    }
-    let mut w = if y > 1.0 { y - y.ln() } else { y.exp() / (1.0 + y.exp()) };
+/// A function at an argument: its value, its derivative, and what of the value may be rounding.
+type Evaluated = [f64; 3];
+
+/// The root of an increasing function in a bracket, by Newton's method from above, and by bisection where that leaves the bracket.
+fn root_between([mut low, mut high]: [f64; 2], mut function: impl FnMut(f64) -> Evaluated) -> f64 {
+    let mut now = high;
     for _ in 0..ITERATIONS {
-        let next = w * (1.0 + y - w.ln()) / (1.0 + w);
-        let change = (next - w).abs();
-        w = next;
-        if change <= 2.0 * f64::EPSILON * w {
+        let [value, slope, rounding] = function(now);
+        if value > 0.0 {
+            high = now;
+        } else {
+            low = now;
+        }
+        let newton = now - value / slope;
+        let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
+        let change = (next - now).abs();
+        now = next;
+        if change <= rounding / slope + 1e-15 * (1.0 + now.abs()) {
             break;
         }
     }
-    w
+    now
+}
+
+/// The `w > 0` with `w + ln w = y`.
+fn exponential_root(y: f64) -> f64 {
+    if y < -LEAST_LOG { y.exp() } else { iterates(y).last().unwrap_or(f64::NAN) }
+}
+
+/// Approximations of the `w > 0` with `w + ln w = y`, until they differ by rounding, relative to `y` and its logarithm, which cancel:
+/// Newton's method, which converges from either start without leaving the positive numbers.
+fn iterates(y: f64) -> impl Iterator<Item = f64> {
+    let start = if y > 1.0 { y - y.ln() } else { y.exp() / (1.0 + y.exp()) };
+    let next = move |w: &f64| {
+        let next = w * (1.0 + y - w.ln()) / (1.0 + w);
+        ((next - w).abs() > 4.0 * f64::EPSILON * (1.0 + y.abs()) * w / (1.0 + w)).then_some(next)
+    };
+    std::iter::successors(Some(start), next).take(ITERATIONS)
 }
 
 #[cfg(test)]
@@ -320,6 +336,34 @@ mod tests {
             let law = law(evolution);
             let after = |state: f64, length| law.history_after([state; 2], Blend::euler(length), 3e-6);
             assert!((after(4.0, 1.0) - after(after(4.0, 0.5), 0.5)).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn the_state_and_the_velocity_are_found_in_few_iterations() {
+        for y in (-395..400).map(|tenths| 0.1 * f64::from(tenths)).chain([1e3, 1e6]) {
+            assert!(iterates(y).count() <= 8, "{y}: {}", iterates(y).count());
+            let w = exponential_root(y);
+            assert!((w + w.ln() - y).abs() <= 1e-15 * (4.0 + 4.0 * y.abs()), "{y}: {w}");
+        }
+        // Of a fault that creeps, that starts to slip, and that slips, in short and in long steps of both schemes.
+        for (direct, state, step_length, is_blended) in [(0.008, 1.6e9, 0.01, true), (0.01, 2.0, 1e-3, false)]
+        {
+            let law = RateAndState { direct, ..law(Evolution::Ageing) };
+            let context = SlidingContext { is_blended, ..after(state, step_length) };
+            for s in [1e7, 7e7, 7.5e7, 8e7, 1e8, 1e9] {
+                let [c, pressure] = [4.6e6, 1.2e8];
+                let excess = law.excess([s, c, pressure], context);
+                let mut evaluations = 0;
+                let bracket = [(s / (c + pressure * law.at(0.0, context)[1])).ln().max(LEAST), (s / c).ln()];
+                let root = root_between(bracket, |now| {
+                    evaluations += 1;
+                    excess(now)
+                });
+                let [off, ..] = excess(root);
+                assert!(evaluations <= 30, "{s}: {evaluations}");
+                assert!(off.abs() < 1e-13 * s, "{s}: {off}");
+            }
         }
     }
 
