@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""In-plane rupture of a fault between two elastic half-spaces, by a spectral boundary integral: the reference of jobs and pages of docs/verification.
+"""In-plane rupture of a fault between two elastic half-spaces, by a spectral boundary integral: a reference of docs/verification.
 
     scripts/boundary_integral.py slip_weakening [spacing in m]
     scripts/boundary_integral.py short_fault [spacing in m]
     scripts/boundary_integral.py rate_and_state [spacing in m]
 
-prints, at points of the fault, the times at which the slip rate first exceeds 1 mm/s and a hundredth of its largest value, that value and its
-time, and the slip at the end. It needs NumPy and shares nothing with the solver. Equations: for a slip D(x, t) the shear traction of the fault is
+prints, at points of the fault, the times at which the slip rate first exceeds 1 mm/s and a hundredth of its largest value, that value and
+its time, and the slip at the end. It needs NumPy and shares nothing with the solver. Equations: for a slip D(x, t) the shear traction of the fault is
 
     T = T0 + dT(x, t) + f - mu V / (2 c_s),   f(k, t) = -mu |k| / 2 (w(0) D(k, t) - integral of w(|k| c_s s) V(k, t - s) ds),
 
@@ -172,7 +172,7 @@ def main():
     fault = faults[sys.argv[1]]
     spacing = float(sys.argv[2]) if len(sys.argv) > 2 else 100.0
     x, step, velocities, slip = run(fault, spacing)
-    print("x in m, time of 1 mm/s in s, time of a hundredth of the largest slip rate in s, this in m/s, its time in s, slip at the end in m")
+    print("x in m; times of 1 mm/s and of a hundredth of the largest slip rate in s; this in m/s, its time in s; slip at the end in m")
     for point in fault.points:
         i = int(round((point - x[0]) / spacing))
         here = velocities[:, i]
