@@ -355,7 +355,7 @@ impl CondensedMatrix {
 const LARGEST_LINEARISED: usize = 4096;
 /// Iterations that cost as much as the factors of linearised equations: at least so many, and one for so many motions.
 const LEAST_ITERATIONS: usize = 64;
-const UNKNOWNS_AN_ITERATION: usize = 4;
+const UNKNOWNS_AN_ITERATION: usize = 10;
 /// Share of the largest entry of a block at which a pivot counts as zero.
 const ROUNDING: f64 = 1e-12;
 /// Largest number of components of a node.
@@ -400,6 +400,10 @@ impl StepMatrix for CondensedMatrix {
         (size <= LARGEST_LINEARISED).then(|| LEAST_ITERATIONS.max(size / UNKNOWNS_AN_ITERATION))
     }
 
+    fn forget_linearised(&self) {
+        self.subspace.borrow_mut().linearised = None;
+    }
+
     fn set_linearised(&self, act: LinearisedAction<'_>) -> Result<bool> {
         let subspace = &mut *self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
@@ -426,7 +430,9 @@ impl StepMatrix for CondensedMatrix {
     fn set_subspace(&self, project: NodeByNode<'_>) -> Result<bool> {
         let subspace = &mut *self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
-        subspace.linearised = None;
+        if subspace.linearised.is_some() {
+            return Ok(false);
+        }
         self.write_blocks(project, &mut subspace.work_vector, workspace)?;
         let blocks = &workspace.blocks;
         let missing = |(count, block): (usize, &[f64])| -> f64 {

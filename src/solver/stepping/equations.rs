@@ -61,8 +61,11 @@ pub trait StepMatrix {
         None
     }
 
-    /// Preconditions later solves on the present subspace by factors of these linearised equations; returns whether there are any.
-    /// Collective.
+    /// Later solves are preconditioned without factors of linearised equations.
+    fn forget_linearised(&self) {}
+
+    /// Preconditions later solves by factors of these linearised equations, until they are set anew or forgotten; returns whether there are
+    /// any. Collective.
     fn set_linearised(&self, _act: LinearisedAction<'_>) -> Result<bool> {
         Ok(false)
     }
@@ -517,6 +520,10 @@ impl<const D: usize> ContactEquations<'_, D> {
         operator.obstacles.add_approach(open)?;
         operator.reduce(open)?;
         let is_slow = self.counts.last_iterations > MANY_ITERATIONS;
+        // Of an earlier search, which a restart does not have.
+        if self.counts.sets.len() <= 1 {
+            self.matrix.forget_linearised();
+        }
         let mut has_additions = false;
         if let Some(cells) = operator.cells.as_mut().filter(|_| is_slow || self.counts.sets.len() == 1) {
             has_additions = self.matrix.set_additions(&mut |column| {
