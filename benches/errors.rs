@@ -296,7 +296,8 @@ fn main() {
                 let run = format!("`{}`", [stem.as_str(), variant.as_str()].join(" ").trim());
                 match found {
                     Ok(errors) => {
-                        println!("{name} {run} {errors:.2e?}");
+                        let [estimated, actual] = errors;
+                        println!("{name} {run} {estimated:.2e} for {actual:.2e}");
                         tally.add(name, &run, errors);
                     }
                     Err(reason) => {
@@ -312,6 +313,11 @@ fn main() {
         .expect("text");
     println!("{table}");
     if options.iter().any(|option| option == "--write") {
-        table::write(PAGE, "estimated errors", "make bench-errors ARGS=--write", None, &table);
+        let command = if cfg!(debug_assertions) {
+            "cargo bench --profile dev --bench errors -- --write"
+        } else {
+            "make bench-errors ARGS=--write"
+        };
+        table::write(PAGE, "estimated errors", command, None, &table);
     }
 }

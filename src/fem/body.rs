@@ -305,8 +305,26 @@ impl<const D: usize, const S: usize> Body<D, S> {
         session.total(nodes.filter(|node| !node.masters.is_empty()).count())
     }
 
-    /// Finds anew what the nodes of pairs face that slide along each other, at this displacement with ghosts. Collective.
-    pub fn form_pairs(&mut self, session: &Session, displacement: &DistributedVector) -> Result<(), Agreed> {
+    /// Whether pairs were formed at another displacement than this one. Collective.
+    pub fn is_paired_elsewhere(
+        &self,
+        session: &Session,
+        displacement: &DistributedVector,
+    ) -> Result<bool, Agreed> {
+        let Some(paired) = &self.paired_displacement else { return Ok(false) };
+        let [paired, displacement] = [paired, displacement].map(DistributedVector::owned);
+        let differ = *session.agree(paired)? != *session.agree(displacement)?;
+        Ok(session.total(usize::from(differ)) > 0)
+    }
+
+    /// Finds what the nodes of pairs face that slide along each other, at this displacement with ghosts: anew, because they have slid, or
+    /// for the first time. Collective.
+    pub fn form_pairs(
+        &mut self,
+        session: &Session,
+        displacement: &DistributedVector,
+        anew: bool,
+    ) -> Result<(), Agreed> {
         if let Some(paired) = &mut self.paired_displacement {
             session.agree(paired.copy_from(displacement))?;
         }
@@ -321,7 +339,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.coupling = Some(Coupling::new(session, &self.mesh, &shares(&self.mesh, &pairs), &self.held)?);
         let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, &displacement);
         for pair in pairs.iter().filter(|pair| pair.slides) {
-            self.contacts[pair.contact].face(&pair.nodes, &seen);
+            session.agree(self.contacts[pair.contact].face(&pair.nodes, &seen, anew))?;
         }
         self.pairs = pairs;
         Ok(())

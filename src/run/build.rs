@@ -88,7 +88,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     refuse_conflicts(session, job, &body)?;
     if body.paired_displacement.is_some() {
         // As a restart does.
-        body.form_pairs(session, &state.displacement)?;
+        body.form_pairs(session, &state.displacement, false)?;
     }
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         redistribute_mass(session, job, &mut body, &parts, &state)?;

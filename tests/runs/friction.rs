@@ -605,10 +605,9 @@ fn quasistatic_friction_that_falls_faster_than_the_body_resists_has_a_solution_i
     for step in [1e-4, 5e-5] {
         let case = Case::written_as(job).set("time.step", &step.to_string());
         let results = case.run(1);
-        assert!(
-            results.number("max_energy_imbalance") < 1e-10
-                && results.number("max_inclusion_residual") < 1e-10
-        );
+        // Within the accepted distance to the graphs, `[solver] inclusion_tolerance`.
+        assert!(results.number("max_inclusion_residual") < 1e-6);
+        assert!(results.number("max_energy_imbalance") < 1e-7);
         let forces = results.table("resultants.csv");
         let contact = forces.only("source", "contact block.bottom").last("force_y");
         assert!((contact - 400.0).abs() < 1e-6, "{contact} N");

@@ -115,6 +115,32 @@ fn a_body_that_comes_to_lie_above_another_one_lands_on_it() {
     }
 }
 
+/// A block half over a plate slides along it at 8 m/s under its weight. Where its nodes find the deformed surface of the plate anew, they are
+/// a little inside of it; removed within one step, however short, this depth would throw the block up (24 J).
+#[test]
+fn a_block_that_slides_over_the_end_of_a_plate_gains_no_energy_by_short_steps() {
+    let case = Case::written_as(
+        "mesh.rectangle = [
+            { name = 'block', corner = [0.65, 0.001], size = [0.2, 0.1], cells = [3, 2] },
+            { name = 'plate', corner = [0.0, -0.1], size = [0.6, 0.1], cells = [9, 2] },
+         ]
+         material = { hypothesis = 'plane_strain', density = 1000.0, elasticity = { youngs_modulus = 2e7, poisson_ratio = 0.3 } }
+         support = [{ on = ['plate.left', 'plate.bottom'], fix = 'all' }]
+         initial.velocity = ['-8*(y>0)', '0']
+         body_force = [{ value = [0, '-1e4*(y>0)'] }]
+         contact = [{ on = ['block.bottom'], against = ['plate.top'], sliding = 'finite', normal.unilateral = {} }]
+         checkpoint.at = [0.02]
+         time = { end = 0.03, step = 2e-5, scheme = 'implicit_euler' }",
+    );
+    let straight = case.run(1);
+    let history = straight.table("history.csv");
+    let (lost, all) = (history.last("contact_dissipation"), straight.text("history.csv"));
+    assert!(lost.abs() < 0.5, "{lost} J");
+    let checkpoint = case.folder().join("out/checkpoint-1000.h5");
+    case.run_with(1, &["--restart", &checkpoint.display().to_string()]).expect(0);
+    assert!(case.results().text("history.csv") == all, "in its middle");
+}
+
 /// All nodes of both sides that supports move along the boundary, those at its ends, have a sliding velocity that is relative.
 #[test]
 fn bodies_that_supports_move_along_their_contact_rub_by_their_relative_velocity() {

@@ -54,8 +54,8 @@ pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
     CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
     Freedom, Gaps, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK,
-    OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, choose_unknowns,
-    contact_nodes, set_walls,
+    OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, SLIP_BETWEEN_PAIRINGS, STORED_IN_CONTACT,
+    choose_unknowns, contact_nodes, set_walls,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

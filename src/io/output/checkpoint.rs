@@ -243,7 +243,8 @@ pub fn restore<const D: usize, const S: usize>(
         let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(PAIRED, D)], &nodes)?;
         let mut paired = state.displacement.like()?;
         fill(&mut paired, &values[0])?;
-        body.form_pairs(session, &paired)?;
+        let anew = body.is_paired_elsewhere(session, &paired)?;
+        body.form_pairs(session, &paired, anew)?;
     }
     let cells = cell_ids(body);
     let [of_cells, of_nodes] = kept_by(body);
@@ -317,13 +318,14 @@ pub fn transfer<const D: usize, const S: usize>(
     }
     if body.paired_displacement.is_some() {
         // What was in contact stays paired as it was: under small sliding without any displacement.
-        let mut paired = state.displacement.like()?;
+        let (mut paired, mut anew) = (state.displacement.like()?, false);
         if surfaces_in_contact(&header.physics) != surfaces_in_contact(physics) {
             paired.copy_from(&state.displacement)?;
         } else if of_nodes.iter().any(|name| name == PAIRED) {
             fill(&mut paired, &checkpoint.read("nodes", total_nodes, &[(PAIRED, D)], &nodes)?[0])?;
+            anew = body.is_paired_elsewhere(session, &paired)?;
         }
-        body.form_pairs(session, &paired)?;
+        body.form_pairs(session, &paired, anew)?;
     }
     if of_nodes.iter().any(|name| name == ORIGIN) {
         let values = checkpoint.read("nodes", total_nodes, &[(ORIGIN, D)], &nodes)?;

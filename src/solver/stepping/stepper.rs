@@ -22,8 +22,8 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{
-            CONTACT, Contact, Energy, Form, Freedom, Heat, LoadedMotion, NUMERICAL, Role, Step, THERMAL_WORK,
-            VISCOUS, WORK,
+            CONTACT, Contact, Energy, Form, Freedom, Heat, LoadedMotion, NUMERICAL, Role,
+            SLIP_BETWEEN_PAIRINGS, Step, THERMAL_WORK, VISCOUS, WORK,
         },
         resultants::BalancedMotion,
         state::State,
@@ -34,8 +34,6 @@ use crate::{
 };
 use std::time::Instant;
 
-/// The slip between bodies, as a share of the size of a facet, after which what they face is found anew.
-const SLIP_BETWEEN_PAIRINGS: f64 = 0.25;
 /// Residuals of the start of a step beyond this multiple of its forces are those of supports that have moved ahead of the body.
 const FAR: f64 = 1e3;
 
@@ -557,7 +555,7 @@ impl Stepper {
         }
         let faced = body.faced_nodes(session);
         let before = body.energy_of_contacts(state.time, &state.displacement)?;
-        body.form_pairs(session, &state.displacement)?;
+        body.form_pairs(session, &state.displacement, true)?;
         if faced + body.faced_nodes(session) == 0 {
             return Ok(());
         }

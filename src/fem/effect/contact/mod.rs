@@ -70,7 +70,7 @@ pub use loaded_obstacle::{
 };
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
-pub use sweep::OVERRUN;
+pub use sweep::{OVERRUN, SLIP_BETWEEN_PAIRINGS};
 pub(super) use tangential_point::tangents;
 pub use unknowns::{choose_unknowns, set_walls};
 

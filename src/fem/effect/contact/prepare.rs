@@ -3,6 +3,7 @@
 use super::{
     Contact,
     point::{Point, Vectors::Body},
+    sweep::allowance,
     tangential_point::ROUNDING,
 };
 use crate::{
@@ -44,8 +45,9 @@ impl<const D: usize> Contact<D> {
             };
             let along = point.normal_component(Body, converged);
             let [worn, worn_before] = point.worn;
-            let gap = self.gap_of(point, time, &after, along - worn)?;
-            let before = self.gap_of(point, time_before, &before, along - worn)?;
+            let allowance = allowance(point, converged);
+            let gap = self.gap_of(point, time, &after, along - worn)? + allowance;
+            let before = self.gap_of(point, time_before, &before, along - worn)? + allowance;
             let point = &mut self.points[at];
             point.reach = gap;
             point.moved = along - worn;
