@@ -338,8 +338,10 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         self.coupling = Some(Coupling::new(session, &self.mesh, &shares(&self.mesh, &pairs), &self.held)?);
         let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, &displacement);
+        // Without mass nothing is thrown.
+        let keeps_depth = anew && self.has_form(Form::Mass);
         for pair in pairs.iter().filter(|pair| pair.slides) {
-            session.agree(self.contacts[pair.contact].face(&pair.nodes, &seen, anew))?;
+            session.agree(self.contacts[pair.contact].face(&pair.nodes, &seen, keeps_depth))?;
         }
         self.pairs = pairs;
         Ok(())

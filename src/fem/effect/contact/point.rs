@@ -90,6 +90,8 @@ pub(super) struct Point<const D: usize> {
     pub faced_at: Vector<D>,
     /// The depth in m in that body that it had then because bodies slid, which it may keep until it has slid on.
     pub overlap: f64,
+    /// What is left of it in the step.
+    pub allowance: f64,
     /// The gap in m at the end of the step of the undeformed surface without wear.
     pub reach: f64,
     /// Normal displacement in m of the surface without wear at the start of the step.
@@ -143,6 +145,7 @@ impl<const D: usize> Point<D> {
             stretch: 1.0,
             faced_at: [0.0; D],
             overlap: 0.0,
+            allowance: 0.0,
             reach: 0.0,
             moved: 0.0,
             follows: 0.0,

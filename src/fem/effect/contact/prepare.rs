@@ -3,7 +3,6 @@
 use super::{
     Contact,
     point::{Point, Vectors::Body},
-    sweep::allowance,
     tangential_point::ROUNDING,
 };
 use crate::{
@@ -45,7 +44,7 @@ impl<const D: usize> Contact<D> {
             };
             let along = point.normal_component(Body, converged);
             let [worn, worn_before] = point.worn;
-            let allowance = allowance(point, converged);
+            let allowance = point.allowance;
             let gap = self.gap_of(point, time, &after, along - worn)? + allowance;
             let before = self.gap_of(point, time_before, &before, along - worn)? + allowance;
             let point = &mut self.points[at];

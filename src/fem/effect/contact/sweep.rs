@@ -24,16 +24,6 @@ pub const OVERRUN: f64 = 1e-6;
 /// The slip between bodies, as a share of the size of a facet, after which what they face is found anew.
 pub const SLIP_BETWEEN_PAIRINGS: f64 = 0.25;
 
-/// The depth in m that a point may still have in the body that it faces, at a displacement relative to it. What nodes face on a surface that
-/// is inclined or deformed jumps when it is found anew. A law without a finite pressure would remove the depth within one step, however
-/// short, and thus throw the bodies apart; over the slip until they face anew they move as the surface rises.
-pub(super) fn allowance<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
-    if point.overlap == 0.0 {
-        return 0.0;
-    }
-    point.overlap * (1.0 - slip(point, displacement) / SLIP_BETWEEN_PAIRINGS).max(0.0)
-}
-
 /// How far a point has slid along another body since it began to face it, as a share of the size of the facets there.
 fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
     let moved: Vector<D> = std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i]);
@@ -147,16 +137,33 @@ impl<const D: usize> Contact<D> {
         points.map(|point| (point.node(), point.facet_size))
     }
 
-    /// Lets the points of a contact that slides along another body face it, at displacements that are relative to it; anew, because they
-    /// have slid, or for the first time.
-    pub fn face(&mut self, nodes: &[PairedNode<D>], displacement: &[f64], anew: bool) -> Result<()> {
-        let keeps_depth = anew && self.law.has_vertical_parts() && self.wear.is_none();
+    /// Whether points may be inside of the body that they face, see [`Contact::allow_depths`].
+    pub fn keeps_depths(&self) -> bool {
+        self.points.iter().any(|point| point.overlap > 0.0)
+    }
+
+    /// Sets the depths that points may have in the body that they face in the next step, at whose end they will be at these displacements
+    /// relative to it if they move on as they do. What nodes face on a surface that is inclined or deformed jumps when it is found anew. A law
+    /// without a finite pressure would remove the depth within one step, however short, and thus throw the bodies apart; over the slip
+    /// until they face anew they move as the surface rises.
+    pub fn allow_depths(&mut self, displacement: &[f64]) {
+        for point in &mut self.points {
+            let left = 1.0 - slip(point, displacement) / SLIP_BETWEEN_PAIRINGS;
+            point.allowance = point.overlap * left.max(0.0);
+        }
+    }
+
+    /// Lets the points of a contact that slides along another body face it, at displacements that are relative to it. Points that are inside
+    /// of it keep their depth at first, if wanted and if no finite pressure removes it.
+    pub fn face(&mut self, nodes: &[PairedNode<D>], displacement: &[f64], keeps_depth: bool) -> Result<()> {
+        let keeps_depth = keeps_depth && self.law.has_vertical_parts() && self.wear.is_none();
         for (at, node) in nodes.iter().enumerate() {
             let point = &self.points[at];
             let own = self.gap.of_moved(0.0, &point.place, &point.normal, 0.0)?;
             let depth = -(node.distance + node.stretch * own);
             let point = &mut self.points[at];
             point.overlap = if keeps_depth && depth > 0.0 { depth } else { 0.0 };
+            point.allowance = point.overlap;
             point.set_weight(node.weight);
             point.stretch = node.stretch;
             let moved = std::array::from_fn(|i| displacement[point.node() * D + i]);
