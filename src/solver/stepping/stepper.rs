@@ -550,7 +550,7 @@ impl Stepper {
         body: &mut Body<D, S>,
         state: &State,
     ) -> Result<()> {
-        if body.slip(session, &*state.displacement.local()?)? <= SLIP_BETWEEN_PAIRINGS {
+        if body.slip(session, &state.displacement.local()?)? <= SLIP_BETWEEN_PAIRINGS {
             return Ok(());
         }
         let faced = body.faced_nodes(session);
