@@ -613,3 +613,29 @@ fn quasistatic_friction_that_falls_faster_than_the_body_resists_has_a_solution_i
         assert!((contact - 400.0).abs() < 1e-6, "{contact} N");
     }
 }
+
+#[test]
+fn a_heated_plate_that_nothing_but_friction_holds_has_a_solution_in_each_step() {
+    let job = "[mesh.rectangle]\nsize = [0.2, 0.02]\ncells = [4, 1]\n\
+        [material]\nhypothesis = 'plane_strain'\nelasticity = { youngs_modulus = 7e10, poisson_ratio = 0.33 }\n\
+        heat = { conductivity = 200.0, volumetric_capacity = 2.4e6, expansion = 2.3e-5, reference = 293.0 }\n\
+        [initial]\ntemperature = 293.0\n\
+        [[heat]]\non = ['top']\ntemperature = '293 + 50*(1 - cos(2*pi*t/10))'\n\
+        [[traction]]\non = ['top']\npressure = 1e6\n\
+        [[contact]]\non = ['bottom']\nobstacle.plane = { point = [0.0, 0.0], normal = [0.0, 1.0] }\n\
+        normal.unilateral = {}\nfriction.coulomb.coefficient = 0.3\n\
+        [time]\nscheme = 'implicit_euler'\nend = 10.0\nstep = 0.5\n";
+    // The plate grows and shrinks over the plane: all points slip outwards or inwards, except for one that holds it.
+    for law in ["{ unilateral = {} }", "{ compliance = { stiffness = 1e12 } }"] {
+        let case = Case::written_as(job).set("contact.0.normal", law);
+        let results = case.run(1);
+        assert!(results.number("max_energy_imbalance") < 1e-9, "{law}");
+        let forces = results.table("resultants.csv");
+        let contact = forces.only("source", "contact bottom");
+        for (name, expected) in [("force_x", 0.0), ("force_y", 2e5)] {
+            let misses = contact.numbers(name).into_iter().map(|force| (force - expected).abs());
+            let largest = misses.fold(0.0, f64::max);
+            assert!(largest < 1e-3, "{law}: {name} misses {expected} N by {largest} N");
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! The matrix of a step, condensed to the motions on which contact laws act.
 
-use super::equations::{Linearised, LinearisedAction, NodeByNode, StepMatrix};
+use super::equations::{Linearised, LinearisedAction, NodeByNode, Rigid, StepMatrix};
 use crate::{
     error::Result,
     linear_algebra::petsc::{DistributedVector, LocalFactor, MISSING_DIRECTIONS, times_own_transpose},
@@ -404,7 +404,10 @@ impl StepMatrix for CondensedMatrix {
         self.subspace.borrow_mut().linearised = None;
     }
 
-    fn set_linearised(&self, act: LinearisedAction<'_>) -> Result<bool> {
+    fn set_linearised(&self, bodies: Rigid, act: LinearisedAction<'_>) -> Result<bool> {
+        if bodies == Rigid::OnSprings && self.springs.is_none() {
+            return Ok(false);
+        }
         let subspace = &mut *self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
         subspace.linearised = None;
@@ -418,7 +421,7 @@ impl StepMatrix for CondensedMatrix {
             self.write_product(&mut subspace.product)?;
         }
         let mut springs = Vec::new();
-        if let Some(own) = &self.springs {
+        if let Some(own) = self.springs.as_ref().filter(|_| bodies == Rigid::Free) {
             springs.resize(self.positions.len(), 0.0);
             workspace.gathering.gather(&workspace.world, own, &mut springs);
         }

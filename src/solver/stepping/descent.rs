@@ -113,7 +113,8 @@ impl Descent {
             let place = loop {
                 equations.set_softening(share);
                 equations.linearise(x)?;
-                let curvature = equations.solve_if_definite(&self.residual, &mut self.direction)?;
+                let curvature =
+                    equations.solve_if_definite(&self.residual, &mut self.direction, share == 0.0)?;
                 if curvature == Curvature::Positive
                     && let Some(place) = self.search(equations, x, norm, share == 0.0)?
                 {

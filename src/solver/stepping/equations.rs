@@ -24,6 +24,13 @@ pub enum Linearised {
     Projection,
 }
 
+/// What holds bodies that contact alone holds in factors of linearised equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rigid {
+    Free,
+    OnSprings,
+}
+
 /// Applies one of them to a vector.
 pub(super) type LinearisedAction<'a> = &'a mut dyn FnMut(Linearised, &mut DistributedVector) -> Result<()>;
 
@@ -64,9 +71,9 @@ pub trait StepMatrix {
     /// Later solves are preconditioned without factors of linearised equations.
     fn forget_linearised(&self) {}
 
-    /// Preconditions later solves by factors of these linearised equations, until they are set anew or forgotten; returns whether there are
-    /// any. Collective.
-    fn set_linearised(&self, _act: LinearisedAction<'_>) -> Result<bool> {
+    /// Preconditions later solves by factors of these linearised equations, as they are or with soft springs where contact alone holds a
+    /// body, until they are set anew or forgotten; returns whether there are any. Collective.
+    fn set_linearised(&self, _bodies: Rigid, _act: LinearisedAction<'_>) -> Result<bool> {
         Ok(false)
     }
 
@@ -232,6 +239,8 @@ pub struct SolveCounts {
     pub refreshed: usize,
     /// Linear systems that were not symmetric: some point slides with a friction bound that depends on the pressure.
     pub coupled: usize,
+    /// Linear systems that were singular, because nothing resists the motion of a whole body.
+    pub singular: usize,
     /// Linearisations that were not positive definite where the energy was minimised.
     pub unstable: usize,
     /// The least norm in N of a residual since the search began, and the number of linearisations until then; only decreases by
@@ -307,13 +316,15 @@ impl<const D: usize> ContactEquations<'_, D> {
         self.contacts.iter_mut().for_each(|contact| contact.set_softening(share));
     }
 
-    /// As [`NonlinearProblem::solve_jacobian`], where the derivative is positive definite; otherwise `direction` is not changed.
+    /// As [`NonlinearProblem::solve_jacobian`], where the derivative is positive definite; otherwise `direction` is not changed. If the
+    /// energy is convex, a derivative that is not definite is singular.
     pub(super) fn solve_if_definite(
         &mut self,
         residual: &DistributedVector,
         direction: &mut DistributedVector,
+        is_convex: bool,
     ) -> Result<Curvature> {
-        self.solve_linearised(residual, direction, ProjectedKsp::solve_if_definite)
+        self.solve_linearised(residual, direction, (ProjectedKsp::solve_if_definite, is_convex))
     }
 
     /// Writes the residual at these unknowns, with the motions of obstacles that belong to them.
@@ -477,7 +488,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         residual: &DistributedVector,
         direction: &mut DistributedVector,
     ) -> Result<()> {
-        match self.solve_linearised(residual, direction, ProjectedKsp::solve)? {
+        match self.solve_linearised(residual, direction, (ProjectedKsp::solve, true))? {
             Curvature::Positive => Ok(()),
             // Without a direction, iterations would repeat the same velocity.
             Curvature::Negative => Err(Error::Failed(NO_DIRECTION.into())),
@@ -494,12 +505,14 @@ type SymmetricSolve = fn(
 ) -> Result<ProjectedOutcome>;
 
 impl<const D: usize> ContactEquations<'_, D> {
-    /// Solves the linearised equations, which negative curvature may end early if `solve` does.
+    /// Solves the linearised equations, which negative curvature may end early if `solve` does. Where all points slide, nothing resists
+    /// the motion of a whole body along them, although at the solution some point sticks: such singular equations, on which iterations break
+    /// down, are solved as if soft springs held the body as well.
     fn solve_linearised(
         &mut self,
         residual: &DistributedVector,
         direction: &mut DistributedVector,
-        solve: SymmetricSolve,
+        (solve, may_be_singular): (SymmetricSolve, bool),
     ) -> Result<Curvature> {
         let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
@@ -543,17 +556,27 @@ impl<const D: usize> ContactEquations<'_, D> {
         let mut outcome = solve(self.linear_solver, &mut operator, open, velocity)?;
         self.linear_solver.limit_iterations(usize::MAX);
         if most.is_some() && outcome.linear.ran_out() {
-            let rebuilt = self.matrix.set_linearised(&mut |map, column| operator.act(map, column))?;
+            let rebuilt =
+                self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?;
             self.counts.refreshed += usize::from(rebuilt);
             let first = outcome.linear;
             outcome = solve(self.linear_solver, &mut operator, open, velocity)?;
             outcome.linear = first.followed_by(outcome.linear);
         }
+        let is_on_springs = most.is_some()
+            && may_be_singular
+            && !outcome.linear.converged()
+            && self.matrix.set_linearised(Rigid::OnSprings, &mut |map, column| operator.act(map, column))?;
+        self.counts.singular += usize::from(is_on_springs);
+        if is_on_springs {
+            operator.precondition(open, velocity)?;
+            operator.project(velocity)?;
+        }
         self.counts.linear_iterations += outcome.linear.iterations;
         self.counts.last_iterations = outcome.linear.iterations;
         self.counts.indefinite += usize::from(outcome.indefinite);
         self.counts.refreshed += usize::from(outcome.refreshed);
-        if !outcome.linear.converged() {
+        if !outcome.linear.converged() && !is_on_springs {
             if outcome.indefinite {
                 return Ok(Curvature::Negative);
             }
