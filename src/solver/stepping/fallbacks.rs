@@ -49,6 +49,8 @@ pub(super) struct Conditions {
     pub has_user_search: bool,
     /// Whether all equations except those of the contact points are linear.
     pub interior_is_linear: bool,
+    /// Whether cells flow.
+    pub flows: bool,
     /// Whether there is friction.
     pub rubs: bool,
     /// Whether friction moves obstacles that forces drive.
@@ -65,7 +67,8 @@ impl Conditions {
     /// Full steps are tried first: a new set of branches raises the residual of the whole body, so that a line search would take very
     /// short steps where full ones converge. With all other velocities in equilibrium the residual is that of the contact points alone
     /// and measures their error. Fixed-point iteration avoids cycles between pressure and friction; it is used if friction depends on the
-    /// pressure. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
+    /// pressure. Where cells flow, the residual of the whole body measures the error of flow as well, and shorter steps come second: full
+    /// ones beyond the yield stress overshoot. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
     /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge. Friction
     /// points yield after these full steps for a light obstacle on a stiff body, which points that stick and slide in turn move to and
     /// fro; and at last for bodies that nothing but little friction holds, or whose points all stick at once. Where friction falls faster
@@ -79,11 +82,12 @@ impl Conditions {
         [
             (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
+            (follows_bounds && self.flows, Backtracking, 1.0, Newton),
             (follows_bounds, Equilibrated, 1.0, Newton),
             (follows_bounds, Equilibrated, 10.0, Newton),
             (follows_bounds, FullSteps, 10.0, Newton),
             (self.rubs_obstacles, Yielding, 1.0, FixedPoint),
-            (follows_bounds, Backtracking, 1.0, Newton),
+            (follows_bounds && !self.flows, Backtracking, 1.0, Newton),
             (follows_bounds, FullSteps, 100.0, Newton),
             (follows_bounds, Backtracking, 1.0 / 30.0, Newton),
             (fixes_bounds, FullSteps, 1.0, FixedPoint),
@@ -125,6 +129,7 @@ mod tests {
         friction: FrictionIteration::Newton,
         has_user_search: false,
         interior_is_linear: true,
+        flows: false,
         rubs: false,
         rubs_obstacles: false,
         softens: false,
@@ -142,6 +147,14 @@ mod tests {
         let found = searches(bonds);
         assert_eq!(found[..2], [Search::Descent, Search::FullSteps]);
         assert_eq!(found.last(), Some(&Search::Descent), "from the start value again");
+    }
+
+    #[test]
+    fn shorter_steps_come_second_where_cells_flow() {
+        let flows = Conditions { flows: true, interior_is_linear: false, ..FRICTIONLESS };
+        let found = searches(flows);
+        assert_eq!(found[..2], [Search::FullSteps, Search::Backtracking]);
+        assert_eq!(found.len(), searches(Conditions { flows: false, ..flows }).len());
     }
 
     #[test]

@@ -71,6 +71,9 @@ const DESCENT_REDUCTION: f64 = 1e-6;
 /// Fixed-point iterations after which an attempt fails.
 const MAX_FIXED_POINT_ITERATIONS: usize = 200;
 
+/// As [`PATIENCE`], where cells flow: shorter steps then take fewer iterations.
+const PATIENCE_OF_FLOW: usize = 10;
+
 const NO_MINIMUM: &str = "no minimum of the energy was found";
 
 /// Fallbacks that are tried before a body that contact alone holds starts from elsewhere: without any pressure, the equations are singular.
@@ -302,6 +305,7 @@ impl Newton {
             // Motions of obstacles are not in equilibrium with those of the contact points alone.
             interior_is_linear: !flows
                 && !contacts.iter().any(|contact| contact.needs_ghosts() || contact.obstacle.is_some()),
+            flows,
             rubs,
             rubs_obstacles: rubs && !self.obstacles.is_empty(),
             softens: (flows && body.softening().next().is_some()) || contacts.iter().any(decreases),
@@ -394,7 +398,9 @@ impl Newton {
             _ => limit,
         };
         let [iterations, patience] = match search {
-            Search::FullSteps if limit >= PATIENCE && sharpness == 1.0 => [most, PATIENCE],
+            Search::FullSteps if limit >= PATIENCE && sharpness == 1.0 => {
+                [most, if self.flow.is_some() { PATIENCE_OF_FLOW } else { PATIENCE }]
+            }
             _ => [limit, usize::MAX],
         };
         self.counts.restart_search();
