@@ -133,67 +133,48 @@ impl Newton {
         let mut failure = String::new();
         let most = if system.is_first_try { FIRST_FALLBACKS } else { usize::MAX };
         let is_yielding = |fallback: &Fallback| fallback.search == Search::Yielding;
-        let mut has_yielded = false;
-        for fallback in conditions.fallbacks().take(most) {
-            if has_yielded && is_yielding(&fallback) {
-                continue;
-            }
-            if let Some(outcome) = self.solve_by(problem, &mut equations, fallback, &mut failure)? {
-                return Ok(outcome);
-            }
-            // Full steps move a body that nothing but friction holds to and fro.
-            if self.counts.singular == 0 || has_yielded {
-                continue;
-            }
-            if let Some(yielding) = conditions.fallbacks().find(is_yielding) {
-                has_yielded = true;
-                if let Some(outcome) = self.solve_by(problem, &mut equations, yielding, &mut failure)? {
-                    return Ok(outcome);
+        let mut rest = conditions.fallbacks().take(most);
+        let (mut next, mut has_yielded) = (rest.next(), false);
+        while let Some(fallback) = next {
+            loop {
+                self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
+                match fallback.search {
+                    Search::Yielding => self.solve_yielding(problem, &mut equations)?,
+                    Search::Falling => {
+                        self.solve_falling(problem, &mut equations)?;
+                        let contacts = &mut problem.body.contacts;
+                        write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
+                        self.set_graph_parameters(contacts, system.scales, fallback);
+                    }
+                    _ => {}
                 }
-            }
-        }
-        Err(problem.explain(&failure, conditions.softens))
-    }
-
-    /// Solves equations by one fallback from their start value; if it fails, writes the reason and goes back there. Collective.
-    fn solve_by<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-        fallback: Fallback,
-        failure: &mut String,
-    ) -> Result<Option<StepOutcome>> {
-        let scales = equations.system.scales;
-        loop {
-            self.set_graph_parameters(&mut problem.body.contacts, scales, fallback);
-            match fallback.search {
-                Search::Yielding => self.solve_yielding(problem, equations)?,
-                Search::Falling => {
-                    self.solve_falling(problem, equations)?;
-                    let contacts = &mut problem.body.contacts;
-                    write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
-                    self.set_graph_parameters(contacts, scales, fallback);
-                }
-                _ => {}
-            }
-            match self.solve_with_bounds(problem, equations, fallback)? {
-                None if self.suits_friction(problem) => {
-                    return self.finish(problem, equations, fallback.search).map(Some);
-                }
-                // From this solution, with parameters for the pressures there.
-                None => {}
-                Some(reason) => {
-                    *failure = reason;
-                    // Where a load comes at once, the pressures at the start of the step tell nothing of how fast friction falls.
-                    let contacts = &problem.body.contacts;
-                    write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
-                    self.go_back(problem, equations)?;
-                    if !self.follow_obstacles(problem, equations)? {
-                        return Ok(None);
+                match self.solve_with_bounds(problem, &mut equations, fallback)? {
+                    None if self.suits_friction(problem) => {
+                        return self.finish(problem, &mut equations, fallback.search);
+                    }
+                    // From this solution, with parameters for the pressures there.
+                    None => {}
+                    Some(reason) => {
+                        failure = reason;
+                        // Where a load comes at once, the pressures at the start of the step tell nothing of how fast friction falls.
+                        let contacts = &problem.body.contacts;
+                        write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
+                        self.go_back(problem, &mut equations)?;
+                        if !self.follow_obstacles(problem, &equations)? {
+                            break;
+                        }
                     }
                 }
             }
+            has_yielded |= is_yielding(&fallback);
+            // Full steps move a body that nothing but friction holds to and fro.
+            next = match self.counts.singular > 0 && !has_yielded {
+                true => conditions.fallbacks().find(is_yielding),
+                false => None,
+            };
+            next = next.or_else(|| rest.find(|fallback| !(has_yielded && is_yielding(fallback))));
         }
+        Err(problem.explain(&failure, conditions.softens))
     }
 
     /// Prepares obstacles, linear solves and parameters of friction graphs for new equations. Collective.
