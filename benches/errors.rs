@@ -4,6 +4,7 @@
 //! steps an eighth as long; that of the mesh, for jobs whose mesh is one block, the distance to a run on cells a quarter as large, of the job's
 //! mesh and of one with half as many cells along each axis. `--write` puts the table into docs/what-accuracy-costs.md.
 
+mod jobs;
 mod table;
 
 use clarke::{
@@ -15,18 +16,18 @@ use clarke::{
     job::{Job, Loaded},
     laws::material::Hypothesis,
     linear_algebra::tensor::{Mandel, Vector, add_scaled},
-    mesh::Mesh,
+    mesh::{Mesh, shape::signed_measure},
     parallel::session::{Mpi, Session},
     run::{EndState, Scene, Simulation, error_of_mesh, error_of_steps, vibrates, with_steps},
 };
+use jobs::jobs;
 use std::{
     fmt::Write,
-    path::{Path, PathBuf},
+    path::Path,
     time::{Duration, Instant},
 };
 
 const PAGE: &str = "docs/what-accuracy-costs.md";
-const FOLDERS: [&str; 4] = ["jobs", "jobs/papers", "jobs/hard", "jobs/verification"];
 /// Runs that take longer are left out: estimates and true errors.
 const LONGEST: [Duration; 2] = [Duration::from_secs(10), Duration::from_secs(60)];
 /// The step of the true state over that of a run.
@@ -101,14 +102,13 @@ fn of_mesh<const D: usize, const S: usize>(
     let fine = run::<D, S>(session, fine, fine_mesh, LONGEST[1])?;
     let [of_coarse, of_fine] = [&coarse, &fine].map(|run| run.body.stress_at_points(&run.state));
     let (of_coarse, of_fine) = (of_coarse.map_err(words)?, of_fine.map_err(words)?);
-    let finder = Finder::new(&coarse.body.mesh);
     let points = fine.body.geometry.points();
     let [mut error, mut size] = [0.0; 2];
     for (number, cell) in fine.body.geometry.cells().enumerate() {
         let tensor = fine.body.tensor(Form::Elasticity, cell.material()).ok_or("no elasticity")?;
         for point in 0..points {
             let x = place_in_cell(&fine.body.mesh, number, &cell_rule::<D>()[point].0);
-            let (around, place) = finder.cell_around(&x);
+            let (around, place) = cell_around(&coarse.body.mesh, &x);
             let held = coarse.body.geometry.points();
             let stress: Mandel<S> = stress_at::<D, S>(&of_coarse[around * held..][..held], &place);
             let own = of_fine[number * points + point];
@@ -120,43 +120,32 @@ fn of_mesh<const D: usize, const S: usize>(
     Ok([estimate, (error / size).sqrt()])
 }
 
-/// Finds cells by place.
-struct Finder<'a, const D: usize> {
-    mesh: &'a Mesh<D>,
-}
-
-impl<'a, const D: usize> Finder<'a, D> {
-    fn new(mesh: &'a Mesh<D>) -> Self {
-        Self { mesh }
-    }
-
-    /// The cell that contains a place or is nearest to it, with the barycentric coordinates there.
-    fn cell_around(&self, x: &Vector<D>) -> (usize, [f64; 4]) {
-        let mut best = (f64::NEG_INFINITY, 0, [0.0; 4]);
-        for cell in 0..self.mesh.cell_count() {
-            let corners: Vec<Vector<D>> =
-                self.mesh.cell(cell)[..=D].iter().map(|&node| self.mesh.nodes[node as usize]).collect();
-            let place = barycentric(&corners, x);
-            let inside = place[..=D].iter().copied().fold(f64::INFINITY, f64::min);
-            if inside > best.0 {
-                best = (inside, cell, place);
-            }
-            if inside > -1e-12 {
-                break;
-            }
+/// The cell that contains a place or is nearest to it, with the barycentric coordinates there.
+fn cell_around<const D: usize>(mesh: &Mesh<D>, x: &Vector<D>) -> (usize, [f64; 4]) {
+    let mut best = (f64::NEG_INFINITY, 0, [0.0; 4]);
+    for cell in 0..mesh.cell_count() {
+        let corners: Vec<Vector<D>> =
+            mesh.cell(cell)[..=D].iter().map(|&node| mesh.nodes[node as usize]).collect();
+        let place = barycentric(&corners, x);
+        let inside = place[..=D].iter().copied().fold(f64::INFINITY, f64::min);
+        if inside > best.0 {
+            best = (inside, cell, place);
         }
-        (best.1, best.2)
+        if inside > -1e-12 {
+            break;
+        }
     }
+    (best.1, best.2)
 }
 
 /// Barycentric coordinates of a place in a simplex: measures of the simplices in which it replaces a corner.
 fn barycentric<const D: usize>(corners: &[Vector<D>], x: &Vector<D>) -> [f64; 4] {
-    let whole = clarke::mesh::shape::signed_measure(corners);
+    let whole = signed_measure(corners);
     let mut place = [0.0; 4];
     for (at, share) in place.iter_mut().enumerate().take(D + 1) {
         let mut moved = corners.to_vec();
         moved[at] = *x;
-        *share = clarke::mesh::shape::signed_measure(&moved) / whole;
+        *share = signed_measure(&moved) / whole;
     }
     place
 }
@@ -225,20 +214,6 @@ fn variants(session: &Session, path: &Path, of: Of) -> Vec<(String, Outcome<[f64
             all.map(|cells| (format!("{cells:?}"), mesh_of(session, path, &cells))).collect()
         }
     }
-}
-
-/// The jobs of the folders, in the order of their names.
-fn jobs(words: &[String]) -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut jobs: Vec<PathBuf> = FOLDERS
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(root.join(folder)).expect("a folder of jobs"))
-        .map(|entry| entry.expect("an entry").path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
-        .filter(|path| words.is_empty() || words.iter().any(|word| path.display().to_string().contains(word)))
-        .collect();
-    jobs.sort();
-    jobs
 }
 
 /// How many runs were measured, and what their estimates are worth.

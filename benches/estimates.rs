@@ -4,33 +4,15 @@
 //! Each job is checked and then run on one process, three times in turn; the table has the estimate that is the median and the median of the
 //! times, without output. `--write` puts it into docs/speed.md.
 
+mod jobs;
 mod table;
 
+use jobs::jobs;
 use serde_json::Value;
-use std::{
-    fmt::Write,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::{fmt::Write, path::Path, process::Command};
 
 const PAGE: &str = "docs/speed.md";
-/// Folders of jobs.
-const FOLDERS: [&str; 4] = ["jobs", "jobs/papers", "jobs/hard", "jobs/verification"];
 const REPETITIONS: usize = 3;
-
-/// The jobs of these folders, in the order of their names.
-fn jobs(words: &[String]) -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut jobs: Vec<PathBuf> = FOLDERS
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(root.join(folder)).expect("a folder of jobs"))
-        .map(|entry| entry.expect("an entry").path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
-        .filter(|path| words.is_empty() || words.iter().any(|word| path.display().to_string().contains(word)))
-        .collect();
-    jobs.sort();
-    jobs
-}
 
 /// What the solver prints with these arguments; `None` if it refuses the job.
 fn solver(arguments: &[&str]) -> Option<String> {

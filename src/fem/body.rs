@@ -272,29 +272,30 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut most: f64 = 0.0;
         for pair in self.pairs.iter().filter(|pair| pair.slides) {
             let contact = &self.contacts[pair.contact];
+            let mut least = f64::INFINITY;
             // Largest motions in either direction of each axis, of nodes that face nothing and of the other body.
-            let mut far = [[[f64::NEG_INFINITY; 2]; D]; 2];
+            let mut far = [[f64::NEG_INFINITY; 4]; 3];
             let mut add = |side: usize, node: usize| {
-                for (axis, far) in far[side].iter_mut().enumerate() {
+                for (axis, far) in far.iter_mut().enumerate().take(D) {
                     let moved = displacement[node * D + axis] - paired[node * D + axis];
-                    *far = [larger(far[0], -moved), larger(far[1], moved)];
+                    far[side] = larger(far[side], -moved);
+                    far[side + 1] = larger(far[side + 1], moved);
                 }
             };
-            let mut least = f64::INFINITY;
             for (node, size) in contact.facing_nothing() {
                 add(0, node);
                 least = least.min(size);
             }
             let facets = pair.against.iter().flat_map(|facet| self.mesh.facet_nodes(*facet));
-            facets.for_each(|node| add(1, node as usize));
-            let [slip, size] = session.largest([contact.slip(&seen), -least]);
-            let mut square = 0.0;
-            for axis in 0..D {
-                let [back, forth] = session.largest(far[0][axis]);
-                let [other_back, other_forth] = session.largest(far[1][axis]);
-                square += larger(back + other_forth, forth + other_back).max(0.0).powi(2);
-            }
-            most = larger(most, larger(slip, square.sqrt() / -size));
+            facets.for_each(|node| add(2, node as usize));
+            let mut all = [contact.slip(&seen); 14];
+            all[1] = -least;
+            all[2..].copy_from_slice(far.as_flattened());
+            let [slip, size, far @ ..] = session.largest(all);
+            let apart = far.as_chunks().0.iter().map(|[back, forth, other_back, other_forth]| {
+                larger(back + other_forth, forth + other_back).max(0.0).powi(2)
+            });
+            most = larger(most, larger(slip, apart.sum::<f64>().sqrt() / -size));
         }
         Ok(most)
     }

@@ -179,8 +179,7 @@ fn points_down<const D: usize>(normal: &Vector<D>) -> bool {
 impl<const D: usize> GlobalMesh<D> {
     /// The corners of the facet of a cell opposite to one of its nodes.
     fn corners_of(&self, (cell, opposite): (usize, usize)) -> [Vector<D>; D] {
-        facet_of::<D>(&self.cells[cell * (D + 1)..(cell + 1) * (D + 1)], opposite)
-            .map(|node| self.nodes[node as usize])
+        facet_of::<D>(self.cell(cell), opposite).map(|node| self.nodes[node as usize])
     }
 
     /// Splits the mesh along the facets inside the body that have this name: their nodes become two, except on the edge of the surface

@@ -14,10 +14,7 @@
 //! Where longer steps are refused or are not fewer, the run is repeated once with steps half as long instead, and `p` is 1:
 //! `e = F 2 |S_1 - S_1/2|`.
 
-use super::{
-    setup::{Setup, setup},
-    simulation::{Prepared, Simulation},
-};
+use super::simulation::Simulation;
 use crate::{
     error::{Exit, Result},
     fem::{
@@ -56,7 +53,7 @@ const LARGEST_TOLERANCE: f64 = 0.5;
 const LEAST_SHARE: f64 = 0.05;
 
 /// The estimated error of the steps.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorOfSteps {
     /// The error of stress and velocity at the end over `norm`.
     pub relative: f64,
@@ -88,7 +85,7 @@ pub struct EndState<const S: usize> {
     velocity: Vec<f64>,
     stress: Vec<Mandel<S>>,
     /// Number of steps.
-    pub steps: u64,
+    steps: u64,
     /// Largest sum of kinetic and elastic energy after any step, where that is known.
     most: f64,
 }
@@ -106,7 +103,7 @@ impl<const S: usize> EndState<S> {
     }
 
     /// Steps a simulation to its end; `None` if it is interrupted. Collective.
-    pub fn reached<const D: usize>(
+    fn reached<const D: usize>(
         session: &Session,
         mut simulation: Simulation<D, S>,
         mut is_interrupted: impl FnMut() -> bool,
@@ -133,13 +130,12 @@ impl<const S: usize> EndState<S> {
             velocity.iter_mut().zip(&other.velocity).for_each(|(v, w)| *v -= w);
             stress.iter_mut().zip(&other.stress).for_each(|(s, t)| *s = add_scaled(s, -1.0, t));
         }
-        let form = match body.has_form(Form::Elasticity) {
-            _ if body.has_form(Form::Mass) => Some(Form::Mass),
-            false => Some(Form::Viscosity),
-            true => None,
-        };
         let mut forces = vec![0.0; velocity.len()];
-        form.into_iter().for_each(|form| body.add_form(form, &velocity, &mut forces));
+        if body.has_form(Form::Mass) {
+            body.add_form(Form::Mass, &velocity, &mut forces);
+        } else if !body.has_form(Form::Elasticity) {
+            body.add_form(Form::Viscosity, &velocity, &mut forces);
+        }
         let of_velocity: f64 = forces.iter().zip(&velocity).map(|(f, v)| f * v).sum();
         let mut of_stress = 0.0;
         let points = body.geometry.points();
@@ -220,8 +216,7 @@ fn repeated<const D: usize, const S: usize>(
     is_interrupted: impl FnMut() -> bool,
 ) -> Result<std::result::Result<EndState<S>, String>, Agreed> {
     let run = || -> Result<Option<EndState<S>>, Agreed> {
-        let Setup { body, state, scheme, .. } = session.agree(setup::<D, S>(session, loaded, mesh))?;
-        let simulation = Simulation::start(session, &loaded.job, Prepared { body, state, scheme }, None)?;
+        let simulation = session.agree(Simulation::<D, S>::on(session, loaded, mesh))?;
         EndState::reached(session, simulation, is_interrupted)
     };
     match run() {

@@ -56,7 +56,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let folder = job.output_folder();
     let mut log = Log::new(session.is_first(), clock.on_terminal);
     let claimed = session.on_first(|| claim_folder(job, start, &mut log))?.unwrap_or_default();
-    let began_on = job.output.error_estimate.then(|| mesh.clone());
+    let began_on = job.output.error_estimate.then(|| (loaded, mesh.clone()));
     let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let is_restart = start.is_restart();
     let start_state = ready.began_from.as_ref().map(|state| state.digest.clone());
@@ -100,7 +100,6 @@ pub(super) fn run<const D: usize, const S: usize>(
     deadline.log_limit(&mut log);
     let mut run = Run {
         session,
-        loaded,
         job,
         began_on,
         simulation,
@@ -131,10 +130,9 @@ enum Ended {
 
 struct Run<'a, const D: usize, const S: usize> {
     session: &'a Session,
-    loaded: &'a Loaded,
     job: &'a Job,
-    /// The mesh on which the run began, if its errors are to be estimated.
-    began_on: Option<Mesh<D>>,
+    /// The job and the mesh on which the run began, if its errors are to be estimated.
+    began_on: Option<(&'a Loaded, Mesh<D>)>,
     simulation: Simulation<D, S>,
     certificates: Certificates,
     /// Logged lines about the times that steps landed on.
@@ -434,7 +432,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
 
     /// Estimates the errors of the state at the end, if the job asks for them. Collective.
     fn errors(&mut self) -> Result<Errors, Agreed> {
-        let Self { session, loaded, began_on: Some(mesh), simulation, log, deadline, .. } = self else {
+        let Self { session, began_on: Some((loaded, mesh)), simulation, log, deadline, .. } = self else {
             return Ok(Errors::default());
         };
         let of_mesh = error_of_mesh(session, &loaded.job, simulation)?;

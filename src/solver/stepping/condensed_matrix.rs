@@ -85,7 +85,7 @@ pub(super) struct Subspace {
     projection_blocks: Vec<f64>,
     /// The same of symmetric, positive forces in addition to `S`; empty if there are none.
     additions: Vec<f64>,
-    /// `S` as a full matrix, in the order of the motions, once it was needed; its lower half.
+    /// `L L^T` as a full matrix, in the order of the motions, once it was needed.
     product: Vec<f64>,
     factor: Option<LocalFactor>,
     is_active: bool,
@@ -265,47 +265,22 @@ impl CondensedMatrix {
 
     /// Factors `P (S + B) P + k (I - P)` with the blocks of `P` and of the additions `B`, in the order of the motions.
     fn factor_on_subspace(&self, subspace: &mut Subspace) -> Result<LocalFactor> {
-        let size = self.positions.len();
-        if subspace.product.is_empty() {
-            self.write_product(&mut subspace.product)?;
+        let Subspace { product, additions, projection_blocks: projection, .. } = subspace;
+        if product.is_empty() {
+            self.write_product(product)?;
         }
-        let mut full = subspace.product.clone();
-        let mean = (0..size).map(|at| full[at * size + at]).sum::<f64>() / size as f64;
-        let mut first = 0;
-        for node in &self.nodes {
-            let blocks = first..first + node.len() * node.len();
-            first = blocks.end;
-            if let Some(block) = subspace.additions.get(blocks.clone()) {
-                for (entry, value) in block.iter().enumerate() {
-                    let (row, column) = (node.start + entry / node.len(), node.start + entry % node.len());
-                    full[column * size + row] += value;
-                }
-            }
-            let block = &subspace.projection_blocks[blocks];
-            for line in 0..size {
-                multiply_entries(&mut full, block, node.clone().map(|at| at * size + line));
-            }
-            for line in 0..size {
-                multiply_entries(&mut full, block, node.clone().map(|at| line * size + at));
-            }
-            for (i, row) in node.clone().enumerate() {
-                for (j, column) in node.clone().enumerate() {
-                    let identity = f64::from(u8::from(i == j));
-                    full[column * size + row] += mean * (identity - block[i * node.len() + j]);
-                }
-            }
-        }
-        LocalFactor::cholesky(size, &full)
+        let full = self.with_blocks(product, &[], [additions, projection, projection]);
+        LocalFactor::cholesky(self.positions.len(), &full)
     }
 
-    /// Factors `R (S + C) P + k (I - P)` with the blocks of the forces `C`, the reduction `R` and the projection `P`, in the order of the
-    /// motions.
-    fn factor_linearised(
+    /// `R (L L^T - D + C) P + k (I - P)` in the order of the motions, given a full `L L^T`, the springs `D` and the blocks of the
+    /// forces `C`, if there are any, and those of the reduction `R` and the projection `P`; `k` is the mean of the diagonal of `L L^T`.
+    fn with_blocks(
         &self,
         product: &[f64],
         springs: &[f64],
-        [forces, reduction, projection]: &[Vec<f64>; 3],
-    ) -> Result<LocalFactor> {
+        [forces, reduction, projection]: [&[f64]; 3],
+    ) -> Vec<f64> {
         let size = self.positions.len();
         let mut full = product.to_vec();
         let mean = (0..size).map(|at| full[at * size + at]).sum::<f64>() / size as f64;
@@ -314,21 +289,16 @@ impl CondensedMatrix {
         for node in &self.nodes {
             let blocks = first..first + node.len() * node.len();
             first = blocks.end;
-            for (entry, value) in forces[blocks].iter().enumerate() {
+            for (entry, value) in forces.get(blocks.clone()).unwrap_or_default().iter().enumerate() {
                 let (row, column) = (node.start + entry / node.len(), node.start + entry % node.len());
                 full[column * size + row] += value;
             }
-        }
-        first = 0;
-        for node in &self.nodes {
-            let blocks = first..first + node.len() * node.len();
-            first = blocks.end;
             let [reduction, projection] = [reduction, projection].map(|all| &all[blocks.clone()]);
             for line in 0..size {
-                multiply_entries(&mut full, reduction, node.clone().map(|at| line * size + at));
+                multiply_entries(&mut full, projection, node.clone().map(|at| at * size + line));
             }
             for line in 0..size {
-                multiply_entries(&mut full, projection, node.clone().map(|at| at * size + line));
+                multiply_entries(&mut full, reduction, node.clone().map(|at| line * size + at));
             }
             for (i, row) in node.clone().enumerate() {
                 for (j, column) in node.clone().enumerate() {
@@ -337,7 +307,7 @@ impl CondensedMatrix {
                 }
             }
         }
-        LocalFactor::lu(size, &full)
+        full
     }
 
     /// The blocks of nodes, node after node of all ranks.
@@ -426,7 +396,8 @@ impl StepMatrix for CondensedMatrix {
             workspace.gathering.gather(&workspace.world, own, &mut springs);
         }
         // Of a singular matrix there are none.
-        subspace.linearised = self.factor_linearised(&subspace.product, &springs, &blocks).ok();
+        let full = self.with_blocks(&subspace.product, &springs, blocks.each_ref().map(Vec::as_slice));
+        subspace.linearised = LocalFactor::lu(self.positions.len(), &full).ok();
         Ok(subspace.linearised.is_some())
     }
 
@@ -497,7 +468,7 @@ fn is_positive(size: usize, block: &[f64]) -> bool {
     true
 }
 
-/// Replaces these entries by their product with a symmetric block.
+/// Replaces these entries by their product with a block, given row by row.
 fn multiply_entries(entries: &mut [f64], block: &[f64], at: impl Iterator<Item = usize> + Clone) {
     let mut before = [0.0; MAX_DIMENSION];
     at.clone().zip(&mut before).for_each(|(at, value)| *value = entries[at]);

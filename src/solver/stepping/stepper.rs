@@ -452,7 +452,7 @@ impl Stepper {
         state: &State,
         step: Step,
     ) -> Result<()> {
-        if self.heat.is_none() || self.heat_of_step.is_some() {
+        if self.heat_of_step.is_some() {
             return Ok(());
         }
         self.finish(body, state, step)?;

@@ -158,11 +158,12 @@ impl<const D: usize> Contact<D> {
     pub fn face(&mut self, nodes: &[PairedNode<D>], displacement: &[f64], keeps_depth: bool) -> Result<()> {
         let keeps_depth = keeps_depth && self.law.has_vertical_parts() && self.wear.is_none();
         for (at, node) in nodes.iter().enumerate() {
-            let point = &self.points[at];
-            let own = self.gap.of_moved(0.0, &point.place, &point.normal, 0.0)?;
-            let depth = -(node.distance + node.stretch * own);
             let point = &mut self.points[at];
-            point.overlap = if keeps_depth && depth > 0.0 { depth } else { 0.0 };
+            point.overlap = 0.0;
+            if keeps_depth {
+                let own = self.gap.of_moved(0.0, &point.place, &point.normal, 0.0)?;
+                point.overlap = (-(node.distance + node.stretch * own)).max(0.0);
+            }
             point.allowance = point.overlap;
             point.set_weight(node.weight);
             point.stretch = node.stretch;

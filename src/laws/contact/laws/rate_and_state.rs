@@ -154,9 +154,7 @@ impl RateAndState {
         // d asinh(y) = y / sqrt(1 + y^2) d ln y.
         [self.direct * value, share * (self.direct / speed + self.evolution * log_slope)]
     }
-}
 
-impl RateAndState {
     /// What `c v` and the friction at a pressure exceed the parameter `s` by, as a function of the logarithm of the velocity `v`.
     fn excess(&self, [s, c, pressure]: [f64; 3], context: SlidingContext) -> impl Fn(f64) -> Evaluated {
         move |logarithm| {

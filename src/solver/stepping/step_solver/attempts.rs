@@ -122,10 +122,7 @@ impl StepSolver {
     ) -> Result<StepOutcome> {
         let mut accuracy = self.accuracy(problem, trial)?;
         if self.springs.are_needed() {
-            match &mut self.first_start {
-                Some(start) => start.copy_from(trial)?,
-                none => none.insert(trial.like()?).copy_from(trial)?,
-            }
+            keep(&mut self.first_start, trial)?;
         }
         let mut failure = None;
         for change in Change::ALL {
@@ -327,10 +324,7 @@ impl StepSolver {
     /// Keeps the velocity from which a step with a factor in single precision starts.
     fn keep_start(&mut self, trial: &DistributedVector) -> Result<()> {
         if self.parts()?.solver.precision() == Some(Precision::Single) {
-            match &mut self.start {
-                Some(start) => start.copy_from(trial)?,
-                none => none.insert(trial.like()?).copy_from(trial)?,
-            }
+            keep(&mut self.start, trial)?;
         }
         Ok(())
     }
@@ -442,6 +436,14 @@ impl Accuracy {
         let floor = if awaits_pressure { Floor::default() } else { floor };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
         System { matrix, right_hand_side, tolerance, floor, is_first_try, converged, scales }
+    }
+}
+
+/// Keeps a copy of a vector.
+fn keep(place: &mut Option<DistributedVector>, vector: &DistributedVector) -> Result<()> {
+    match place {
+        Some(kept) => kept.copy_from(vector),
+        none => none.insert(vector.like()?).copy_from(vector),
     }
 }
 
