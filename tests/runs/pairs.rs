@@ -136,6 +136,9 @@ fn a_block_that_slides_over_the_end_of_a_plate_gains_no_energy_by_short_steps() 
     let history = straight.table("history.csv");
     let (lost, all) = (history.last("contact_dissipation"), straight.text("history.csv"));
     assert!(lost.abs() < 0.5, "{lost} J");
+    let forces = straight.table("resultants.csv").only("source", "contact block.bottom").numbers("force_y");
+    let largest = forces.into_iter().fold(0.0, f64::max);
+    assert!(largest > 200.0, "{largest} N do not bear its weight of 200 N");
     let checkpoint = case.folder().join("out/checkpoint-1000.h5");
     case.run_with(1, &["--restart", &checkpoint.display().to_string()]).expect(0);
     assert!(case.results().text("history.csv") == all, "in its middle");
