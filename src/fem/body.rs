@@ -166,24 +166,25 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.in_unknowns(session, rows)
     }
 
-    /// The same matrix with the derivatives of what cells add to the stress at the end of the step, averaged over each cell. Collective.
+    /// The same matrix with the symmetric part of the derivatives of what cells add to the stress at the end of the step. Collective.
     pub fn matrix_with(
         &self,
         session: &Session,
         length: f64,
         tangents: &Tangents,
     ) -> Result<BlockRows, Agreed> {
-        let cells = self.geometry.point_count() / self.geometry.points();
-        let mut means = vec![0.0; cells * S * S];
+        let points = self.geometry.points();
+        let mut of_points = vec![None; self.geometry.point_count()];
         for (number, tangent) in tangents.iter::<S>() {
-            let (cell, _, point) = self.geometry.point(number);
-            let whole = self.geometry.cell_at(cell).whole();
-            let mean = &mut means[cell * S * S..][..S * S];
-            mean.iter_mut().zip(tangent).for_each(|(mean, t)| *mean += point.volume / whole.volume * t);
+            let (cell, point, _) = self.geometry.point(number);
+            of_points[cell * points + point] = Some(tangent);
         }
-        let rows = self.assemble_rows(session, length, |cell, geometry, matrix| {
-            let mean = &means[cell * S * S..][..S * S];
-            matrix.add_form(geometry, 1.0, &Anisotropic::of_entries::<S>(mean));
+        let rows = self.assemble_rows(session, length, |number, cell, matrix| {
+            for (point, tangent) in of_points[number * points..][..points].iter().enumerate() {
+                if let Some(tangent) = tangent {
+                    matrix.add_form_at((cell, point), 1.0, &Anisotropic::of_entries::<S>(tangent));
+                }
+            }
         })?;
         self.in_unknowns(session, rows)
     }

@@ -91,20 +91,28 @@ impl<const D: usize> CellMatrix<D> {
     /// Adds `factor * integral of e(w) : T(e(v))`.
     #[inline]
     pub fn add_form(&mut self, cell: Cell<'_, D>, factor: f64, tensor: &impl LinearTensor) {
-        let linear = |cell: &Simplex<D>| {
-            let mut blocks = [[[[0.0; D]; D]; 4]; 4];
-            add_linear(&mut blocks, cell, factor, tensor);
-            blocks
-        };
         match cell.shape() {
-            CellShape::Linear | CellShape::LinearRing(_) => {
-                add_linear(&mut self.blocks, &cell.point(0), factor, tensor);
+            CellShape::Straight => {
+                let linear = linear_blocks(&cell.whole(), factor, tensor);
+                add_products(&mut self.blocks, &self.products, &linear);
             }
-            CellShape::Straight => add_products(&mut self.blocks, &self.products, &linear(&cell.whole())),
-            CellShape::Curved(_) => {
-                for (point, products) in self.products_at.iter().enumerate() {
-                    add_products(&mut self.blocks, products, &linear(&cell.point(point)));
-                }
+            _ => (0..cell.points()).for_each(|point| self.add_form_at((cell, point), factor, tensor)),
+        }
+    }
+
+    /// The same for one of the cell's points alone.
+    #[inline]
+    pub fn add_form_at(
+        &mut self,
+        (cell, point): (Cell<'_, D>, usize),
+        factor: f64,
+        tensor: &impl LinearTensor,
+    ) {
+        let simplex = cell.point(point);
+        match self.products_at.get(point) {
+            None => add_linear(&mut self.blocks, &simplex, factor, tensor),
+            Some(products) => {
+                add_products(&mut self.blocks, products, &linear_blocks(&simplex, factor, tensor));
             }
         }
     }
@@ -158,6 +166,18 @@ fn add_linear<const D: usize, const N: usize>(
             tensor.add_block(factor, cell.volume, [&slope(a), &slope(b)], &mut blocks[a][b]);
         }
     }
+}
+
+/// The matrix of a linear cell.
+#[inline(always)]
+fn linear_blocks<const D: usize>(
+    cell: &Simplex<D>,
+    factor: f64,
+    tensor: &impl LinearTensor,
+) -> [[Block<D>; 4]; 4] {
+    let mut blocks = [[[[0.0; D]; D]; 4]; 4];
+    add_linear(&mut blocks, cell, factor, tensor);
+    blocks
 }
 
 /// Adds the matrix of a quadratic cell, given that of the linear one.

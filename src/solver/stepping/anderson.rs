@@ -24,13 +24,13 @@ pub(super) struct Anderson {
 }
 
 impl Anderson {
-    /// For vectors like this one, and differences of this number of corrections, at most 4.
-    pub(super) fn new(like: &DistributedVector, depth: usize) -> Result<Self> {
+    /// For vectors like this one.
+    pub(super) fn new(like: &DistributedVector) -> Result<Self> {
         let two = || Ok([like.like()?, like.like()?]);
         Ok(Self {
             last: two()?,
             has_last: false,
-            differences: (0..depth.min(MOST)).map(|_| two()).collect::<Result<_>>()?,
+            differences: (0..MOST).map(|_| two()).collect::<Result<_>>()?,
             count: 0,
             products: [[0.0; MOST]; MOST],
         })

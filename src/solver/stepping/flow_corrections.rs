@@ -6,8 +6,10 @@
 //! one evaluation of the flow, without its derivative. The forces of the next correction are those of the last one, extrapolated along
 //! those before (see [`anderson`](super::anderson)).
 //!
-//! What is factored may be another matrix `K'`: with the derivatives of `F` at a velocity that the step has met, where these stiffen the
-//! body. Then `F(v)` stands for `F(v) - (K' - K) v`. Where corrections converge slowly, such derivatives are found anew.
+//! What is factored may be another matrix `K'`: with the derivatives of `F` at a velocity that the step has met. Then `F(v)` stands for
+//! `F(v) - (K' - K) v`. Where corrections converge slowly, such derivatives are found anew: with those at its start a correction is a step
+//! of Newton's method for the flow, in which the contact is solved, not linearised. Along it the forces of the contact at its end are those
+//! of a convex energy; it is shortened to where its power, with these forces, nearly vanishes.
 //!
 //! Where that does not help, Newton's method solves the equations of the whole body, from the velocity reached. Its linear
 //! systems are preconditioned by the same factor. The choice depends on this step alone: a restarted run makes the same.
@@ -34,15 +36,12 @@ use std::cell::RefCell;
 
 /// A correction that leaves more than this share of the residual is slow: Newton's method takes some ten solves.
 const SLOW: f64 = 0.2;
-
-/// Number of corrections after which a factor with derivatives at the velocity reached takes the place of one without, or with those of an
-/// earlier step: it costs less than a few corrections, and two of them then suffice.
-const MAX_WITH_TANGENTS: usize = 6;
-/// Such corrections may leave a larger residual than those before, up to this multiple.
-const LARGEST_GROWTH: f64 = 10.0;
-/// Numbers of differences along which forces are extrapolated.
-const DEPTH: usize = 1;
-const DEPTH_WITH_TANGENTS: usize = 4;
+/// The same with derivatives of the flow in the factor, in 2D and 3D: new ones cost as much as a few corrections, and as more of them in 3D.
+const SLOW_WITH_TANGENTS: [f64; 2] = [0.1, 0.3];
+/// A correction is shortened until this share of the power along it is left, at most so often, each time by at least this share of the range.
+const LEFT_POWER: f64 = 0.5;
+const MOST_SHORTER: usize = 8;
+const LEAST_REDUCTION: f64 = 0.1;
 
 /// How corrections end, with their work.
 pub(super) enum Corrected {
@@ -56,8 +55,6 @@ pub(super) struct StepFactor<'a> {
     pub solver: &'a mut dyn LinearSolver,
     /// The matrix `K'`, unless it is that of the step.
     pub other: Option<&'a dyn StepMatrix>,
-    /// Whether it may be replaced by one with derivatives.
-    pub is_replaceable: bool,
 }
 
 /// Work data of steps in which cells flow.
@@ -73,8 +70,10 @@ pub(super) struct FlowCorrections {
     earlier: Anderson,
     /// `b - F_i`.
     right_hand_side: DistributedVector,
-    /// The velocity from which the step was started.
+    /// The velocity from which corrections go on.
     start: DistributedVector,
+    /// The norm of the residual that the last one left, in N.
+    left: f64,
     /// Newton's method for the whole body, once it was needed.
     whole: Option<Box<WholeBody>>,
     settings: SolverSettings,
@@ -88,54 +87,62 @@ struct WholeBody {
 }
 
 impl FlowCorrections {
-    /// For cells that flow, with vectors of the layout of `like`; whether derivatives of what they add stiffen the body.
-    pub(super) fn new(like: &DistributedVector, settings: &SolverSettings, stiffens: bool) -> Result<Self> {
-        let depth = if stiffens { DEPTH_WITH_TANGENTS } else { DEPTH };
+    /// For cells that flow, with vectors of the layout of `like`.
+    pub(super) fn new(like: &DistributedVector, settings: &SolverSettings) -> Result<Self> {
         Ok(Self {
             flow: Flow::new(like)?,
             product: like.like()?,
             given: like.like()?,
             found: like.like()?,
             change: like.like()?,
-            earlier: Anderson::new(like, depth)?,
+            earlier: Anderson::new(like)?,
             right_hand_side: like.like()?,
             start: like.like()?,
+            left: f64::INFINITY,
             whole: None,
             settings: settings.clone(),
         })
+    }
+
+    /// Begins a step.
+    pub(super) fn begin(&mut self) {
+        self.left = f64::INFINITY;
     }
 
     /// Makes corrections of the velocity in `trial` with a solver of the matrix of the step. Collective.
     pub(super) fn correct<const D: usize, const S: usize>(
         &mut self,
         newton: &mut Newton,
-        StepFactor { solver, other, is_replaceable }: StepFactor<'_>,
+        StepFactor { solver, other }: StepFactor<'_>,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<Corrected> {
         let of_step = system.matrix;
         let system = System { matrix: other.unwrap_or(of_step), ..system };
-        let (slow, most) = match is_replaceable {
-            true => (LARGEST_GROWTH, MAX_WITH_TANGENTS),
-            false => (SLOW, MAX_CORRECTIONS),
-        };
+        let has_tangents = other.is_some();
+        let share = if has_tangents { SLOW_WITH_TANGENTS[usize::from(D == 3)] } else { SLOW };
         self.earlier.restart();
         self.start.copy_from(trial)?;
         self.evaluate(problem, trial)?;
         self.subtract_stiffening(of_step, other, trial)?;
         self.given.copy_from(&self.found)?;
         solver.start(system, trial)?;
-        let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
+        let mut sum = StepOutcome::default();
         let mut has_progressed = true;
-        for _ in 0..most {
+        let mut flows_at_first = !has_tangents;
+        for number in 0..MAX_CORRECTIONS {
             self.right_hand_side.copy_from(system.right_hand_side)?;
             self.right_hand_side.add_scaled(-1.0, &self.given)?;
             let tolerance = CONTACT_SHARE * system.tolerance;
             let of_contact = System { right_hand_side: &self.right_hand_side, tolerance, ..system };
             let reduced = solver.condense(of_contact, trial)?;
             match problem.session.agree(newton.solve(problem, reduced)) {
-                Ok(outcome) => sum = sum.followed_by(outcome),
+                Ok(mut outcome) => {
+                    // A correction of the flow is an iteration, even if none of the contact is needed.
+                    outcome.newton_iterations = outcome.newton_iterations.max(1);
+                    sum = sum.followed_by(outcome);
+                }
                 Err(failure) if failure.is_failure() => {
                     self.restart(problem, trial)?;
                     has_progressed = false;
@@ -151,17 +158,73 @@ impl FlowCorrections {
                 trial.update_ghosts()?;
                 return Ok(Corrected::Solved(StepOutcome { residual: sum.residual.hypot(left), ..sum }));
             }
-            if left.is_nan() || left > slow * last {
-                if left.is_nan() || left > last.max(slow * last) {
-                    self.restart(problem, trial)?;
-                    has_progressed = false;
-                }
+            let last = std::mem::replace(&mut self.left, left);
+            let (is_better, is_slow) = (left <= last, left.is_nan() || left > share * last);
+            if is_slow && has_tangents && number == 0 {
+                self.shorten(problem, of_step, trial)?;
                 break;
             }
-            self.earlier.extrapolate(&self.found, &self.change, &mut self.given)?;
-            last = left.min(last);
+            if is_better {
+                self.start.copy_from(trial)?;
+            } else {
+                self.restart(problem, trial)?;
+                has_progressed = number > 0 && has_tangents;
+                self.left = last;
+            }
+            if !is_slow {
+                self.earlier.extrapolate(&self.found, &self.change, &mut self.given)?;
+            } else if flows_at_first {
+                // The velocity from which the step starts may be one at which cells flow that do not flow in the step.
+                self.earlier.restart();
+                self.given.fill(0.0)?;
+                flows_at_first = false;
+            } else {
+                break;
+            }
         }
         Ok(Corrected::Unfinished(sum, has_progressed))
+    }
+
+    /// Shortens a correction to where the power of the forces along it nearly vanishes, with those of the contact at its end; uses the
+    /// vectors of further corrections. Collective.
+    fn shorten<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        of_step: &dyn StepMatrix,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        // The forces of flow with which the correction was made, at its end; and the correction.
+        self.evaluate(problem, trial)?;
+        self.given.copy_from(&self.found)?;
+        self.given.add_scaled(-1.0, &self.change)?;
+        self.right_hand_side.copy_from(trial)?;
+        self.right_hand_side.add_scaled(-1.0, &self.start)?;
+        let of_matrix = of_step.power(&self.right_hand_side)?;
+        let made_with = self.right_hand_side.dot(&self.given)?;
+        let mut power = |share: f64| -> Result<f64> {
+            trial.copy_from(&self.start)?;
+            trial.add_scaled(share, &self.right_hand_side)?;
+            self.evaluate(problem, trial)?;
+            Ok(self.right_hand_side.dot(&self.found)? - made_with - (1.0 - share) * of_matrix)
+        };
+        let first = power(0.0)?;
+        let mut ends = [(0.0, first), (1.0, f64::INFINITY)];
+        let mut share = 1.0;
+        for number in 0..MOST_SHORTER {
+            let value = power(share)?;
+            // The energy falls up to the end, or does not fall at all.
+            let is_whole = number == 0 && (value < 0.0 || first >= 0.0);
+            if is_whole || value.abs() <= LEFT_POWER * first.abs() {
+                break;
+            }
+            let is_near = value < 0.0;
+            ends[usize::from(!is_near)] = (share, value);
+            let [(near, low), (far, high)] = ends;
+            let (root, margin) = (near - low * (far - near) / (high - low), LEAST_REDUCTION * (far - near));
+            share =
+                if root.is_finite() { root.clamp(near + margin, far - margin) } else { 0.5 * (near + far) };
+        }
+        Ok(())
     }
 
     /// Takes from the forces in `found` what another factored matrix has beyond that of the step. Collective.

@@ -16,7 +16,7 @@ pub struct StepClock {
     pub solve: Duration,
     /// Energy balance and certificates of the step.
     pub balance: Duration,
-    /// Matrix assembly and preconditioner, each time the step length changes.
+    /// Matrix assembly and preconditioner, where the step length has changed or cells have flowed.
     pub assembly: Duration,
     /// The part of `assembly` spent before the first step.
     pub first_assembly: Duration,

@@ -23,7 +23,10 @@ use crate::{
     linear_algebra::petsc::{BlockRows, DistributedVector, Matrix, Precision, has_option},
     parallel::{agreement::Agreed, session::Session},
 };
-use std::cell::Cell;
+use std::{
+    cell::Cell,
+    time::{Duration, Instant},
+};
 
 /// The length of a step, and the length of the steps for which its preconditioner is set up, both as used in matrices, in s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +64,8 @@ pub(super) struct StepSolver {
     products: Cell<u64>,
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
+    /// Time spent on factors with derivatives at velocities of steps, until it is taken.
+    refactoring: Duration,
     /// Springs that keep the factors of bodies supported by contact alone regular.
     springs: Springs,
 }
@@ -99,6 +104,7 @@ impl StepSolver {
             first_start: None,
             products: Cell::new(0),
             cache: None,
+            refactoring: Duration::ZERO,
             springs: Springs::default(),
         })
     }
@@ -129,6 +135,11 @@ impl StepSolver {
             (self.active, self.step_matrix, self.prepared) = (None, None, None);
         }
         self.cache.iter_mut().for_each(FactorCache::forget_tangents);
+    }
+
+    /// The time spent within steps on their matrices and factors since it was last taken.
+    pub(super) fn take_assembly_time(&mut self) -> Duration {
+        std::mem::take(&mut self.refactoring)
     }
 
     /// Whether the matrices belong to these lengths.
@@ -288,6 +299,7 @@ impl StepSolver {
         let (Some(flowing), Some(mut prepared)) = (&mut self.flowing, self.active.take()) else {
             return Err(unassembled());
         };
+        let began = Instant::now();
         let tangents = flowing.tangents(problem, velocity)?;
         let (session, body, like) = (problem.session, &*problem.body, problem.forces);
         let Some(Lengths { matrix: length, .. }) = self.prepared else { return Err(unassembled()) };
@@ -297,9 +309,10 @@ impl StepSolver {
         self.step_matrix.get_or_insert(of_step);
         prepared.has_tangents = true;
         let rows = self.springs.add(session, body, (rows, length))?;
-        let is_factored = self.complete(session, body, &mut prepared, rows, like)?;
+        let is_factored = self.complete(session, body, &mut prepared, rows, like);
         self.active = Some(prepared);
-        Ok(is_factored)
+        self.refactoring += began.elapsed();
+        is_factored
     }
 
     /// Replaces the factor by one without derivatives, in the precision of the next factors. Collective.
@@ -364,7 +377,7 @@ fn nonlinear<const D: usize, const S: usize>(
         let nodes = body.contact_nodes().iter().map(|contact| contact.node).collect();
         newton.flow = Some(Flow::at_nodes(like, solver.unknowns(like), nodes)?);
     } else if body.flows() && solver.precision().is_some() {
-        flowing = Some(Box::new(FlowCorrections::new(like, settings, !body.flows_beside_viscosity())?));
+        flowing = Some(Box::new(FlowCorrections::new(like, settings)?));
     } else if body.flows() {
         newton.flow = Some(Flow::new(like)?);
     }

@@ -328,7 +328,9 @@ impl Stepper {
             supports.set(body, &mut self.trial)?;
         }
         drop(stage);
-        self.clock.solve += solving.elapsed();
+        let assembly = self.solver.take_assembly_time();
+        self.clock.assembly += assembly;
+        self.clock.solve += solving.elapsed().saturating_sub(assembly);
         self.traffic.add_solve(self.solver.traffic(session.ranks())?);
         let outcome = outcome?;
         if body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {

@@ -38,7 +38,7 @@ const LARGEST_FLOOR: f64 = 1e-4;
 const STAGNANT: f64 = 4.0;
 
 /// Number of factors with derivatives at velocities of a step after which Newton's method solves it.
-const MOST_FACTORS: usize = 6;
+const MOST_FACTORS: usize = 15;
 
 /// A body that only contact holds flies away if it moves by more than this multiple of its size in a step.
 const FAR: f64 = 1e3;
@@ -257,7 +257,7 @@ impl StepSolver {
         }
     }
 
-    /// Solves a condensed step in which cells flow: by corrections, where these are slow with a factor that has derivatives at the
+    /// Solves a condensed step in which cells flow: by corrections, where these are slow with factors that have derivatives at the
     /// velocities reached, and where that does not help by Newton's method for the whole body. Collective.
     fn solve_with_flow<const D: usize, const S: usize>(
         &mut self,
@@ -266,8 +266,7 @@ impl StepSolver {
         accuracy: Accuracy,
     ) -> Result<StepOutcome> {
         let session = problem.session;
-        // What is monotone stiffens the body: its derivatives may be part of a factor.
-        let stiffens = problem.body.flows() && !problem.body.flows_beside_viscosity();
+        self.flowing.iter_mut().for_each(|flowing| flowing.begin());
         let (mut factors, mut earlier) = (0, StepOutcome::default());
         loop {
             self.keep_start(trial)?;
@@ -277,7 +276,7 @@ impl StepSolver {
                 return Err(unassembled());
             };
             let system = accuracy.system(problem, &matrix, scales);
-            let is_replaceable = stiffens && factors < MOST_FACTORS;
+            let is_replaceable = factors < MOST_FACTORS;
             let other: Option<&dyn StepMatrix> = match &factored {
                 FactorOf::Tangents(other) => Some(other),
                 FactorOf::Step | FactorOf::AnotherLength => None,
@@ -285,7 +284,7 @@ impl StepSolver {
             let corrected = match factored {
                 FactorOf::AnotherLength => Corrected::Unfinished(StepOutcome::default(), false),
                 FactorOf::Step | FactorOf::Tangents(_) => {
-                    let factor = StepFactor { solver: &mut *solver, other, is_replaceable };
+                    let factor = StepFactor { solver: &mut *solver, other };
                     flowing.correct(newton, factor, problem, system, trial)?
                 }
             };
@@ -301,7 +300,12 @@ impl StepSolver {
                     return Ok(earlier.followed_by(work).followed_by(outcome));
                 }
             }
-            if !session.agree(self.refactor_with_tangents(problem, trial))? {
+            let is_factored = match session.agree(self.refactor_with_tangents(problem, trial)) {
+                // Where the flow softens, its derivatives may make the matrix indefinite.
+                Err(error) if error.is_failure() => false,
+                is_factored => is_factored?,
+            };
+            if !is_factored {
                 session.agree(self.refactor(problem))?;
                 factors = MOST_FACTORS;
             }
