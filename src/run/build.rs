@@ -117,14 +117,20 @@ fn contacts<const D: usize>(
         if let Some(pair) = pairs.iter().find(|pair| pair.contact == number) {
             facets.clone_from(&pair.on);
         }
-        if let Some(motion) = motion {
-            let points = surface_points(session, mesh, &facets)?;
-            session.agree(refuse_moving_contact(contact, mesh, &points, (held, motion)))?;
-        }
         let (law, gap) = session.agree(normal_law(contact))?;
         let paired = nodes_of(pairs, number).map(<[_]>::to_vec);
         let conditions = ContactConditions { quadrature: contact.quadrature, law, gap, paired };
         let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
+        laws.turn_edges(session, mesh, held, job.time.end)?;
+        if let Some(motion) = motion {
+            let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired()
+            {
+                laws.surface_points().collect()
+            } else {
+                surface_points(session, mesh, &facets)?.into_iter().map(|point| held.whole(point)).collect()
+            };
+            session.agree(refuse_moving_contact(contact, mesh, &points, (held, motion)))?;
+        }
         laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
         laws.wear = contact.wear;
         laws.shares_of_heat = contact.shares_of_heat();
@@ -328,7 +334,7 @@ fn refuse_moving_contact<const D: usize>(
     points: &[SurfacePoint<D>],
     (held, motion): (&Held<D>, &SupportMotion<D>),
 ) -> Result<()> {
-    for point in points.iter().map(|point| held.whole(*point)) {
+    for point in points {
         let (node, place) = (point.node as usize, mesh.nodes[point.node as usize]);
         let free = norm(&held.free_part(node, &point.normal)) > 1e-9;
         let is_nodal = contact.quadrature == Quadrature::Nodal;

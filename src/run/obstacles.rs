@@ -100,8 +100,9 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     Ok(out)
 }
 
-/// A warning about a plane to which no part of the boundary is parallel, at the start, the end or in the middle of a run to this time in s.
-/// Collective.
+/// A warning about a plane to which no part of the boundary is parallel, at the start, the end or in the middle of a run to this time in
+/// s: all of it is inclined to one side. On a round boundary the smallest angle may be that of the nodes next to the place that is
+/// parallel to the plane. Collective.
 fn warning_of_tilt<const D: usize>(
     session: &Session,
     (number, contact): (usize, &Contact<D>),
@@ -109,7 +110,11 @@ fn warning_of_tilt<const D: usize>(
     end: f64,
 ) -> Option<String> {
     let [angle, time] = [0.0, 0.5 * end, end]
-        .map(|time| [-session.largest([-contact.tilt(time)])[0], time])
+        .map(|time| {
+            let [least, most] = contact.tilts(time);
+            let [least, most] = session.largest([-least, most]);
+            [if most + least < -2.0 * least { -least } else { 0.0 }, time]
+        })
         .into_iter()
         .fold([0.0; 2], |most, found| if found[0].is_finite() && found[0] > most[0] { found } else { most });
     (angle > TILTED).then(|| {

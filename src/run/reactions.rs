@@ -288,9 +288,7 @@ fn residual<const D: usize, const S: usize>(
     let mut of_node: BTreeMap<u32, Vec<SurfacePoint<D>>> = BTreeMap::new();
     let nodal = body.contacts.iter().filter(|contact| !contact.needs_ghosts() && !contact.is_paired());
     for contact in nodal {
-        for point in session.agree(surface_points(session, &body.mesh, contact.facets()))? {
-            of_node.entry(point.node).or_default().push(body.held.whole(point));
-        }
+        contact.surface_points().for_each(|point| of_node.entry(point.node).or_default().push(point));
     }
     let add_tractions = |forces: &mut DistributedVector| {
         let Some(traction) = &state.contact_traction else { return Ok(()) };

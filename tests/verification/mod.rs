@@ -11,6 +11,7 @@ mod belts;
 mod branches;
 mod callbacks;
 mod closed_forms;
+mod corners;
 mod creep;
 mod damage;
 mod damping;

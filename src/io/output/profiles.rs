@@ -40,8 +40,9 @@ struct OptionalColumns {
     friction: bool,
 }
 
-/// Cosine of the angle up to which the normals of a profile and of a contact point are those of the same side of an edge.
-const SAME_SIDE: f64 = 0.7;
+/// Cosine of the angle up to which the normals of a profile and of a contact point are those of the same side of an edge: at the corner of
+/// a cube that touches an obstacle it is 0.58.
+const SAME_SIDE: f64 = 0.5;
 
 /// The profiles of a job.
 #[derive(Debug)]

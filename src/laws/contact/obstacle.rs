@@ -71,8 +71,9 @@ pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector
 macro_rules! obstacles {
     ($($(#[$about:meta])* $obstacle:ident = $name:literal,)*) => {
         /// A rigid obstacle that may move. Friction acts on the velocity relative to the obstacle, averaged over a step. The gap is the
-        /// distance from the undeformed position of a boundary point to the obstacle along the outward normal of the undeformed boundary;
-        /// if this ray does not meet the obstacle, there is no contact.
+        /// distance from the undeformed position of a boundary point to the obstacle along the outward normal of the undeformed boundary,
+        /// at edges and corners of the body along the normal of the obstacle, if it is between those of the faces there; if this ray does
+        /// not meet the obstacle, there is no contact.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[schemars(rename = "Obstacle")]
         pub enum Gap {

@@ -23,7 +23,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     laws::{expression::Scalar, law::LawFault},
-    linear_algebra::tensor::{Vector, add_scaled},
+    linear_algebra::tensor::{Vector, add_scaled, norm},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,11 @@ obstacles! {
     /// triangulated surface.
     Shape = "shape",
 }
+
+/// The half-width for derivatives of the depth, as a share of it and of the coordinates.
+const WIDTH: f64 = 1e-5;
+/// By how much the slope of the depth may differ from 1 where the surface has a normal.
+const NO_NORMAL: f64 = 0.01;
 
 impl Default for Gap {
     fn default() -> Self {
@@ -139,6 +144,28 @@ impl Gap {
         each_obstacle!(self, _ => None, obstacle => Some(obstacle.depth(time, place)))
     }
 
+    /// The direction from a place to the obstacle, a unit vector against the normal of its surface, at that of the times at which it is
+    /// nearest; none where it has none there, as in the middle of a sphere, or where two parts of it are equally near.
+    pub fn direction_of_nearest<const D: usize>(
+        &self,
+        place: &Vector<D>,
+        times: &[f64],
+    ) -> Option<Vector<D>> {
+        let depth = |time: f64, place: &Vector<D>| self.depth(time, place).filter(|depth| depth.is_finite());
+        let depths = times.iter().filter_map(|time| Some((*time, depth(*time, place)?)));
+        let (time, nearest) = depths.reduce(|best, next| if next.1 > best.1 { next } else { best })?;
+        let width = WIDTH * place.iter().fold(nearest.abs(), |most, x| most.max(x.abs()));
+        let mut direction = [0.0; D];
+        for (i, component) in direction.iter_mut().enumerate() {
+            let at = |length: f64| {
+                depth(time, &std::array::from_fn(|j| place[j] + if i == j { length } else { 0.0 }))
+            };
+            *component = (at(width)? - at(-width)?) / (2.0 * width);
+        }
+        let length = norm(&direction);
+        ((length - 1.0).abs() < NO_NORMAL).then(|| direction.map(|x| x / length))
+    }
+
     /// The length of a ray, see [`Obstacle::ray`]; a given gap is that of any ray.
     fn ray<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
         each_obstacle!(self, gap => gap.evaluate(time, place), obstacle => obstacle.ray(time, place, normal))
@@ -156,7 +183,7 @@ impl Gap {
     }
 
     /// Whether the place of the surface depends on the time.
-    pub(super) fn is_driven(&self) -> bool {
+    pub fn is_driven(&self) -> bool {
         let Prescribed { centre, facing, .. } = self.prescribed();
         centre.iter().chain(facing).any(Scalar::depends_on_time)
     }
@@ -190,7 +217,7 @@ impl Gap {
 #[cfg(test)]
 pub(super) mod tests {
     use super::{plane::PARALLEL, *};
-    use crate::linear_algebra::tensor::{dot, norm};
+    use crate::linear_algebra::tensor::dot;
     use proptest::prelude::*;
 
     pub fn numbers(values: &[f64]) -> Vec<Scalar> {
@@ -320,6 +347,24 @@ pub(super) mod tests {
             assert!(error.contains("t = 1 s") && error.contains("[0.25, 0.0]"), "{gap:?}: {error}");
         }
         assert_eq!(Gap::Distance(expression("1/t")).at(0.0, &[0.0, 0.0], &DOWN).unwrap(), f64::INFINITY);
+    }
+
+    #[test]
+    fn the_nearest_obstacle_lies_against_the_normal_of_its_surface() {
+        let close = |found: Option<Vector<2>>, expected: [f64; 2]| {
+            let found = found.expect("a direction");
+            assert!((0..2).all(|i| (found[i] - expected[i]).abs() < 1e-9), "{found:?}, not {expected:?}");
+        };
+        close(floor(-0.5).direction_of_nearest(&[1.0, 0.25], &[0.0]), [0.0, -1.0]);
+        close(disc([3.0, -4.0], false).direction_of_nearest(&[0.0, 0.0], &[0.0]), [0.6, -0.8]);
+        close(disc([0.3, -0.4], true).direction_of_nearest(&[0.0, 0.0], &[0.0]), [-0.6, 0.8]);
+        // It passes below at t = 3 s.
+        let rolling = sphere(vec![expression("t - 3"), Scalar::Number(-4.0)], 2.0, false);
+        close(rolling.direction_of_nearest(&[0.0, 0.0], &[0.0, 1.0, 2.0, 3.0, 4.0]), [0.0, -1.0]);
+        let channel = shape("min(x, y)", vec![]);
+        assert_eq!(channel.direction_of_nearest(&[1.0, 1.0], &[0.0]), None);
+        close(channel.direction_of_nearest(&[1.0, 0.5], &[0.0]), [0.0, -1.0]);
+        assert_eq!(disc([0.0, 0.0], true).direction_of_nearest(&[0.0, 0.0], &[0.0]), None);
     }
 
     proptest! {

@@ -25,6 +25,7 @@
 
 mod bounds;
 mod closeness;
+mod corners;
 mod count;
 mod directions;
 mod driven;

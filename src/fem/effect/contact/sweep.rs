@@ -181,8 +181,9 @@ impl<const D: usize> Contact<D> {
         Closeness::of(session.largest(self.closeness.numbers()))
     }
 
-    /// The smallest angle in rad between the surface at a point on this rank and a plane in front of it at `time`; infinite where none is.
-    pub fn tilt(&self, time: f64) -> f64 {
+    /// The smallest and the largest angle in rad between the surface at a point on this rank and a plane in front of it at `time`;
+    /// infinity and its opposite where none is.
+    pub fn tilts(&self, time: f64) -> [f64; 2] {
         let of_point = |point: &Point<D>| {
             let gap = |along: &Vector<D>| {
                 self.gap
@@ -195,7 +196,9 @@ impl<const D: usize> Contact<D> {
         };
         let is_plane = matches!(self.gap, Gap::Plane(_));
         let angles = self.points.iter().filter(|point| is_plane && point.can_touch()).map(of_point);
-        angles.fold(f64::INFINITY, f64::min)
+        angles.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], angle| {
+            [least.min(angle), most.max(angle)]
+        })
     }
 
     /// The gaps of points on this rank at `time`, from displacements with ghosts. A gap that is NaN is ignored: the first step refuses
