@@ -94,16 +94,17 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         }
         let target = landings.next([state.time, state.step_length]);
         let was_single = scheme.factor_precision() == Some(Precision::Single);
-        let mut outcome = if let Some(adaptive) = adaptive {
-            let outcome = adaptive.advance(session, scheme, body, state, target)?;
+        let outcome = if let Some(adaptive) = adaptive {
+            let outcome = adaptive.advance(session, scheme, body, state, target);
             totals.step_level = Some(adaptive.step_level);
             outcome
         } else {
             let step = landings.fixed_step([state.time, state.step_length], target);
-            let mut outcome = session.agree(scheme.advance(session, body, state, step))?;
-            outcome.landed_on = target.name.filter(|_| step.time == target.time);
-            outcome
+            let landed_on = target.name.filter(|_| step.time == target.time);
+            let outcome = session.agree(scheme.advance(session, body, state, step));
+            outcome.map(|outcome| StepOutcome { landed_on, ..outcome })
         };
+        let mut outcome = outcome.inspect_err(|_| totals.add_work(scheme.take_work()))?;
         let before = *totals;
         // Newton's method may jump over unstable states without having met them.
         outcome.fell |= !body.has_form(Form::Mass) && totals.is_jump(&outcome.energy);

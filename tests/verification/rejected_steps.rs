@@ -36,6 +36,8 @@ fn tried_and_straight(session: &Session, effect: &Acting, scheme: &str) {
             let step = Step { time: state.time + length, length, previous_length: state.step_length };
             scheme.attempt(session, body, state, step).expect("an attempt");
         }
+        // Which the totals would have.
+        trying.scheme.take_work();
         let [one, other] = [&mut straight, &mut trying].map(|run| run.advance(session).expect("a step"));
         if one.is_none() && other.is_none() {
             break;
@@ -46,6 +48,28 @@ fn tried_and_straight(session: &Session, effect: &Acting, scheme: &str) {
     }
     assert!((effect.sign)(&trying.totals) > 1e-3, "{}, {scheme}: {:?}", effect.name, trying.totals);
     assert_eq!(straight.totals, trying.totals, "{}, {scheme}", effect.name);
+}
+
+/// Steps with a first attempt that is not accepted take the iterations of both attempts, which are the same.
+fn counted(session: &Session) {
+    let text = EFFECTS[0].job::<2>("implicit_euler", END / STEPS);
+    let mesh = || rectangle([1.0; 2], [5; 2], Diagonal::Crossed, [1.0; 2]).expect("mesh");
+    let [mut straight, mut trying] = [(); 2].map(|()| simulation::<2, 4>(session, &text, &mesh()));
+    for _ in 0..3 {
+        let Simulation { body, state, scheme, .. } = &mut trying;
+        let step =
+            Step { time: state.time + END / STEPS, length: END / STEPS, previous_length: state.step_length };
+        scheme.attempt(session, body, state, step).expect("an attempt");
+        let [once, twice] = [&mut straight, &mut trying]
+            .map(|run| run.advance(session).expect("a step").expect("a step"))
+            .map(|outcome| [outcome.newton_iterations, outcome.linear_iterations]);
+        assert!(once[0] > 0 && twice == once.map(|count| 2 * count), "{once:?}, {twice:?}");
+    }
+}
+
+#[test]
+fn the_iterations_of_a_step_are_those_of_all_attempts_at_it() {
+    run_on(&[1, 2], |world| counted(&world.session));
 }
 
 fn in_the_plane(session: &Session) {

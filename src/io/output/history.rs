@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     fem::effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, FIRST_OF_HEAT, Peaks, Role},
     linear_algebra::tensor::larger,
-    solver::stepping::{StepLevel, StepOutcome},
+    solver::stepping::{StepLevel, StepOutcome, Work},
 };
 use serde::{Deserialize, Serialize};
 use std::{cmp::Ordering, path::Path};
@@ -230,8 +230,7 @@ impl Totals {
         self.powers = outcome.powers;
         self.peaks.von_mises = larger(self.peaks.von_mises, outcome.peaks.von_mises);
         self.peaks.strain = larger(self.peaks.strain, outcome.peaks.strain);
-        self.newton_iterations += outcome.newton_iterations as u64;
-        self.linear_iterations += outcome.linear_iterations as u64;
+        self.add_work(Work { newton: outcome.newton_iterations, linear: outcome.linear_iterations });
         self.unstable_steps += u64::from(outcome.fell);
         let available = larger(dissipated - numerical, 0.0);
         let failed = failed(energy);
@@ -246,6 +245,12 @@ impl Totals {
 }
 
 impl Totals {
+    /// Adds work that was done for steps.
+    pub fn add_work(&mut self, Work { newton, linear }: Work) {
+        self.newton_iterations += newton as u64;
+        self.linear_iterations += linear as u64;
+    }
+
     /// Whether all totals are finite; a value that is not finite remains in the maxima.
     pub fn are_finite(&self) -> bool {
         let most = [

@@ -46,7 +46,7 @@ pub use equations::{CellForces, ContactEquations, Floor, Scratch, SolveCounts};
 pub use integrator::evaluation;
 pub use linear_solver::{FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize};
 pub use obstacle_motions::ObstacleMotions;
-pub use outcome::StepOutcome;
+pub use outcome::{StepOutcome, Work};
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};
 pub use step_length::{Breakpoint, Forgets, Landing, Landings, TIME_TOLERANCE, without_rounding};

@@ -113,9 +113,21 @@ impl Newton {
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
-        mut equations: Reduced<'_>,
+        equations: Reduced<'_>,
     ) -> Result<StepOutcome> {
         self.counts.restart();
+        let solved = self.try_fallbacks(problem, equations);
+        problem.work.newton += self.counts.newton_iterations;
+        problem.work.linear += self.counts.linear_iterations;
+        solved
+    }
+
+    /// The same, where work is not counted yet.
+    fn try_fallbacks<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        mut equations: Reduced<'_>,
+    ) -> Result<StepOutcome> {
         let system = equations.system;
         if let Some(bounded) = &mut self.bounded {
             write_branches(problem.body, system.converged, &mut self.branches_before)?;

@@ -5,12 +5,21 @@ use crate::{
     parallel::session::Session,
 };
 
+/// The work of all attempts at a step, those that failed among them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Work {
+    /// Newton iterations.
+    pub newton: usize,
+    /// Krylov iterations.
+    pub linear: usize,
+}
+
 /// Work and accuracy of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepOutcome {
-    /// Newton iterations; 0 if a step is linear.
+    /// Newton iterations of all attempts, once the step is complete; 0 if a step is linear.
     pub newton_iterations: usize,
-    /// Krylov iterations.
+    /// Krylov iterations of all attempts, once it is complete.
     pub linear_iterations: usize,
     /// Contact points that changed their branch, over all ranks.
     pub active_changes: usize,
@@ -39,11 +48,9 @@ pub struct StepOutcome {
 }
 
 impl StepOutcome {
-    /// The outcome of a further solve, with the work of this one.
+    /// The outcome of a further solve, with what was found in this one.
     pub(super) fn followed_by(self, next: Self) -> Self {
         Self {
-            newton_iterations: self.newton_iterations + next.newton_iterations,
-            linear_iterations: self.linear_iterations + next.linear_iterations,
             indefinite_solves: self.indefinite_solves + next.indefinite_solves,
             fell: self.fell || next.fell,
             ..next

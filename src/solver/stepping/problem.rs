@@ -3,6 +3,7 @@
 use super::{
     equations::{Floor, StepMatrix},
     flow::FlowStart,
+    outcome::Work,
 };
 use crate::{
     error::{Error, Result},
@@ -37,6 +38,8 @@ pub(super) struct StepProblem<'a, const D: usize, const S: usize> {
     pub rounding: f64,
     /// The displacement from which the step starts.
     pub flow_start: FlowStart<'a>,
+    /// The work done for the step.
+    pub work: &'a mut Work,
 }
 
 /// The equations `K v + C(v) = b` of Newton's method: for the whole body, or for its contact nodes alone.

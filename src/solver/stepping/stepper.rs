@@ -1,7 +1,7 @@
 //! The sequence of a step, common to all schemes: matrix, right-hand side, contact, solution, commit, energy balance.
 
 use super::{
-    StepOutcome,
+    StepOutcome, Work,
     contacts::{commit_tractions, keep_closeness, prepare_contacts, refuse_passage},
     factor_cache::nearest_cached_length,
     force_scale::ForceScale,
@@ -68,6 +68,8 @@ pub struct Stepper {
     /// The work in J of thermal expansion at the start of the step, from then until it is accepted.
     thermal_work: Option<f64>,
     trial: DistributedVector,
+    /// The work done since the last step that was accepted.
+    work: Work,
     /// The velocity of the converged state in the unknowns of a step, with contact between bodies.
     converged: Option<DistributedVector>,
     /// Whether the scheme has completed the last attempted step, so that trial histories belong to its solution.
@@ -144,6 +146,7 @@ impl Stepper {
             heat_of_step: None,
             thermal_work: None,
             trial: state.velocity.like()?,
+            work: Work::default(),
             converged: if body.coupling.is_some() { Some(state.velocity.like()?) } else { None },
             is_finished: false,
             workspace: ErrorWorkspace::default(),
@@ -160,6 +163,11 @@ impl Stepper {
             traffic: StepTraffic::default(),
             passes: PassBytes::of(body),
         })
+    }
+
+    /// The work done since the last step that was accepted, which it then no longer counts.
+    pub fn take_work(&mut self) -> Work {
+        std::mem::take(&mut self.work)
     }
 
     /// The scheme.
@@ -386,6 +394,7 @@ impl Stepper {
             scale,
             rounding: self.integrator.rounding(session),
             flow_start: self.integrator.flow_start(state, step.length),
+            work: &mut self.work,
         };
         if self.other_starts == 0 || problem.body.contacts.is_empty() {
             self.solver.solve(&mut problem, &mut self.trial)
@@ -490,6 +499,8 @@ impl Stepper {
         step: Step,
         outcome: &mut StepOutcome,
     ) -> Result<()> {
+        let Work { newton, linear } = self.take_work();
+        (outcome.newton_iterations, outcome.linear_iterations) = (newton, linear);
         let solving = Instant::now();
         let stage = self.stages.solve.enter()?;
         self.finish(body, state, step)?;

@@ -49,7 +49,7 @@ impl Newton {
         Ok(StepOutcome { fell: may_have_fallen && self.counts.unstable > 0, ..outcome })
     }
 
-    /// Checks the distance from the graphs of this solution, whose ghosts are updated, and summarises the work of the step. Collective.
+    /// Checks the distance from the graphs of this solution, whose ghosts are updated, and summarises the solution. Collective.
     pub(super) fn check_inclusion<const D: usize, const S: usize>(
         &mut self,
         problem: &StepProblem<'_, D, S>,
@@ -71,8 +71,6 @@ impl Newton {
             points.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
         }
         Ok(StepOutcome {
-            newton_iterations: self.counts.newton_iterations,
-            linear_iterations: self.counts.linear_iterations,
             active_changes: session.total(changes),
             points: PointCount::from_array(session.sum(points)),
             indefinite_solves: self.counts.indefinite,

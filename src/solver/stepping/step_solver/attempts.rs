@@ -478,12 +478,13 @@ fn farthest<const D: usize, const S: usize>(problem: &StepProblem<'_, D, S>) -> 
 /// Solves a step without contact and flow. Collective.
 fn solve_linear<const D: usize, const S: usize>(
     ksp: &mut Ksp,
-    problem: &StepProblem<'_, D, S>,
+    problem: &mut StepProblem<'_, D, S>,
     system: System<'_>,
     trial: &mut DistributedVector,
 ) -> Result<StepOutcome> {
     ksp.set_tolerances(0.0, system.tolerance, LINEAR_ITERATIONS)?;
     let outcome = problem.session.agree(ksp.solve(problem.forces, trial))?;
+    problem.work.linear += outcome.iterations;
     let mut residual = outcome.residual;
     if !outcome.converged() {
         let mut left = trial.like()?;
@@ -493,5 +494,5 @@ fn solve_linear<const D: usize, const S: usize>(
             return Err(problem.failed(outcome.description(), REMEDY));
         }
     }
-    Ok(StepOutcome { linear_iterations: outcome.iterations, residual, ..StepOutcome::default() })
+    Ok(StepOutcome { residual, ..StepOutcome::default() })
 }
