@@ -160,7 +160,11 @@ impl Newton {
                     }
                     _ => {}
                 }
-                match self.solve_with_bounds(problem, &mut equations, fallback)? {
+                let mut reason = self.solve_with_bounds(problem, &mut equations, fallback)?;
+                if reason.is_none() && is_yielding(&fallback) {
+                    reason = self.sharpen(problem, &mut equations, fallback)?;
+                }
+                match reason {
                     None if self.suits_friction(problem) => {
                         return self.finish(problem, &mut equations, fallback.search);
                     }

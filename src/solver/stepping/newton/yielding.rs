@@ -6,7 +6,8 @@ use crate::{
     fem::{body::Body, effect::Contact},
     linear_algebra::petsc::DistributedVector,
     solver::stepping::{
-        fallbacks::Search,
+        fallbacks::{Fallback, Search},
+        linear_solver::FrictionIteration,
         problem::{StepProblem, System},
         solver::Reduced,
     },
@@ -18,13 +19,25 @@ const FIRST_RATIO: f64 = 100.0;
 const RATIO_FACTOR: f64 = 0.01;
 const LARGEST_RATIO_FACTOR: f64 = 0.9;
 const LAST_RATIO: f64 = 1e-3;
+/// The tolerance of full steps from the last of these solutions, relative to that of the step.
+const SHARP: f64 = 1e-3;
 /// The tolerance of these solutions relative to that of the step.
 const YIELDING_TOLERANCE: f64 = 1e5;
 
 impl Newton {
     /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
-    /// none. Collective.
+    /// none. Afterwards no point yields, whatever the outcome. Collective.
     pub(super) fn solve_yielding<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+    ) -> Result<()> {
+        let solved = self.yield_less_and_less(problem, equations);
+        problem.body.contacts.iter_mut().for_each(|contact| contact.set_give(0.0));
+        solved
+    }
+
+    fn yield_less_and_less<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         equations: &mut Reduced<'_>,
@@ -61,8 +74,31 @@ impl Newton {
             }
             ratio = last * factor;
         }
-        problem.body.contacts.iter_mut().for_each(|contact| contact.set_give(0.0));
         Ok(())
+    }
+
+    /// Goes on by full steps from a solution that followed points which yield: their energies are flat near it, so that descents end within
+    /// the tolerance but far from the accuracy of Newton's method. Goes back to that solution where full steps find none; returns the reason for failure, if that is none
+    /// any more. Collective.
+    pub(super) fn sharpen<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+        fallback: Fallback,
+    ) -> Result<Option<String>> {
+        let scales = equations.system.scales;
+        self.keep_reached(&problem.body.contacts, equations.velocity)?;
+        let newton = Fallback { iteration: FrictionIteration::Newton, ..fallback };
+        self.set_graph_parameters(&mut problem.body.contacts, scales, newton);
+        self.scratch.restart();
+        if self.attempt(problem, equations, Search::FullSteps, SHARP)?.is_none() {
+            return Ok(None);
+        }
+        self.set_graph_parameters(&mut problem.body.contacts, scales, fallback);
+        self.go_to_reached(problem, equations)?;
+        self.fix_bounds(problem, equations.system)?;
+        self.go_to_reached(problem, equations)?;
+        self.solve_with_bounds(problem, equations, fallback)
     }
 
     /// Evaluates the contacts at the velocity from which they are solved. Collective.
