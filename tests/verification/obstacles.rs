@@ -314,6 +314,33 @@ fn several(session: &Session, folder: &std::path::Path) {
     }
 }
 
+/// A plane that is inside of the body at the start, as a constraint and as the vertical end of a graph.
+fn interference(session: &Session) {
+    let found = [UNILATERAL, "[contact.normal.displacement_graph]\npoints = [[0, 0]]\nslope_after = inf\n"]
+        .map(|law| {
+            let plane = "[contact.obstacle.plane]\npoint = [0, 1e-3]\nnormal = [0, 1]\n";
+            let text = format!(
+                "{}{}[[contact]]\non = [\"bottom\"]\n{law}{plane}",
+                body::<2>(false),
+                time(0.5, 2, "")
+            );
+            let mut run = simulation::<2, 4>(session, &text, &crossed([4, 3]));
+            while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}
+            (run.totals.energy, run.totals.energy_of_scheme())
+        });
+    for (energy, generated) in found {
+        assert!(energy[CONTACT] < 0.0 && generated == 0.0, "{energy:?}, {generated}");
+        let off =
+            (energy[CONTACT] - found[0].0[CONTACT]).abs() + (energy[ELASTIC] - found[0].0[ELASTIC]).abs();
+        assert!(off < 1e-9 * energy[ELASTIC], "{energy:?}, not {:?}", found[0].0);
+    }
+}
+
+#[test]
+fn rigid_obstacles_inside_of_the_body_give_it_the_same_energy_by_constraints_and_by_graphs() {
+    run_on(&[1], |world| interference(&world.session));
+}
+
 #[test]
 fn an_elastic_bar_is_thrown_back_by_a_wall_as_travelling_waves_say() {
     run_on(&[1], |world| impacts(&world.session));

@@ -150,6 +150,11 @@ pub trait Response {
         None
     }
 
+    /// The penetration in m of a rigid obstacle behind a law of the penetration, and the pressure in Pa at which its graph becomes vertical.
+    fn wall(&self) -> Option<[f64; 2]> {
+        None
+    }
+
     /// The coefficient in Pa s/m of a dashpot beside a law of the penetration; 0 without one.
     fn damping(&self) -> f64 {
         0.0
@@ -205,6 +210,7 @@ macro_rules! normal_laws {
                 monotonicity_constant(step_length: f64) -> f64;
                 greatest_pressure() -> f64;
                 energy(penetration: f64) -> Option<f64>;
+                wall() -> Option<[f64; 2]>;
                 damping() -> f64;
                 damping_pressure(penetration: f64, node: NodeContext) -> f64;
                 corners() -> &[[f64; 2]];

@@ -30,8 +30,8 @@ pub trait StoringGraph {
     /// The mean pressure in Pa between two different or equal penetrations in m, and its derivative in Pa/m with respect to the second.
     fn mean(&self, before: f64, after: f64) -> [f64; 2];
 
-    /// The penetration in m of a rigid obstacle.
-    fn wall(&self) -> Option<f64> {
+    /// The penetration in m of a rigid obstacle, and the pressure in Pa at which the graph becomes vertical there.
+    fn wall(&self) -> Option<[f64; 2]> {
         None
     }
 }
@@ -55,7 +55,7 @@ impl<G: StoringGraph> Potential for PenetrationLaw<G> {
         Vertical {
             jump: nearest.filter(|jump| off(jump) <= ROUNDING * extent).map(pressures),
             nearest: nearest.map(|jump| (jump[0][0], pressures(jump))),
-            wall: self.0.wall(),
+            wall: self.0.wall().map(|[penetration, _]| penetration),
         }
     }
 
@@ -145,6 +145,10 @@ impl<G: StoringGraph> Response for PenetrationLaw<G> {
 
     fn energy(&self, penetration: f64) -> Option<f64> {
         Some(self.0.potential(penetration))
+    }
+
+    fn wall(&self) -> Option<[f64; 2]> {
+        self.0.wall()
     }
 
     fn corners(&self) -> &[[f64; 2]] {

@@ -8,6 +8,7 @@ use crate::{
     error::Result,
     fem::effect::{EnergyKind, Role},
     laws::contact::NodeContext,
+    linear_algebra::tensor::larger,
 };
 
 /// Dissipated by contact, or absorbed by contact memory.
@@ -65,7 +66,9 @@ impl<const D: usize> Contact<D> {
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let energies = self.law.energy(after).zip(self.law.energy(point.penetration_before));
             let (stored, lost) = match energies {
-                Some((after, before)) => (after - before, 0.0),
+                Some(energies) => {
+                    (energies.0 - energies.1, self.lost_at_wall(pressure, [point.penetration_before, after]))
+                }
                 None => (0.0, times(pressure, after - before)),
             };
             // The growth of the wear that this step has seen, which is no longer stored.
@@ -87,6 +90,14 @@ impl<const D: usize> Contact<D> {
             sum.driving_power += friction.driving_power(velocity);
         }
         sum
+    }
+
+    /// What a rigid obstacle behind a law that stores energy dissipates of the work of this pressure in Pa in J/m^(D-1), where the
+    /// penetration in m changes from the first to the second value: that inside of it, beyond what the law stores.
+    fn lost_at_wall(&self, pressure: f64, penetrations: [f64; 2]) -> f64 {
+        let Some([wall, stored]) = self.law.wall() else { return 0.0 };
+        let [before, after] = penetrations.map(|penetration| larger(penetration - wall, 0.0));
+        if pressure > stored { (pressure - stored) * (after - before) } else { 0.0 }
     }
 
     /// Visits the powers in W that friction dissipates at local nodes, from velocities at the end of the step just solved, with ghosts.

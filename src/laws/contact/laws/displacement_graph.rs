@@ -134,10 +134,10 @@ impl StoringGraph for StoringPolyline {
         [mean, (own - mean) / (after - before)]
     }
 
-    fn wall(&self) -> Option<f64> {
+    fn wall(&self) -> Option<[f64; 2]> {
         let corners = self.graph.corners();
         let is_rigid = self.graph.slope_of(corners.len()) == f64::INFINITY;
-        is_rigid.then_some(corners[corners.len() - 1][0])
+        is_rigid.then_some(corners[corners.len() - 1])
     }
 }
 
