@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Defines [`Scheme`] by a list: the meaning of each scheme, its name in job files and its properties.
 macro_rules! schemes {
     ($($(#[$about:meta])* $scheme:ident = $name:literal {
-        order: $order:literal, formula: $formula:expr
+        order: $order:literal, is_implicit: $is_implicit:literal, formula: $formula:expr
     })*) => {
         /// The time scheme.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -31,14 +31,14 @@ macro_rules! schemes {
                 match self { $(Self::$scheme => $order,)* }
             }
 
-            /// An implicit step as a blend of earlier states from which it starts; `None` for other schemes.
-            pub fn formula(self) -> Option<fn(Step) -> Blend> {
+            /// The blend of earlier states from which a step starts.
+            pub fn formula(self) -> fn(Step) -> Blend {
                 match self { $(Self::$scheme => $formula,)* }
             }
 
             /// Whether every stress is taken at the end of the step.
             pub fn is_implicit(self) -> bool {
-                self.formula().is_some()
+                match self { $(Self::$scheme => $is_implicit,)* }
             }
 
             /// Number of states from which a step starts.
@@ -54,8 +54,7 @@ macro_rules! schemes {
 
             /// One of equal steps.
             fn example(self) -> Blend {
-                let step = Step { time: 2.0, length: 1.0, previous_length: 1.0 };
-                self.formula().map_or(Blend::euler(step.length), |formula| formula(step))
+                self.formula()(Step { time: 2.0, length: 1.0, previous_length: 1.0 })
             }
         }
     };
@@ -66,18 +65,18 @@ schemes! {
     /// contact memory are taken from the previous step. Stable only for steps below explicit_step_bound, which `solver check`
     /// prints.
     #[default]
-    LaggedEuler = "lagged_euler" { order: 1, formula: None }
+    LaggedEuler = "lagged_euler" { order: 1, is_implicit: false, formula: implicit_euler::blend }
     /// First order in time: all stresses are taken at the end of the step. The step has no stability bound. Suitable for large
     /// steps and impacts.
-    ImplicitEuler = "implicit_euler" { order: 1, formula: Some(implicit_euler::blend) }
+    ImplicitEuler = "implicit_euler" { order: 1, is_implicit: true, formula: implicit_euler::blend }
     /// Second order in time. All stresses are taken at the end of the step, from a backward difference over two steps. The step has
     /// no stability bound. Suitable for smooth motions; where velocities jump (impacts, sudden loads), the solution may overshoot.
-    Bdf2 = "bdf2" { order: 2, formula: Some(bdf2::blend) }
+    Bdf2 = "bdf2" { order: 2, is_implicit: true, formula: bdf2::blend }
     /// Second order in time, for impacts and waves. All stresses are taken at the midpoint of the step, rigid contact at its end. The
     /// total energy of elastic bodies, of compliant foundations and of obstacles moved by forces is conserved exactly and never grows in
     /// an impact on a rigid obstacle; no vibration is damped, however short. Requires a density, fixed steps and, for contact,
     /// `redistribute_mass`. Damage, adhesion, contact memory and moving supports are refused.
-    Midpoint = "midpoint" { order: 2, formula: Some(midpoint::blend) }
+    Midpoint = "midpoint" { order: 2, is_implicit: true, formula: midpoint::blend }
 }
 
 #[cfg(test)]

@@ -19,8 +19,7 @@ pub struct StepRange {
 impl StepRange {
     /// The range of a single step under a scheme.
     pub fn of(scheme: Scheme, step: Step) -> Self {
-        let length = scheme.formula().map_or(step.length, |formula| formula(step).length);
-        Self { steps: [step.length; 2], matrices: [length; 2] }
+        Self { steps: [step.length; 2], matrices: [scheme.formula()(step).length; 2] }
     }
 
     /// The range of all fixed steps of a run.

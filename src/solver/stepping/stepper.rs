@@ -6,8 +6,7 @@ use super::{
     factor_cache::nearest_cached_length,
     force_scale::ForceScale,
     heat::HeatStep,
-    integrator::Integrator,
-    lagged_euler::refuse_fast_flow,
+    integrator::{Integrator, refuse_fast_flow},
     linear_solver::{Preconditioner, SolverSettings},
     multistart::solve_and_search,
     problem::StepProblem,
@@ -393,7 +392,7 @@ impl Stepper {
             norm,
             scale,
             rounding: self.integrator.rounding(session),
-            flow_start: self.integrator.flow_start(state, step.length),
+            flow_start: self.integrator.flow_start(state),
             work: &mut self.work,
         };
         if self.other_starts == 0 || problem.body.contacts.is_empty() {
@@ -427,13 +426,9 @@ impl Stepper {
     ) -> Result<StepError> {
         self.finish(body, state, step)?;
         self.trial.update_ghosts()?;
-        let blend = self.integrator.blend(step.length);
-        let solved = SolvedStep {
-            step,
-            velocity: &self.trial,
-            flow_start: self.integrator.flow_start(state, step.length),
-            blend,
-        };
+        let blend = self.integrator.blend();
+        let solved =
+            SolvedStep { step, velocity: &self.trial, flow_start: self.integrator.flow_start(state), blend };
         self.workspace.error(session, body, state, solved)
     }
 
@@ -509,7 +504,7 @@ impl Stepper {
             if body.flows() {
                 self.trial.update_ghosts()?;
             }
-            let start = self.integrator.flow_start(state, step.length);
+            let start = self.integrator.flow_start(state);
             work = supports.work(session, body, step, &self.trial, start)?;
         }
         let mut of_obstacles = Energy::default();
@@ -637,7 +632,7 @@ impl Stepper {
         }
         let forces = &mut self.right_hand_side;
         if let Some(supports) = &mut self.moving_supports {
-            let start = self.integrator.flow_start(state, step.length);
+            let start = self.integrator.flow_start(state);
             supports.impose(session, body, step, start, forces)?;
         }
         body.held.clear(&mut forces.owned_mut()?);
@@ -661,7 +656,7 @@ impl Stepper {
             supports.set(body, &mut self.trial)?;
             supports.show_contacts(body)?;
         }
-        let (blend, time) = (self.integrator.blend(step.length), self.integrator.balanced_time(step));
+        let (blend, time) = (self.integrator.blend(), self.integrator.balanced_time(step));
         let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);
         for (number, contact) in body.contacts.iter_mut().enumerate() {
             for (cause, freedom) in [("force", Freedom::Translation), ("moment", Freedom::Rotation)] {
@@ -675,7 +670,7 @@ impl Stepper {
                 }
             }
         }
-        let start = self.integrator.flow_start(state, step.length).displacement;
+        let start = self.integrator.flow_start(state).displacement;
         Ok(session.agree(prepare_contacts(body, state, step, (blend, start)))?)
     }
 
