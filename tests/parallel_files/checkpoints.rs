@@ -57,8 +57,8 @@ fn read_all(
     cells: &[u64],
 ) -> Result<(Vec<u8>, Vec<Vec<f64>>)> {
     let checkpoint = Checkpoint::open(path, world)?;
-    let mut tables = checkpoint.read("nodes", NODES, &[("velocity", 2), ("displacement", 2)], nodes)?;
-    tables.extend(checkpoint.read("cells", CELLS, &[("history", 3)], cells)?);
+    let (nodes, cells) = (checkpoint.rows("nodes", NODES, nodes)?, checkpoint.rows("cells", CELLS, cells)?);
+    let tables = vec![nodes.read("velocity", 2)?, nodes.read("displacement", 2)?, cells.read("history", 3)?];
     Ok((checkpoint.header().to_vec(), tables))
 }
 
@@ -84,8 +84,9 @@ pub fn read(world: &impl Communicator, folder: &Path) {
 pub fn refuse_misfits(world: &impl Communicator, folder: &Path) {
     let path = folder.join("checkpoint-64.h5");
     let checkpoint = Checkpoint::open(&path, world).expect("open");
-    let refusal = |set: &str, total: u64, table: &str, width: usize, wanted: &[u64]| {
-        checkpoint.read(set, total, &[(table, width)], wanted).expect_err("refused").to_string()
+    let refusal = |set: &'static str, total: u64, table: &str, width: usize, wanted: &[u64]| {
+        let read = checkpoint.rows(set, total, wanted).and_then(|rows| rows.read(table, width));
+        read.expect_err("refused").to_string()
     };
     let missing = refusal("nodes", NODES, "gap", 1, &[]);
     assert!(

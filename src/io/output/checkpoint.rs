@@ -1,7 +1,7 @@
 //! The contents of the checkpoints of a run, and their restoration.
 
 use super::{
-    checkpoint_file::{self, Checkpoint, IdTable, RowSet},
+    checkpoint_file::{self, Checkpoint, IdTable, RowSet, SavedRows},
     history::Totals,
     seal,
 };
@@ -19,6 +19,16 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
 
+/// The sets of rows, and their positions in lists.
+const SETS: [&str; 2] = ["cells", "nodes"];
+const CELLS: usize = 0;
+const NODES: usize = 1;
+/// The tables of nodal fields.
+const DISPLACEMENT: &str = "displacement";
+const VELOCITY: &str = "velocity";
+const PREVIOUS_VELOCITY: &str = "previous_velocity";
+const PREVIOUS_DISPLACEMENT: &str = "previous_displacement";
+const TRACTION: &str = "contact_traction";
 /// The displacement from which pairs of bodies that slide were formed.
 const PAIRED: &str = "paired_displacement";
 /// The displacement from which outputs and supports count.
@@ -168,36 +178,28 @@ pub fn save<const D: usize, const S: usize>(
 ) -> Result<()> {
     let header = serde_json::to_vec_pretty(header)
         .map_err(|e| Error::Internal(format!("the checkpoint's header can't be written: {e}")))?;
-    let (nodes, cells) = (owned_node_ids(body), cell_ids(body));
-    let sets = [
-        RowSet { name: "nodes", total: body.mesh.total_nodes as u64, ids: &nodes },
-        RowSet { name: "cells", total: body.mesh.total_cells as u64, ids: &cells },
+    let ids = ids(body);
+    let sets = [NODES, CELLS].map(|at| RowSet { name: SETS[at], total: totals(body)[at], ids: &ids[at] });
+    let fields = [
+        (DISPLACEMENT, Some(&state.displacement)),
+        (VELOCITY, Some(&state.velocity)),
+        (PREVIOUS_VELOCITY, Some(&state.previous_velocity)),
+        (TRACTION, state.contact_traction.as_ref()),
+        (PREVIOUS_DISPLACEMENT, state.previous_displacement.as_ref()),
+        (ORIGIN, state.displacement_origin.as_ref()),
+        (PAIRED, body.paired_displacement.as_ref()),
     ];
-    let [displacement, velocity, previous] =
-        [state.displacement.owned()?, state.velocity.owned()?, state.previous_velocity.owned()?];
-    let nodal = [("displacement", &displacement), ("velocity", &velocity), ("previous_velocity", &previous)];
+    let mut owned = Vec::new();
+    for (name, field) in fields {
+        if let Some(field) = field {
+            owned.push((name, field.owned()?));
+        }
+    }
     let mut tables: Vec<IdTable> =
-        nodal.into_iter().map(|(name, values)| IdTable { name, set: "nodes", width: D, values }).collect();
-    let traction = state.contact_traction.as_ref().map(DistributedVector::owned).transpose()?;
-    let traction = traction.as_deref().map(|t| IdTable { name: TRACTION, set: "nodes", width: D, values: t });
-    tables.extend(traction);
-    let previous = state.previous_displacement.as_ref().map(DistributedVector::owned).transpose()?;
-    let previous = previous.as_deref();
-    tables.extend(previous.map(|p| IdTable {
-        name: "previous_displacement",
-        set: "nodes",
-        width: D,
-        values: p,
-    }));
-    let origin = state.displacement_origin.as_ref().map(DistributedVector::owned).transpose()?;
-    let origin = origin.as_deref();
-    tables.extend(origin.map(|values| IdTable { name: ORIGIN, set: "nodes", width: D, values }));
-    let paired = body.paired_displacement.as_ref().map(DistributedVector::owned).transpose()?;
-    let paired = paired.as_deref();
-    tables.extend(paired.map(|values| IdTable { name: PAIRED, set: "nodes", width: D, values }));
+        owned.iter().map(|(name, values)| IdTable { name, set: SETS[NODES], width: D, values }).collect();
     let of_cells: Vec<History> = body.all_cell_histories().collect();
     let of_nodes: Vec<History> = body.all_node_histories().collect();
-    for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
+    for (set, histories) in SETS.into_iter().zip([&of_cells, &of_nodes]) {
         let table = |h| {
             let History { width, values, .. }: &History = h;
             IdTable { name: h.name(), set, width: *width, values }
@@ -218,45 +220,26 @@ pub fn restore<const D: usize, const S: usize>(
 ) -> Result<Header> {
     let checkpoint = Checkpoint::open(path, session.world()).map_err(damaged)?;
     let header = session.agree(check(path, checkpoint.header(), identity, body))?;
-    let nodes = owned_node_ids(body);
-    let names = ["displacement", "velocity", "previous_velocity"].map(|name| (name, D));
-    let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &names, &nodes)?;
-    let fields = [&mut state.displacement, &mut state.velocity, &mut state.previous_velocity];
-    for (field, values) in fields.into_iter().zip(&values) {
-        fill(field, values)?;
-    }
-    if checkpoint.tables("nodes")?.iter().any(|name| name == ORIGIN) {
-        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(ORIGIN, D)], &nodes)?;
-        count_from(&values[0], body, state)?;
-    }
+    let saved = Saved::new(&checkpoint, body)?;
+    saved.fill::<D>(DISPLACEMENT, &mut state.displacement)?;
+    saved.fill::<D>(VELOCITY, &mut state.velocity)?;
+    saved.fill::<D>(PREVIOUS_VELOCITY, &mut state.previous_velocity)?;
+    saved.count_from_origin(body, state)?;
     if let Some(traction) = &mut state.contact_traction {
-        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(TRACTION, D)], &nodes)?;
-        fill(traction, &values[0])?;
-        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&values[0]));
+        saved.fill_traction(traction, body)?;
     }
     if let Some(previous) = &mut state.previous_displacement {
-        let wanted = [("previous_displacement", D)];
-        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &wanted, &nodes)?;
-        fill(previous, &values[0])?;
+        saved.fill::<D>(PREVIOUS_DISPLACEMENT, previous)?;
     }
     if body.paired_displacement.is_some() {
-        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(PAIRED, D)], &nodes)?;
         let mut paired = state.displacement.like()?;
-        fill(&mut paired, &values[0])?;
+        saved.fill::<D>(PAIRED, &mut paired)?;
         let anew = body.is_paired_elsewhere(session, &paired)?;
         body.form_pairs(session, &paired, anew)?;
     }
-    let cells = cell_ids(body);
-    let [of_cells, of_nodes] = kept_by(body);
-    let [total_cells, total_nodes] = [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64);
-    for (set, total, kept, ids) in
-        [("cells", total_cells, &of_cells, &cells), ("nodes", total_nodes, &of_nodes, &nodes)]
-    {
-        let tables: Vec<_> =
-            kept.iter().map(|(quantity, moment, width)| (quantity.name(*moment), *width)).collect();
-        let values = checkpoint.read(set, total, &tables, ids)?;
-        for ((quantity, moment, _), values) in kept.iter().zip(&values) {
-            body.restore_history(*quantity, *moment, values);
+    for (at, kept) in kept_by(body).into_iter().enumerate() {
+        for (quantity, moment, width) in kept {
+            body.restore_history(quantity, moment, &saved.rows[at].read(quantity.name(moment), width)?);
         }
     }
     body.refresh_histories()?;
@@ -305,54 +288,42 @@ pub fn transfer<const D: usize, const S: usize>(
 ) -> Result<Transferred> {
     let checkpoint = Checkpoint::open(path, session.world())?;
     let header = session.agree(check_mesh(path, checkpoint.header(), body))?;
-    let [nodes, cells] = [owned_node_ids(body), cell_ids(body)];
-    let [total_cells, total_nodes] = [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64);
-    let [of_nodes, of_cells] = [checkpoint.tables("nodes")?, checkpoint.tables("cells")?];
-    let fields = ["displacement", "velocity"].map(|name| (name, D));
-    let values = checkpoint.read("nodes", total_nodes, &fields, &nodes)?;
-    fill(&mut state.displacement, &values[0])?;
-    fill(&mut state.velocity, &values[1])?;
-    fill(&mut state.previous_velocity, &values[1])?;
+    let saved = Saved::new(&checkpoint, body)?;
+    saved.fill::<D>(DISPLACEMENT, &mut state.displacement)?;
+    saved.fill::<D>(VELOCITY, &mut state.velocity)?;
+    state.previous_velocity.copy_from(&state.velocity)?;
+    state.previous_velocity.update_ghosts()?;
     if let Some(previous) = &mut state.previous_displacement {
-        fill(previous, &values[0])?;
+        previous.copy_from(&state.displacement)?;
+        previous.update_ghosts()?;
     }
     if body.paired_displacement.is_some() {
         // What was in contact stays paired as it was: under small sliding without any displacement.
         let (mut paired, mut anew) = (state.displacement.like()?, false);
         if surfaces_in_contact(&header.physics) != surfaces_in_contact(physics) {
             paired.copy_from(&state.displacement)?;
-        } else if of_nodes.iter().any(|name| name == PAIRED) {
-            fill(&mut paired, &checkpoint.read("nodes", total_nodes, &[(PAIRED, D)], &nodes)?[0])?;
+        } else if saved.has(PAIRED) {
+            saved.fill::<D>(PAIRED, &mut paired)?;
             anew = body.is_paired_elsewhere(session, &paired)?;
         }
         body.form_pairs(session, &paired, anew)?;
     }
-    if of_nodes.iter().any(|name| name == ORIGIN) {
-        let values = checkpoint.read("nodes", total_nodes, &[(ORIGIN, D)], &nodes)?;
-        count_from(&values[0], body, state)?;
-    }
-    let mut known: Vec<&str> = vec!["displacement", "velocity", PAIRED, ORIGIN];
+    saved.count_from_origin(body, state)?;
+    let mut known: Vec<&str> = vec![DISPLACEMENT, VELOCITY, PAIRED, ORIGIN];
     if let Some(traction) = &mut state.contact_traction
-        && of_nodes.iter().any(|name| name == TRACTION)
+        && saved.has(TRACTION)
     {
         known.push(TRACTION);
-        let values = checkpoint.read("nodes", total_nodes, &[(TRACTION, D)], &nodes)?;
-        fill(traction, &values[0])?;
-        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&values[0]));
+        saved.fill_traction(traction, body)?;
     }
-    let [own_cells, own_nodes] = kept_by(body);
     let mut at_rest = Vec::new();
-    for (set, total, own, there, ids) in [
-        ("cells", total_cells, own_cells, &of_cells, &cells),
-        ("nodes", total_nodes, own_nodes, &of_nodes, &nodes),
-    ] {
-        for (quantity, moment, width) in own {
+    for (at, kept) in kept_by(body).into_iter().enumerate() {
+        for (quantity, moment, width) in kept {
             // At the start of a run the previous values equal the current ones.
             let current = quantity.name(Moment::Last);
-            if there.iter().any(|table| table == current) {
+            if saved.tables[at].iter().any(|table| table == current) {
                 known.extend([current, quantity.name(moment)]);
-                let values = checkpoint.read(set, total, &[(current, width)], ids)?;
-                body.restore_history(quantity, moment, &values[0]);
+                body.restore_history(quantity, moment, &saved.rows[at].read(current, width)?);
             } else if moment == Moment::Last {
                 at_rest.push(current.to_owned());
             }
@@ -360,7 +331,7 @@ pub fn transfer<const D: usize, const S: usize>(
     }
     body.refresh_histories()?;
     let is_dropped = |name: &&String| !known.contains(&name.as_str()) && !name.starts_with("previous_");
-    let mut dropped: Vec<String> = of_nodes.iter().chain(&of_cells).filter(is_dropped).cloned().collect();
+    let mut dropped: Vec<String> = saved.tables.iter().rev().flatten().filter(is_dropped).cloned().collect();
     let has_stress =
         |keys: &BTreeMap<String, String>| keys.keys().any(|key| key.starts_with("initial.stress."));
     if has_stress(&header.physics) && !has_stress(physics) {
@@ -440,8 +411,50 @@ fn kept_by<const D: usize, const S: usize>(body: &Body<D, S>) -> [Vec<(Quantity,
     [body.all_cell_histories().map(kept).collect(), body.all_node_histories().map(kept).collect()]
 }
 
-/// The table of contact tractions at nodes.
-const TRACTION: &str = "contact_traction";
+/// What a checkpoint has for the cells of this rank and for the nodes that it owns.
+struct Saved<'a> {
+    rows: [SavedRows<'a>; 2],
+    tables: [Vec<String>; 2],
+}
+
+impl<'a> Saved<'a> {
+    fn new<const D: usize, const S: usize>(checkpoint: &'a Checkpoint, body: &Body<D, S>) -> Result<Self> {
+        let (ids, totals) = (ids(body), totals(body));
+        let rows = |at: usize| checkpoint.rows(SETS[at], totals[at], &ids[at]);
+        let tables = [checkpoint.tables(SETS[CELLS])?, checkpoint.tables(SETS[NODES])?];
+        Ok(Self { rows: [rows(CELLS)?, rows(NODES)?], tables })
+    }
+
+    fn has(&self, field: &str) -> bool {
+        self.tables[NODES].iter().any(|name| name == field)
+    }
+
+    /// Reads a nodal field.
+    fn fill<const D: usize>(&self, name: &str, field: &mut DistributedVector) -> Result<()> {
+        fill(field, &self.rows[NODES].read(name, D)?)
+    }
+
+    /// Reads the tractions of contacts, and sets their pressures.
+    fn fill_traction<const D: usize, const S: usize>(
+        &self,
+        traction: &mut DistributedVector,
+        body: &mut Body<D, S>,
+    ) -> Result<()> {
+        self.fill::<D>(TRACTION, traction)?;
+        let values = traction.owned()?;
+        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&values));
+        Ok(())
+    }
+
+    /// Reads the displacement from which outputs and supports count, if there is one.
+    fn count_from_origin<const D: usize, const S: usize>(
+        &self,
+        body: &mut Body<D, S>,
+        state: &mut State,
+    ) -> Result<()> {
+        if self.has(ORIGIN) { count_from(&self.rows[NODES].read(ORIGIN, D)?, body, state) } else { Ok(()) }
+    }
+}
 
 /// A damaged file is a failure, not a refusal, so that an older checkpoint can be tried.
 fn damaged(error: Agreed) -> Error {
@@ -555,10 +568,14 @@ fn digest<const D: usize, const S: usize>(body: &Body<D, S>) -> String {
     format!("{:016x}", body.mesh.digest)
 }
 
-fn owned_node_ids<const D: usize, const S: usize>(body: &Body<D, S>) -> Vec<u64> {
-    body.mesh.node_ids[..body.mesh.owned].iter().map(|&id| u64::from(id)).collect()
+/// The ids of this rank's cells and of the nodes that it owns.
+fn ids<const D: usize, const S: usize>(body: &Body<D, S>) -> [Vec<u64>; 2] {
+    let mesh = &body.mesh;
+    [&mesh.cell_ids[..], &mesh.node_ids[..mesh.owned]]
+        .map(|ids| ids.iter().map(|&id| u64::from(id)).collect())
 }
 
-fn cell_ids<const D: usize, const S: usize>(body: &Body<D, S>) -> Vec<u64> {
-    body.mesh.cell_ids.iter().map(|&id| u64::from(id)).collect()
+/// The numbers of all cells and nodes.
+fn totals<const D: usize, const S: usize>(body: &Body<D, S>) -> [u64; 2] {
+    [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64)
 }

@@ -181,33 +181,17 @@ impl Checkpoint {
         if self.file.contains(&group) { self.file.names(&group) } else { Ok(Vec::new()) }
     }
 
-    /// Reads tables, given by name and width, of a set that must have `total` rows: for each table the rows with the
-    /// `wanted` ids, in that order. An id may be wanted on several ranks. Collective, with the same outcome on all
-    /// ranks.
-    pub fn read(
-        &self,
-        set: &str,
-        total: u64,
-        tables: &[(&str, usize)],
-        wanted: &[u64],
-    ) -> Result<Vec<Vec<f64>>, Agreed> {
+    /// The rows with the `wanted` ids, in that order, of a set that must have `total` rows. An id may be wanted on several ranks.
+    /// Collective, with the same outcome on all ranks.
+    pub fn rows(&self, set: &'static str, total: u64, wanted: &[u64]) -> Result<SavedRows<'_>, Agreed> {
         let (rank, size) = (self.communicator.rank() as usize, self.communicator.size() as usize);
         let first = first_of_part(total, rank, size);
-        let rows = (first_of_part(total, rank + 1, size) - first) as usize;
-        let ids = self.open_table::<u64>(&format!("ids/{set}"), total, 1)?.read(first, rows)?;
+        let count = (first_of_part(total, rank + 1, size) - first) as usize;
+        let ids = self.open_table::<u64>(&format!("ids/{set}"), total, 1)?.read(first, count)?;
         let plan = Redistribution::new(&self.communicator, total, &ids, wanted)?;
-        let read_table = |(name, width): &(&str, usize)| {
-            let path = table_name(set, name);
-            let values = self.open_table::<f64>(&path, total, *width)?.read(first, rows)?;
-            let expected: u64 = self.file.number(&path, "checksum")?;
-            let found = table_checksum(&self.communicator, name, *width, &ids, &values);
-            if found != expected {
-                return agree(&self.communicator, Err(damaged(&self.file, &path)));
-            }
-            plan.apply(*width, &values)
-        };
-        tables.iter().map(read_table).collect()
+        Ok(SavedRows { checkpoint: self, set, total, first, ids, plan })
     }
+
     fn open_table<T: Element>(&self, name: &str, total: u64, width: usize) -> Result<Rows<'_, T>, Agreed> {
         let refused = |what: String| {
             Error::Refused(format!(
@@ -225,6 +209,32 @@ impl Checkpoint {
             return agree(&self.communicator, Err(refused(words)));
         }
         Ok(rows)
+    }
+}
+
+/// Rows of a checkpoint that are wanted on this rank.
+pub struct SavedRows<'a> {
+    checkpoint: &'a Checkpoint,
+    set: &'static str,
+    total: u64,
+    /// The rows that this rank reads for all: the first one, and their ids.
+    first: u64,
+    ids: Vec<u64>,
+    plan: Redistribution,
+}
+
+impl SavedRows<'_> {
+    /// These rows of a table of the given width. Collective, with the same outcome on all ranks.
+    pub fn read(&self, name: &str, width: usize) -> Result<Vec<f64>, Agreed> {
+        let Checkpoint { file, communicator, .. } = self.checkpoint;
+        let path = table_name(self.set, name);
+        let table = self.checkpoint.open_table::<f64>(&path, self.total, width)?;
+        let values = table.read(self.first, self.ids.len())?;
+        let expected: u64 = file.number(&path, "checksum")?;
+        if table_checksum(communicator, name, width, &self.ids, &values) != expected {
+            return agree(communicator, Err(damaged(file, &path)));
+        }
+        self.plan.apply(width, &values)
     }
 }
 
