@@ -171,6 +171,32 @@ pub trait Response {
     }
 }
 
+/// The methods of [`Response`], delegated to the chosen law.
+macro_rules! response_calls {
+    ($visibility:vis $each:ident $family:ident) => {
+        crate::laws::law::calls! { $visibility $each $family Response:
+            resolve(s: f64, c: f64, node: NodeContext) -> Resolved;
+            pressure(velocity: f64, node: NodeContext) -> f64;
+            slope(velocity: f64, node: NodeContext) -> f64;
+            growth_constants() -> Result<[f64; 2], &'static str>;
+            branch(velocity: f64, node: NodeContext) -> usize;
+            distance(velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64;
+            has_vertical_parts() -> bool;
+            depends_on_displacement() -> bool;
+            is_zero() -> bool;
+            velocity_bound(node: NodeContext) -> Option<f64>;
+            monotonicity_constant(step_length: f64) -> f64;
+            greatest_pressure() -> f64;
+            energy(penetration: f64) -> Option<f64>;
+            wall() -> Option<[f64; 2]>;
+            damping() -> f64;
+            damping_pressure(penetration: f64, node: NodeContext) -> f64;
+            corners() -> &[[f64; 2]];
+        }
+    };
+}
+pub(super) use response_calls;
+
 /// The choice of normal laws, defined by their list: the enum of the job, the enum that evaluates the law, and the dispatch to the
 /// chosen law.
 macro_rules! normal_laws {
@@ -196,25 +222,7 @@ macro_rules! normal_laws {
         }
 
         impl NormalResponse {
-            crate::laws::law::calls! { pub each_normal_law NormalResponse Response:
-                resolve(s: f64, c: f64, node: NodeContext) -> Resolved;
-                pressure(velocity: f64, node: NodeContext) -> f64;
-                slope(velocity: f64, node: NodeContext) -> f64;
-                growth_constants() -> Result<[f64; 2], &'static str>;
-                branch(velocity: f64, node: NodeContext) -> usize;
-                distance(velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64;
-                has_vertical_parts() -> bool;
-                depends_on_displacement() -> bool;
-                is_zero() -> bool;
-                velocity_bound(node: NodeContext) -> Option<f64>;
-                monotonicity_constant(step_length: f64) -> f64;
-                greatest_pressure() -> f64;
-                energy(penetration: f64) -> Option<f64>;
-                wall() -> Option<[f64; 2]>;
-                damping() -> f64;
-                damping_pressure(penetration: f64, node: NodeContext) -> f64;
-                corners() -> &[[f64; 2]];
-            }
+            crate::laws::contact::normal_law::response_calls! { pub each_normal_law NormalResponse }
         }
 
         impl NormalLaw {

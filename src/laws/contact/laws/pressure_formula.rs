@@ -6,14 +6,14 @@
 
 use crate::laws::contact::{
     curve::{Curve, StoringCurve},
-    normal_law::{NodeContext, NormalParameters, Resolved, Response},
+    normal_law::{NodeContext, NormalParameters, Resolved, Response, response_calls},
     penetration_law::PenetrationLaw,
 };
 use crate::{
     error::{Error, Result},
     laws::{
         expression::{Formula, OfMotion, Scalar, Variable},
-        law::{Derived, LawFault, calls},
+        law::{Derived, LawFault},
     },
 };
 use schemars::JsonSchema;
@@ -126,21 +126,7 @@ macro_rules! each_form {
 }
 
 impl Response for FormulaLaw {
-    calls! { each_form FormulaLaw Response:
-        resolve(s: f64, c: f64, node: NodeContext) -> Resolved;
-        pressure(velocity: f64, node: NodeContext) -> f64;
-        slope(velocity: f64, node: NodeContext) -> f64;
-        growth_constants() -> Result<[f64; 2], &'static str>;
-        branch(velocity: f64, node: NodeContext) -> usize;
-        distance(velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64;
-        has_vertical_parts() -> bool;
-        depends_on_displacement() -> bool;
-        is_zero() -> bool;
-        monotonicity_constant(step_length: f64) -> f64;
-        greatest_pressure() -> f64;
-        energy(penetration: f64) -> Option<f64>;
-        corners() -> &[[f64; 2]];
-    }
+    response_calls! { each_form FormulaLaw }
 }
 
 #[cfg(test)]
