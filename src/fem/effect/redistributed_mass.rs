@@ -130,31 +130,29 @@ impl<const D: usize> RedistributedMass<D> {
         self.is_massless[node]
     }
 
-    /// Adds `factor` times the change of the mass matrix times the nodal values that `x` gives to `forces`; both with ghosts.
-    pub fn add_product(&self, factor: f64, x: impl Fn(usize) -> f64, forces: &mut [f64]) {
+    /// Visits the entries of the change of the mass matrix, each with its row and column, local nodes.
+    fn visit(&self, mut visit: impl FnMut([usize; 2], f64)) {
         for Change { nodes, entries, .. } in &self.cells {
             for (row, entries) in nodes.iter().zip(entries.chunks_exact(nodes.len())) {
-                for (column, entry) in nodes.iter().zip(entries) {
-                    for i in 0..D {
-                        forces[*row as usize * D + i] += factor * entry * x(*column as usize * D + i);
-                    }
-                }
+                let columns = nodes.iter().zip(entries);
+                columns.for_each(|(column, entry)| visit([*row as usize, *column as usize], *entry));
             }
         }
+    }
+
+    /// Adds `factor` times the change of the mass matrix times the nodal values that `x` gives to `forces`; both with ghosts.
+    pub fn add_product(&self, factor: f64, x: impl Fn(usize) -> f64, forces: &mut [f64]) {
+        self.visit(|[row, column], entry| {
+            (0..D).for_each(|i| forces[row * D + i] += factor * entry * x(column * D + i));
+        });
     }
 
     /// The change of `w . M w` for the nodal values that `w` gives, with ghosts.
     pub fn square(&self, w: impl Fn(usize) -> f64) -> f64 {
         let mut sum = 0.0;
-        for Change { nodes, entries, .. } in &self.cells {
-            for (row, entries) in nodes.iter().zip(entries.chunks_exact(nodes.len())) {
-                for (column, entry) in nodes.iter().zip(entries) {
-                    sum += (0..D)
-                        .map(|i| entry * w(*row as usize * D + i) * w(*column as usize * D + i))
-                        .sum::<f64>();
-                }
-            }
-        }
+        self.visit(|[row, column], entry| {
+            sum += (0..D).map(|i| entry * w(row * D + i) * w(column * D + i)).sum::<f64>();
+        });
         sum
     }
 
