@@ -43,20 +43,14 @@ pub(super) fn revolve(session: &Session, mesh: &mut Mesh<2>, loaded: &Loaded) ->
         let [inside, _] = on_axis(session, mesh, &facets(mesh, names));
         session.agree(refusal(loaded, &format!("contact.{number}.on"), inside > 0))?;
     }
-    for (number, traction) in job.traction.iter().enumerate() {
-        let part = part_of(session, mesh, ("traction", &traction.on), traction.part.as_ref())?;
+    let tractions = (0..).zip(&job.traction).map(|(number, t)| ("traction", number, &t.on, &t.part));
+    let heats = (0..).zip(&job.heat).map(|(number, heat)| ("heat", number, &heat.on, &heat.part));
+    let yielding = (0..).zip(&job.support).filter(|(_, support)| support.gives_way());
+    let supports = yielding.map(|(number, support)| ("support", number, &support.on, &support.part));
+    for (table, number, on, part) in tractions.chain(heats).chain(supports) {
+        let part = part_of(session, mesh, (table, on), part.as_ref())?;
         let [inside, all] = on_axis(session, mesh, &part);
-        session.agree(refusal(loaded, &format!("traction.{number}.on"), inside > 0 && inside == all))?;
-    }
-    for (number, heat) in job.heat.iter().enumerate() {
-        let part = part_of(session, mesh, ("heat", &heat.on), heat.part.as_ref())?;
-        let [inside, all] = on_axis(session, mesh, &part);
-        session.agree(refusal(loaded, &format!("heat.{number}.on"), inside > 0 && inside == all))?;
-    }
-    for (number, support) in job.support.iter().enumerate().filter(|(_, support)| support.gives_way()) {
-        let part = part_of(session, mesh, ("support", &support.on), support.part.as_ref())?;
-        let [inside, all] = on_axis(session, mesh, &part);
-        session.agree(refusal(loaded, &format!("support.{number}.on"), inside > 0 && inside == all))?;
+        session.agree(refusal(loaded, &format!("{table}.{number}.on"), inside > 0 && inside == all))?;
     }
     Ok(())
 }
