@@ -129,21 +129,8 @@ pub struct Contact<const D: usize> {
     /// one of these contacts.
     edges: Vec<Vec<(usize, usize)>>,
     needs_ghosts: bool,
-    derivatives: Derivatives,
     /// The share of the slopes of decreasing branches in the derivatives.
     softening: f64,
-}
-
-/// The derivatives of the laws that the points store. PETSc calls the functions that compute and use them, so debug builds check
-/// the order of calls.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
-enum Derivatives {
-    /// Nothing yet.
-    Unknown,
-    /// Those of the last linearisation.
-    Linearised,
-    /// The same, and the changes along the direction last mapped.
-    AlongDirection,
 }
 
 impl<const D: usize> Contact<D> {
@@ -207,7 +194,6 @@ impl<const D: usize> Contact<D> {
             friction: None,
             edges: Vec::new(),
             needs_ghosts,
-            derivatives: Derivatives::Unknown,
             softening: 1.0,
         })
     }

@@ -2,10 +2,10 @@
 //! has unknowns, unless stated otherwise: see [`Contact::number_unknowns`].
 //!
 //! Points store the pressures of the unknowns last mapped, the derivatives of the last linearisation, and the changes of the
-//! pressures along the direction last mapped.
+//! pressures along the direction last mapped; from the start they have the derivatives of free points.
 
 use super::{
-    Contact, Derivatives,
+    Contact,
     friction::Friction,
     point::{Point, Unknown, Vectors::Newton},
 };
@@ -126,7 +126,6 @@ impl<const D: usize> Contact<D> {
             friction.linearise(&self.points, unknowns);
             friction.keep_share_of_decreases(softening);
         }
-        self.derivatives = Derivatives::Linearised;
     }
 
     /// Computes the slopes of the law at these velocities, where the velocity is the unknown.
@@ -137,10 +136,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Converts a change of the unknowns into the change of the velocities, and sets the changes of the pressures of the points. To
-    /// be called after [`linearise_parameters`](Self::linearise_parameters).
+    /// Converts a change of the unknowns into the change of the velocities, and sets the changes of the pressures of the points.
     pub fn map_direction(&mut self, values: &mut [f64]) {
-        debug_assert!(self.derivatives >= Derivatives::Linearised);
         let scale = self.scale;
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let along = point.along(Newton, values);
@@ -150,23 +147,19 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &mut self.friction {
             friction.map_direction(&self.points, values);
         }
-        self.derivatives = Derivatives::AlongDirection;
     }
 
     /// Adds the change of the contact forces: of the direction last mapped or, where the unknown is the velocity, of the change
-    /// `direction` of the velocity. To be called after [`map_direction`](Self::map_direction).
+    /// `direction` of the velocity.
     pub fn add_derivative(&self, direction: &[f64], forces: &mut [f64]) {
-        debug_assert_eq!(self.derivatives, Derivatives::AlongDirection);
         self.add_changes(direction, |point| point.change, forces);
         if let Some(friction) = &self.friction {
             friction.add_derivative(forces);
         }
     }
 
-    /// Adds the change of the contact forces with the velocity; zero where the graph is vertical. This and all following functions
-    /// are to be called after [`linearise_parameters`](Self::linearise_parameters).
+    /// Adds the change of the contact forces with the velocity; zero where the graph is vertical.
     pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
-        debug_assert!(self.derivatives >= Derivatives::Linearised);
         let change = |point: &Point<D>| point.slope * point.free_length * point.along(Newton, direction);
         self.add_changes(direction, change, forces);
         if let Some(friction) = &self.friction {
@@ -191,7 +184,6 @@ impl<const D: usize> Contact<D> {
     /// Eliminates the unknown pressures of sliding points from the equations; [`project`](Self::project) then leaves the equations
     /// of the velocities.
     pub fn reduce(&self, values: &mut [f64]) {
-        debug_assert!(self.derivatives >= Derivatives::Linearised);
         if let Some(friction) = &self.friction {
             friction.reduce(&self.points, values);
         }
@@ -199,7 +191,6 @@ impl<const D: usize> Contact<D> {
 
     /// Removes from nodal values the motions of points on vertical parts of the graph.
     pub fn project(&self, values: &mut [f64]) {
-        debug_assert!(self.derivatives >= Derivatives::Linearised);
         self.points.iter().filter(|p| p.theta == 0.0).for_each(|point| point.hold(Newton, values));
         if let Some(friction) = &self.friction {
             friction.project(values);
@@ -209,7 +200,6 @@ impl<const D: usize> Contact<D> {
     /// Converts a change of velocities into the change of the unknowns. `open` contains the forces in N that remain unbalanced
     /// after the change of velocities.
     pub fn unmap_direction(&self, open: &[f64], values: &mut [f64]) {
-        debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let change = if point.theta == 0.0 {
                 point.share(Newton, open)
