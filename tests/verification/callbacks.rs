@@ -6,7 +6,7 @@ use crate::mpirun;
 use clarke::{
     error::{Error, Exit, Result},
     linear_algebra::petsc::{
-        DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator, Snes,
+        DistributedVector, Matrix, NonlinearProblem, ProjectedKind, ProjectedKsp, ProjectedOperator, Snes,
     },
     parallel::session::Session,
 };
@@ -99,7 +99,7 @@ impl NonlinearProblem for Cubic<'_> {
     ) -> Result<()> {
         let Self { matrix, slopes, linear_solver, fault, calls, .. } = self;
         let mut operator = Inner { matrix, slopes, fault: *fault, calls };
-        let outcome = linear_solver.solve(&mut operator, residual, direction)?;
+        let outcome = linear_solver.solve(&mut operator, ProjectedKind::Symmetric, residual, direction)?;
         self.linear_iterations += outcome.linear.iterations;
         self.called(3)
     }

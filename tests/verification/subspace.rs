@@ -7,7 +7,9 @@ use clarke::{
     fem::effect::{Effect, Inertia, ViscousStress},
     job::{Fix, FixedDirections},
     laws::material::{ByMaterial, Isotropic},
-    linear_algebra::petsc::{DistributedVector, Matrix, ProjectedKsp, ProjectedOperator, set_default_option},
+    linear_algebra::petsc::{
+        DistributedVector, Matrix, ProjectedKind, ProjectedKsp, ProjectedOperator, set_default_option,
+    },
     mesh::GlobalMesh,
     parallel::session::Session,
 };
@@ -69,15 +71,16 @@ fn solves<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<
         let (mut load, mut expected, mut found) = (vector(), vector(), vector());
         set_nodal(&body.mesh, &mut load, |id, _| std::array::from_fn(|i| noise((id * D + i) as u64 + 7)));
         without.project(&mut load).expect("projected");
-        let slow = frozen.solve(&mut without, &load, &mut expected).expect("solved");
+        let slow =
+            frozen.solve(&mut without, ProjectedKind::Symmetric, &load, &mut expected).expect("solved");
         assert!(slow.linear.converged() && !slow.refreshed, "{slow:?}");
-        let exact = fresh.solve(&mut without, &load, &mut found).expect("solved");
+        let exact = fresh.solve(&mut without, ProjectedKind::Symmetric, &load, &mut found).expect("solved");
         assert!(exact.linear.converged() && exact.refreshed, "{exact:?}");
         assert!(exact.linear.iterations <= 2, "a factor of the matrix itself solves at once: {exact:?}");
-        let two = patient.solve(&mut without, &load, &mut found).expect("solved");
+        let two = patient.solve(&mut without, ProjectedKind::Symmetric, &load, &mut found).expect("solved");
         assert!(two.linear.converged() && two.linear.iterations <= 4, "{two:?}");
         assert!(round == 2 || slow.linear.iterations > 4, "{slow:?}");
-        let again = fresh.solve(&mut without, &load, &mut found).expect("solved");
+        let again = fresh.solve(&mut without, ProjectedKind::Symmetric, &load, &mut found).expect("solved");
         assert!(!again.refreshed, "the subspace is the same: {again:?}");
         found.add_scaled(-1.0, &expected).expect("add");
         let missed = found.norm().expect("norm") / expected.norm().expect("norm");

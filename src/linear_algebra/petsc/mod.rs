@@ -36,7 +36,7 @@ pub use library::{
 };
 pub use matrix::Matrix;
 pub use own_preconditioner::OwnPreconditioner;
-pub use projected::{MISSING_DIRECTIONS, ProjectedKsp};
+pub use projected::{MISSING_DIRECTIONS, ProjectedKind, ProjectedKsp};
 pub use projected_operator::{ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
 pub use variational_inequality::{BoundedSnes, Limits, UNBOUNDED};

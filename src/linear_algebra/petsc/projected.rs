@@ -52,6 +52,17 @@ pub const MISSING_DIRECTIONS: f64 = 16.0;
 /// A solve without iterations.
 const NOTHING: LinearOutcome = LinearOutcome { reason: TOO_MANY, iterations: 0, residual: f64::INFINITY };
 
+/// What is known of linear equations on a subspace.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProjectedKind {
+    /// They are symmetric; where CG finds negative curvature, GMRES solves them.
+    Symmetric,
+    /// They may be positive definite; where CG finds negative curvature, the solve ends as indefinite.
+    Definite,
+    /// They are not symmetric, and are solved by GMRES.
+    Unsymmetric,
+}
+
 impl ProjectedKsp {
     /// A solver for vectors with the layout of `like` (block size `block`), with this prefix of its options.
     pub fn new(prefix: &str, like: &DistributedVector, block: usize) -> Result<Self> {
@@ -178,43 +189,23 @@ impl ProjectedKsp {
         self.most = most;
     }
 
-    /// Solves `P B x = r` with a symmetric `P B` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an
-    /// error.
+    /// Solves `P B x = r` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an error.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank.
     pub fn solve(
         &mut self,
         operator: &mut dyn ProjectedOperator,
+        kind: ProjectedKind,
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
-        self.solve_on_subspace(operator, right_hand_side, |solver, stale| {
-            solver.solve_attached(right_hand_side, solution, stale)
-        })
-    }
-
-    /// As [`ProjectedKsp::solve`], but ends as indefinite where CG finds negative curvature.
-    pub fn solve_if_definite(
-        &mut self,
-        operator: &mut dyn ProjectedOperator,
-        right_hand_side: &DistributedVector,
-        solution: &mut DistributedVector,
-    ) -> Result<ProjectedOutcome> {
-        self.solve_on_subspace(operator, right_hand_side, |solver, stale| {
-            solver.solve_by_cg(right_hand_side, solution, stale)
-        })
-    }
-
-    /// As [`ProjectedKsp::solve`] for a `P B` that is not symmetric, by GMRES.
-    pub fn solve_unsymmetric(
-        &mut self,
-        operator: &mut dyn ProjectedOperator,
-        right_hand_side: &DistributedVector,
-        solution: &mut DistributedVector,
-    ) -> Result<ProjectedOutcome> {
-        self.solve_on_subspace(operator, right_hand_side, |solver, stale| {
-            solver.solve_by_gmres(right_hand_side, solution, stale)
-        })
+        let [stale, refreshed] = self.update_subspace(operator, right_hand_side)?;
+        let outcome = self.attached(operator, |solver| match kind {
+            ProjectedKind::Symmetric => solver.solve_attached(right_hand_side, solution, stale),
+            ProjectedKind::Definite => solver.solve_by_cg(right_hand_side, solution, stale),
+            ProjectedKind::Unsymmetric => solver.solve_by_gmres(right_hand_side, solution, stale),
+        })?;
+        Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
     }
 
     /// As [`ProjectedKsp::solve`] for a symmetric positive definite `P B`, to the absolute tolerance and with the present
@@ -230,18 +221,6 @@ impl ProjectedKsp {
             solver.ksp.set_tolerances(0.0, absolute, iterations)?;
             solver.ksp.solve(right_hand_side, solution)
         })
-    }
-
-    /// Reads the subspace, then runs a solve; its argument is whether the preconditioner belongs to another subspace.
-    fn solve_on_subspace(
-        &mut self,
-        operator: &mut dyn ProjectedOperator,
-        like: &DistributedVector,
-        solve: impl FnOnce(&mut Self, bool) -> Result<ProjectedOutcome>,
-    ) -> Result<ProjectedOutcome> {
-        let [stale, refreshed] = self.update_subspace(operator, like)?;
-        let outcome = self.attached(operator, |solver| solve(solver, stale))?;
-        Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
     }
 
     /// Runs a solve with this operator as the context of the shell matrix.

@@ -5,7 +5,7 @@ use crate::{
     error::{Error, Result},
     fem::effect::{Contact, set_walls},
     linear_algebra::petsc::{
-        DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator, ProjectedOutcome,
+        DistributedVector, Matrix, NonlinearProblem, ProjectedKind, ProjectedKsp, ProjectedOperator,
     },
     parallel::session::Session,
 };
@@ -324,7 +324,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         direction: &mut DistributedVector,
         is_convex: bool,
     ) -> Result<Curvature> {
-        self.solve_linearised(residual, direction, (ProjectedKsp::solve_if_definite, is_convex))
+        self.solve_linearised(residual, direction, (ProjectedKind::Definite, is_convex))
     }
 
     /// Writes the residual at these unknowns, with the motions of obstacles that belong to them.
@@ -488,7 +488,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         residual: &DistributedVector,
         direction: &mut DistributedVector,
     ) -> Result<()> {
-        match self.solve_linearised(residual, direction, (ProjectedKsp::solve, true))? {
+        match self.solve_linearised(residual, direction, (ProjectedKind::Symmetric, true))? {
             Curvature::Positive => Ok(()),
             // Without a direction, iterations would repeat the same velocity.
             Curvature::Negative => Err(Error::Failed(NO_DIRECTION.into())),
@@ -496,23 +496,15 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 }
 
-/// A solver of symmetric linear equations.
-type SymmetricSolve = fn(
-    &mut ProjectedKsp,
-    &mut dyn ProjectedOperator,
-    &DistributedVector,
-    &mut DistributedVector,
-) -> Result<ProjectedOutcome>;
-
 impl<const D: usize> ContactEquations<'_, D> {
-    /// Solves the linearised equations, which negative curvature may end early if `solve` does. Where all points slide, nothing resists
+    /// Solves the linearised equations, which negative curvature ends early unless they are symmetric alone. Where all points slide, nothing resists
     /// the motion of a whole body along them, although at the solution some point sticks: such singular equations, on which iterations break
     /// down, are solved as if soft springs held the body as well.
     fn solve_linearised(
         &mut self,
         residual: &DistributedVector,
         direction: &mut DistributedVector,
-        (solve, may_be_singular): (SymmetricSolve, bool),
+        (kind, may_be_singular): (ProjectedKind, bool),
     ) -> Result<Curvature> {
         let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
@@ -550,17 +542,17 @@ impl<const D: usize> ContactEquations<'_, D> {
             self.counts.refreshed += usize::from(rebuilt);
         }
         self.counts.coupled += usize::from(coupled);
-        let solve = if coupled { ProjectedKsp::solve_unsymmetric } else { solve };
+        let kind = if coupled { ProjectedKind::Unsymmetric } else { kind };
         let most = self.matrix.factor_pays_after();
         self.linear_solver.limit_iterations(most.unwrap_or(usize::MAX));
-        let mut outcome = solve(self.linear_solver, &mut operator, open, velocity)?;
+        let mut outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
         self.linear_solver.limit_iterations(usize::MAX);
         if most.is_some() && outcome.linear.ran_out() {
             let rebuilt =
                 self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?;
             self.counts.refreshed += usize::from(rebuilt);
             let first = outcome.linear;
-            outcome = solve(self.linear_solver, &mut operator, open, velocity)?;
+            outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
             outcome.linear = first.followed_by(outcome.linear);
         }
         let is_on_springs = most.is_some()
