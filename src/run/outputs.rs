@@ -7,6 +7,7 @@ use crate::{
     io::output::{
         checkpoint::{self, Header, Identity},
         checkpoint_folder::{checkpoint_path, prune},
+        csv::CsvFile,
         field_output::FieldOutput,
         history::{History, Totals},
         log::Log,
@@ -104,11 +105,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let history = session.on_first(tables)?;
         let opened = if session.is_first() { extended(&folder) } else { Vec::new() };
         let of_history = history.iter().flat_map(History::faults);
-        of_history
-            .chain(resultants.faults())
-            .chain(probes.faults())
-            .chain(profiles.faults())
-            .for_each(|fault| log.warning(fault));
+        let files = [&resultants.file, &probes.file, &profiles.file].into_iter().flatten();
+        of_history.chain(files.flat_map(CsvFile::faults)).for_each(|fault| log.warning(fault));
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
         let spent = start.elapsed();
         let checkpoints = 0;
@@ -219,8 +217,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Flushes all tables.
     fn flush(&mut self) -> Result<()> {
         self.history.as_mut().map_or(Ok(()), History::flush)?;
-        self.resultants.flush()?;
-        self.probes.flush()?;
+        let files = [&mut self.resultants.file, &mut self.probes.file];
+        files.into_iter().flatten().try_for_each(CsvFile::flush)?;
         self.profiles.flush()
     }
 

@@ -58,7 +58,7 @@ pub(crate) fn records(bytes: &[u8]) -> impl Iterator<Item = Record> {
 
 /// A CSV file open for appending.
 #[derive(Debug)]
-pub(super) struct CsvFile {
+pub(crate) struct CsvFile {
     path: PathBuf,
     writer: BufWriter<File>,
     flushed: Instant,
@@ -134,7 +134,7 @@ impl CsvFile {
     }
 
     /// What the table that is continued lacks, each a sentence with the name of the file.
-    pub(super) fn faults(&self) -> impl Iterator<Item = String> {
+    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
         self.faults.iter().map(|fault| format!("{}: {fault}", self.path.display()))
     }
 
@@ -146,7 +146,7 @@ impl CsvFile {
     }
 
     /// Writes all rows to the file and synchronises it with the disk.
-    pub(super) fn flush(&mut self) -> Result<()> {
+    pub(crate) fn flush(&mut self) -> Result<()> {
         pass()?;
         self.write_out()?;
         match self.writer.get_ref().sync_data() {

@@ -35,7 +35,8 @@ pub(crate) struct Probes<const D: usize> {
     probed: Probed,
     probe_places: Vec<ProbePlace>,
     with: Vec<bool>,
-    file: Option<CsvFile>,
+    /// The file, on rank 0.
+    pub(crate) file: Option<CsvFile>,
     /// Values of this rank and of all ranks.
     room: [Vec<f64>; 2],
 }
@@ -138,16 +139,6 @@ impl<const D: usize> Probes<D> {
             file.row(format_args!("{},{},{name},{}", state.step, Time(state.time), Numbers(values)))?;
         }
         Ok(())
-    }
-
-    /// What the table that is continued lacks.
-    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
-        self.file.iter().flat_map(CsvFile::faults)
-    }
-
-    /// Flushes all rows to the file.
-    pub(crate) fn flush(&mut self) -> Result<()> {
-        self.file.as_mut().map_or(Ok(()), CsvFile::flush)
     }
 }
 

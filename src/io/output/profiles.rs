@@ -49,7 +49,8 @@ const SAME_SIDE: f64 = 0.5;
 pub struct Profiles<const D: usize> {
     profiles: Vec<Profile<D>>,
     with: OptionalColumns,
-    file: Option<CsvFile>,
+    /// The file, on rank 0.
+    pub(crate) file: Option<CsvFile>,
 }
 
 impl<const D: usize> Profiles<D> {
@@ -128,11 +129,6 @@ impl<const D: usize> Profiles<D> {
             session.agree(written)?;
         }
         Ok(())
-    }
-
-    /// What the table that is continued lacks.
-    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
-        self.file.iter().flat_map(CsvFile::faults)
     }
 
     /// Flushes all rows to the file.

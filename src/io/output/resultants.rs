@@ -32,7 +32,8 @@ pub(crate) struct ResultantTable<const D: usize> {
     about: Vector<D>,
     /// The groups of columns that there are.
     with: [bool; 5],
-    file: Option<CsvFile>,
+    /// The file, on rank 0.
+    pub(crate) file: Option<CsvFile>,
 }
 
 impl<const D: usize> ResultantTable<D> {
@@ -102,16 +103,6 @@ impl<const D: usize> ResultantTable<D> {
             Ok(())
         });
         session.agree(written)
-    }
-
-    /// What the table that is continued lacks.
-    pub(crate) fn faults(&self) -> impl Iterator<Item = String> {
-        self.file.iter().flat_map(CsvFile::faults)
-    }
-
-    /// Flushes all rows to the file.
-    pub(crate) fn flush(&mut self) -> Result<()> {
-        self.file.as_mut().map_or(Ok(()), CsvFile::flush)
     }
 }
 
