@@ -432,7 +432,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         for (number, contact) in self.contacts.iter().enumerate() {
             let [own, other] = contact.shares_of_heat;
             let pair = self.pairs.iter().find(|pair| pair.contact == number);
-            contact.visit_friction(&seen, |node, power| {
+            let Some(friction) = &contact.friction else { continue };
+            friction.visit_powers(&seen, |node, power| {
                 heat.add_friction(node, own * power);
                 let faced = pair.and_then(|pair| {
                     let at = pair.nodes.binary_search_by_key(&(node as u32), |paired| paired.node).ok()?;
@@ -1085,7 +1086,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if !self.contacts.is_empty() {
             names.push("contact");
         }
-        if self.contacts.iter().any(|contact| contact.friction().is_some()) {
+        if self.contacts.iter().any(|contact| contact.friction.is_some()) {
             names.push("friction");
         }
         names.extend(self.surface_effects.iter().map(|e| e.name()));

@@ -1,6 +1,10 @@
 //! What a run allocated for its effects, so that tests can compare it with the job.
 
-use crate::{fem::body::Body, parallel::session::Session, solver::stepping::Stepper};
+use crate::{
+    fem::{body::Body, effect::Friction},
+    parallel::session::Session,
+    solver::stepping::Stepper,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -32,7 +36,8 @@ impl Inventory {
             history_bytes.insert(history.name().to_owned(), bytes as u64);
         }
         let points: usize = body.contacts.iter().map(|c| c.point_count()).sum();
-        let with_friction: usize = body.contacts.iter().map(|c| c.friction_point_count()).sum();
+        let with_friction: usize =
+            body.contacts.iter().flat_map(|c| &c.friction).map(Friction::free_points).sum();
         Self {
             history_bytes,
             contact_points: session.total(points) as u64,

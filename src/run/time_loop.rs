@@ -91,7 +91,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let setup = clock.began.elapsed() - clock.launched;
     let columns = ShownColumns {
         contact: !simulation.body.contacts.is_empty(),
-        friction: simulation.body.contacts.iter().any(|contact| contact.friction().is_some()),
+        friction: simulation.body.contacts.iter().any(|contact| contact.friction.is_some()),
         newton: simulation.scheme.is_nonlinear(),
         iterative: simulation.scheme.preconditioner().0 != Preconditioner::Cholesky,
     };

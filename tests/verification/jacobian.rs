@@ -134,8 +134,9 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             contacts.iter_mut().for_each(|c| c.scale = 2.0 * normal.monotonicity_constant(1.0) + 30.0);
             if let Some(friction) = friction.clone() {
                 contacts[0].add_friction(friction, &body.mesh, &body.held).expect("friction");
-                assert!(session.total(contacts[0].friction_point_count()) > 0);
-                contacts[0].set_friction(250.0, follows);
+                let friction = contacts[0].friction.as_mut().expect("friction");
+                assert!(session.total(friction.free_points()) > 0);
+                friction.set_parameter(250.0, follows);
             }
             choose_unknowns(&mut contacts, &body.mesh).expect("square corners");
             let mut displacement = vector();

@@ -151,7 +151,9 @@ fn falling<const D: usize, const S: usize>(
 
 /// The matrix of the form `sum of d w w_tau^2` over the points with friction, with the decrease `d` and the weight `w`. Collective.
 fn sliding<const D: usize, const S: usize>(session: &Session, run: &Simulation<D, S>, fall: f64) -> Dense {
-    let square = |x: &[f64]| run.body.contacts.iter().map(|c| c.tangential_square(x)).sum::<f64>();
+    let square = |x: &[f64]| {
+        run.body.contacts.iter().map(|c| c.friction.as_ref().map_or(0.0, |f| f.square(x))).sum::<f64>()
+    };
     dense_form(session, run, |x, forces| {
         // By polarisation against each component: all others are at rest.
         let mut near = x.to_vec();
@@ -324,7 +326,7 @@ const FALL_WITH_SLIP: f64 = 0.2 / 0.25;
 /// The fall of the friction bound of a contact with the sliding velocity in Pa s/m, at its largest pressure in a step that follows from a
 /// blend of this length in s.
 fn fall_of_friction<const D: usize>(contact: &Contact<D>, length: f64) -> f64 {
-    let law = contact.friction().expect("friction");
+    let law = &contact.friction.as_ref().expect("friction").law;
     let at = law.context(law.first_histories(), Blend::euler(length));
     let speed = 1e-6;
     (law.bound(speed, LARGEST, at) - law.bound(2.0 * speed, LARGEST, at)) / speed

@@ -71,7 +71,7 @@ impl<const D: usize> Profiles<D> {
         let contacts = || boundaries.iter().flat_map(|(_, contacts)| contacts).map(|at| &body.contacts[*at]);
         let with = OptionalColumns {
             gap: contacts().any(|contact| contact.law.depends_on_displacement()),
-            friction: contacts().any(|contact| contact.friction().is_some()),
+            friction: contacts().any(|contact| contact.friction.is_some()),
         };
         Ok(Self { profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?, with, file: None })
     }

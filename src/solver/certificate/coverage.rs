@@ -10,7 +10,7 @@ use crate::{
 /// softens, and cells do not flow in it.
 pub(super) fn covers_steps<const D: usize, const S: usize>(body: &Body<D, S>, step_length: f64) -> bool {
     let is_uncovered = |contact: &Contact<D>| {
-        contact.friction().is_some_and(|friction| friction.follows_pressure())
+        contact.friction.as_ref().is_some_and(|friction| friction.law.follows_pressure())
             || contact.obstacle.is_some()
             || contact.laws().decrease_per_pressure(step_length).is_some()
     };
@@ -28,7 +28,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
 ) -> Vec<String> {
     let contacts = &body.contacts;
     let mut words = Vec::new();
-    if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
+    if contacts.iter().any(|c| c.friction.as_ref().is_some_and(|f| f.law.follows_pressure())) {
         words.push(
             "friction depends on the contact pressure, which theta takes as given: with a large friction coefficient a step may have several solutions"
                 .into(),

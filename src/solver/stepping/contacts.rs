@@ -57,8 +57,8 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         body.contacts.iter_mut().for_each(|contact| contact.allow_depths(&ahead));
     }
     for contact in &mut body.contacts {
-        if let Some(heat) = &body.heat {
-            contact.set_temperatures(heat.temperature());
+        if let Some((friction, heat)) = contact.friction.as_mut().zip(body.heat.as_ref()) {
+            friction.set_temperatures(heat.temperature());
         }
         contact.prepare(step, blend, [&converged, &start])?;
     }

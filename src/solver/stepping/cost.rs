@@ -88,7 +88,7 @@ impl ProblemSize {
                 && !contacts.iter().any(Contact::needs_ghosts)
                 && (!body.flows() || body.only_cells_flow() || body.only_surface_acts())
                 && motions <= MAX_CONDENSED_MOTIONS,
-            friction: contacts.iter().any(|contact| contact.friction().is_some()),
+            friction: contacts.iter().any(|contact| contact.friction.is_some()),
             precision: if body.flows() { FactorPrecision::Double } else { precision },
         })
     }

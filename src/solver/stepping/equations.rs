@@ -3,7 +3,7 @@
 use super::obstacle_motions::ObstacleMotions;
 use crate::{
     error::{Error, Result},
-    fem::effect::{Contact, set_walls},
+    fem::effect::{Contact, Friction, set_walls},
     linear_algebra::petsc::{
         DistributedVector, Matrix, NonlinearProblem, ProjectedKind, ProjectedKsp, ProjectedOperator,
     },
@@ -510,8 +510,10 @@ impl<const D: usize> ContactEquations<'_, D> {
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
         let is_unsymmetric = cells.is_some()
             && self.session.total(cells.as_ref().map_or(0, |cells| usize::from(!cells.is_symmetric()))) > 0;
-        let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
-            && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
+        let coupled = self.contacts.iter().any(|contact| contact.friction.is_some())
+            && self.session.total(usize::from(
+                self.contacts.iter().flat_map(|contact| &contact.friction).any(Friction::is_coupled),
+            )) > 0;
         let coupled = coupled || is_unsymmetric || self.obstacles.is_unsymmetric(self.contacts);
         let mut operator = ReducedJacobian {
             matrix: self.matrix,
@@ -575,7 +577,7 @@ impl<const D: usize> ContactEquations<'_, D> {
             return Err(Error::Failed(outcome.linear.description().into()));
         }
         direction.copy_from(velocity)?;
-        if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction().is_some()) {
+        if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction.is_some()) {
             operator.multiply(velocity, open)?;
             open.scale(-1.0)?;
             open.add_scaled(1.0, residual)?;
@@ -649,7 +651,7 @@ impl<const D: usize> ProjectedOperator for ReducedJacobian<'_, D> {
     }
 
     fn may_project(&self) -> bool {
-        self.contacts.iter().any(|contact| contact.law.has_vertical_parts() || contact.friction().is_some())
+        self.contacts.iter().any(|contact| contact.law.has_vertical_parts() || contact.friction.is_some())
     }
 
     fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {

@@ -19,7 +19,10 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::{body::Body, effect::Contact},
+    fem::{
+        body::Body,
+        effect::{Contact, Friction},
+    },
     linear_algebra::petsc::{DistributedVector, Snes, has_option},
     parallel::session::Session,
 };
@@ -202,7 +205,7 @@ impl Newton {
         let (session, contacts, system) = (problem.session, &mut problem.body.contacts, equations.system);
         self.start.copy_from(equations.velocity)?;
         // An attempt that ended with an error may have left them fixed.
-        contacts.iter_mut().for_each(Contact::free_speeds);
+        frictions(contacts).for_each(|friction| friction.fix_speeds(false));
         let multiply = |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
         self.obstacles.start(session, contacts, equations.velocity, system.tolerance, multiply)?;
         self.set_linear_tolerances(equations, 1.0)?;
@@ -224,7 +227,9 @@ impl Newton {
         let contacts = &problem.body.contacts;
         write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
         let mut pairs = contacts.iter().zip(&self.steepest_decreases);
-        pairs.all(|(contact, decrease)| *decrease <= LARGEST_DECREASE_RATIO * contact.friction_scale())
+        pairs.all(|(contact, decrease)| {
+            *decrease <= LARGEST_DECREASE_RATIO * contact.friction.as_ref().map_or(0.0, |f| f.scale)
+        })
     }
 
     /// Lets unknowns follow obstacles that have touched unexpectedly, and no longer those that have parted; returns whether there are
@@ -292,9 +297,10 @@ impl Newton {
 
     fn conditions<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Conditions {
         let contacts = &body.contacts;
-        let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
+        let follows =
+            |contact: &Contact<D>| contact.friction.as_ref().is_some_and(|f| f.law.follows_pressure());
         let flows = self.flow.is_some();
-        let rubs = contacts.iter().any(|contact| contact.friction().is_some());
+        let rubs = contacts.iter().any(|contact| contact.friction.is_some());
         Conditions {
             follows_pressure: contacts.iter().any(follows),
             friction: self.settings.friction,
@@ -321,7 +327,9 @@ impl Newton {
         for ((contact, scales), decrease) in contacts.iter_mut().zip(scales).zip(&self.steepest_decreases) {
             let [normal, tangential] = scales.map(|scale| fallback.stiffness_factor * scale);
             contact.scale = normal.max(2.0 * contact.monotonicity_constant());
-            contact.set_friction(tangential.max(decrease / INITIAL_DECREASE_RATIO), follows);
+            if let Some(friction) = &mut contact.friction {
+                friction.set_parameter(tangential.max(decrease / INITIAL_DECREASE_RATIO), follows);
+            }
         }
     }
 
@@ -528,9 +536,14 @@ fn decreases<const D: usize>(contact: &Contact<D>) -> bool {
     contact.monotonicity_constant() > 0.0 || contact.has_decreasing_friction()
 }
 
+/// The friction of all contacts that have any.
+fn frictions<const D: usize>(contacts: &mut [Contact<D>]) -> impl Iterator<Item = &mut Friction<D>> {
+    contacts.iter_mut().filter_map(|contact| contact.friction.as_mut())
+}
+
 /// Whether a contact may have several equilibria: not where pressures depend on the velocity alone.
 fn may_fall<const D: usize>(contact: &Contact<D>) -> bool {
-    contact.law.depends_on_displacement() || contact.friction().is_some()
+    contact.law.depends_on_displacement() || contact.friction.is_some()
 }
 
 /// The reason why Newton's method failed, as a message.
@@ -541,9 +554,11 @@ fn explain(reason: &str, counts: &SolveCounts) -> String {
 
 /// Writes the steepest descent of each contact's friction at the pressures in its bounds, over all ranks. Collective.
 fn write_steepest_decreases<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
-    let steepest_decrease = |contact: &Contact<D>| match contact.has_decreasing_friction() {
-        true => session.largest([contact.steepest_friction_decrease()])[0],
-        false => 0.0,
+    let steepest_decrease = |contact: &Contact<D>| match &contact.friction {
+        Some(friction) if contact.has_decreasing_friction() => {
+            session.largest([friction.steepest_decrease()])[0]
+        }
+        _ => 0.0,
     };
     out.clear();
     // That of an attempt that left all bounds is none.

@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Contact, Form, Step},
+        effect::{Contact, Form, Friction, Step},
         state::State,
     },
     laws::digits::Digits,
@@ -74,7 +74,7 @@ impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
     /// laws that soften. Collective.
     pub(super) fn explain(&self, why: &str, softens: bool) -> Error {
         let body = &*self.body;
-        let rises = body.contacts.iter().map(Contact::rise_of_bound);
+        let rises = body.contacts.iter().flat_map(|contact| &contact.friction).map(Friction::rise_of_bound);
         let [rise] = self.session.largest([rises.fold(0.0, larger)]);
         if rise > STEEP_RISE {
             return self.failed(why, &rise_remedy(rise));

@@ -24,12 +24,10 @@ pub(super) fn resistances<const D: usize>(
         contact.add_normals(&mut motion.owned_mut()?);
         let square = contact.normal_square(&motion.owned()?);
         let normal = against(&motion, square)?.max(2.0 * contact.monotonicity_constant());
-        if contact.friction().is_none() {
-            return Ok([normal; 2]);
-        }
+        let Some(friction) = &contact.friction else { return Ok([normal; 2]) };
         motion.fill(0.0)?;
-        contact.add_unit_sliding(&mut motion.owned_mut()?);
-        let square = contact.tangential_square(&motion.owned()?);
+        friction.add_unit_sliding(&mut motion.owned_mut()?);
+        let square = friction.square(&motion.owned()?);
         Ok([normal, against(&motion, square)?])
     };
     contacts.iter().map(&mut resistance).collect()

@@ -99,7 +99,8 @@ impl MovingSupports {
     pub(super) fn show_contacts<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
         let velocity = self.carried.local()?;
         let velocity = body.seen_by_contacts(&velocity);
-        body.contacts.iter_mut().for_each(|contact| contact.set_support_velocities(&velocity));
+        let frictions = body.contacts.iter_mut().filter_map(|contact| contact.friction.as_mut());
+        frictions.for_each(|friction| friction.set_support_velocities(&velocity));
         Ok(())
     }
 

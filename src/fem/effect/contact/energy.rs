@@ -100,13 +100,6 @@ impl<const D: usize> Contact<D> {
         if pressure > stored { (pressure - stored) * (after - before) } else { 0.0 }
     }
 
-    /// Visits the powers in W that friction dissipates at local nodes, from velocities at the end of the step just solved, with ghosts.
-    pub fn visit_friction(&self, velocity: &[f64], visit: impl FnMut(usize, f64)) {
-        if let Some(friction) = &self.friction {
-            friction.visit_powers(velocity, visit);
-        }
-    }
-
     /// Power in W/m^(D-1) that the dashpot at a point dissipates at the end of the step, at this penetration in m, which has grown by
     /// this mean rate in m/s.
     fn damping_power(&self, point: &Point<D>, after: f64, growth: f64) -> f64 {

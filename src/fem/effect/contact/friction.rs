@@ -35,22 +35,23 @@ use crate::{
 
 /// A friction law with its points.
 #[derive(Debug)]
-pub(super) struct Friction<const D: usize> {
+pub struct Friction<const D: usize> {
+    /// The law.
     pub law: FrictionLaw,
     /// The current step, as the law sees it at points with the first history.
-    pub context: SlidingContext,
+    pub(super) context: SlidingContext,
     /// `c` in the parameter `s = c v + q`, in Pa s/m.
     pub scale: f64,
     /// Velocity per traction in m/(Pa s) that is added to the sliding velocity of the law, see [`TangentialPoint::resolve`]; 0 in solutions.
     pub give: f64,
     /// Whether the bound depends on the pressure while a step is solved.
-    pub follows: bool,
-    pub points: Vec<TangentialPoint<D>>,
+    pub(super) follows: bool,
+    pub(super) points: Vec<TangentialPoint<D>>,
     /// Nodes that this rank owns.
-    pub owned: usize,
+    pub(super) owned: usize,
     /// Tangents that supports hold in part, because they hold a part of the normal, beside free ones, with the points of the contact;
     /// empty where the obstacle does not move.
-    pub partly_held: Vec<(usize, Vector<D>)>,
+    pub(super) partly_held: Vec<(usize, Vector<D>)>,
 }
 
 /// The state of a point with friction.
@@ -156,14 +157,14 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Sets the temperatures of the points in K from those of the local nodes.
-    pub(super) fn set_temperatures(&mut self, temperatures: &[f64]) {
+    pub fn set_temperatures(&mut self, temperatures: &[f64]) {
         for point in &mut self.points {
             point.context.temperature = temperatures[point.node()];
         }
     }
 
     /// Sets the velocities of supports in the step in m/s by local nodes.
-    pub(super) fn set_support_velocities(&mut self, velocities: &[f64]) {
+    pub fn set_support_velocities(&mut self, velocities: &[f64]) {
         self.points.iter_mut().for_each(|point| point.set_support_velocity(velocities));
     }
 
@@ -191,8 +192,18 @@ impl<const D: usize> Friction<D> {
         if self.status(point, sliding) == FrictionStatus::Sticks { 0.0 } else { norm(sliding) }
     }
 
+    /// Sets `c` in the parameter of the graph, and whether the bound depends on the pressure while a step is solved, if it does at all.
+    pub fn set_parameter(&mut self, scale: f64, follows: bool) {
+        (self.scale, self.follows) = (scale, follows && self.law.follows_pressure());
+    }
+
+    /// Points on this rank that can move along the boundary.
+    pub fn free_points(&self) -> usize {
+        self.points.iter().filter(|point| point.is_free()).count()
+    }
+
     /// Fixes the bounds of laws with one at rest at the sliding speeds of the last evaluation, or no longer.
-    pub(super) fn fix_speeds(&mut self, fixed: bool) {
+    pub fn fix_speeds(&mut self, fixed: bool) {
         let fixed = fixed && self.law.jumps_at_rest();
         self.points.iter_mut().for_each(|point| point.fixed_speed = fixed.then_some(point.speed));
     }
@@ -382,7 +393,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Whether, at the last linearisation, some point slides with a bound that depends on the pressure.
-    pub(super) fn is_coupled(&self) -> bool {
+    pub fn is_coupled(&self) -> bool {
         self.points.iter().any(|p| p.tangent.coefficient > 0.0)
     }
 
@@ -398,7 +409,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.
-    pub(super) fn steepest_decrease(&self) -> f64 {
+    pub fn steepest_decrease(&self) -> f64 {
         let decrease =
             |point: &TangentialPoint<D>| self.law.steepest_decrease(point.context) * point.pressure;
         self.points.iter().fold(0.0, |most, point| larger(most, decrease(point)))
@@ -406,7 +417,7 @@ impl<const D: usize> Friction<D> {
 
     /// The growth of the bound of a point at rest with the pressure where it comes under pressure, the largest of all points; 0 if bounds do
     /// not depend on the pressure.
-    pub(super) fn rise_of_bound(&self) -> f64 {
+    pub fn rise_of_bound(&self) -> f64 {
         let rise = |point: &TangentialPoint<D>| self.law.by_pressure(0.0, 0.0, point.context);
         let follows = self.law.follows_pressure();
         self.points.iter().filter(|_| follows).fold(0.0, |most, point| larger(most, rise(point)))
@@ -441,7 +452,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Visits the powers in W that friction dissipates at the nodes of its points at these velocities.
-    pub(super) fn visit_powers(&self, velocity: &[f64], mut visit: impl FnMut(usize, f64)) {
+    pub fn visit_powers(&self, velocity: &[f64], mut visit: impl FnMut(usize, f64)) {
         for (point, sliding) in self.sliding(Body, velocity) {
             visit(point.node(), point.weight * dot(&point.whole_traction(), &sliding));
         }
@@ -507,7 +518,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Adds a unit velocity along the first free tangent of each point to nodal values.
-    pub(super) fn add_unit_sliding(&self, nodal: &mut [f64]) {
+    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
         self.points
             .iter()
             .filter(|point| point.is_free())
@@ -523,7 +534,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// `integral of w_tau^2` over the points on this rank.
-    pub(super) fn square(&self, nodal: &[f64]) -> f64 {
+    pub fn square(&self, nodal: &[f64]) -> f64 {
         let square = |point: &TangentialPoint<D>| {
             point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
         };

@@ -57,7 +57,6 @@ use crate::{
     mesh::Mesh,
     parallel::session::Session,
 };
-use friction::Friction;
 use point::{Point, Vectors::Body, gauss_points};
 use std::collections::BTreeSet;
 
@@ -66,6 +65,7 @@ pub use closeness::{Closeness, Gaps};
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, ContactEnergy, STORED_IN_CONTACT};
+pub use friction::Friction;
 pub use loaded_obstacle::{
     Freedom, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK,
 };
@@ -124,7 +124,8 @@ pub struct Contact<const D: usize> {
     points: Vec<Point<D>>,
     /// Nodes that this rank owns.
     owned: usize,
-    friction: Option<Friction<D>>,
+    /// Friction, if there is any.
+    pub friction: Option<Friction<D>>,
     /// Nodes at which points meet whose normals are not orthogonal, as lists of contacts and their points; each node is in the list of
     /// one of these contacts.
     edges: Vec<Vec<(usize, usize)>>,

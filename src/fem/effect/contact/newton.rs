@@ -214,11 +214,6 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Whether the last linearisation is unsymmetric at points on this rank.
-    pub fn is_coupled(&self) -> bool {
-        self.friction.as_ref().is_some_and(Friction::is_coupled)
-    }
-
     /// Hash that differs between linearisations whose points are on different branches.
     pub fn set_digest(&self) -> u64 {
         let normal = self.points.iter().flat_map(|p| [p.theta, p.slope]);

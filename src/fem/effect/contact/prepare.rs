@@ -13,16 +13,6 @@ use crate::{
 };
 
 impl<const D: usize> Contact<D> {
-    /// Lets friction see the temperatures of the local nodes in K at the start of a step, before it is prepared.
-    pub fn set_temperatures(&mut self, temperatures: &[f64]) {
-        self.friction.iter_mut().for_each(|friction| friction.set_temperatures(temperatures));
-    }
-
-    /// Lets friction know the velocities of supports in the step in m/s by local nodes, as contacts see them. Not called, all are at rest.
-    pub fn set_support_velocities(&mut self, velocities: &[f64]) {
-        self.friction.iter_mut().for_each(|friction| friction.set_support_velocities(velocities));
-    }
-
     /// Starts a step of this blend: evaluates the gap and the motion of the obstacle, given the displacements of the converged state and of
     /// the blend, both with ghosts. Histories of friction and wear start from the same blend of earlier ones, and the velocity of the
     /// obstacle follows from its positions by the same formula. If the end of the step is extrapolated, pressures of laws with a potential

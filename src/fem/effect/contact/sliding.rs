@@ -36,36 +36,6 @@ impl<const D: usize> Contact<D> {
         Ok(())
     }
 
-    /// The friction law, if there is friction.
-    pub fn friction(&self) -> Option<&FrictionLaw> {
-        self.friction.as_ref().map(|friction| &friction.law)
-    }
-
-    /// Points with friction on this rank that can move along the boundary.
-    pub fn friction_point_count(&self) -> usize {
-        self.friction.iter().flat_map(|friction| &friction.points).filter(|point| point.is_free()).count()
-    }
-
-    /// Sets `c` in the parameter `s = c v + q` of the friction graph, in Pa s/m, and whether its bound depends on the contact
-    /// pressure while a step is solved.
-    pub fn set_friction(&mut self, scale: f64, follows: bool) {
-        if let Some(friction) = &mut self.friction {
-            friction.scale = scale;
-            friction.follows = follows && friction.law.follows_pressure();
-        }
-    }
-
-    /// Sets the velocity in m/s for each Pa of traction by which points with friction yield in addition to their law: with a large one
-    /// they are almost free, with a small one they almost stick, and with 0 they obey the law.
-    pub fn set_give(&mut self, give: f64) {
-        self.friction.iter_mut().for_each(|friction| friction.give = give);
-    }
-
-    /// `c` in the parameter of the friction graph in Pa s/m; 0 without friction.
-    pub fn friction_scale(&self) -> f64 {
-        self.friction.as_ref().map_or(0.0, |friction| friction.scale)
-    }
-
     /// Fixes the friction bounds at the pressures of the points. The unknowns of points without a bound do not follow an obstacle that
     /// forces drive.
     pub fn fix_bounds(&mut self) {
@@ -74,16 +44,6 @@ impl<const D: usize> Contact<D> {
         if self.obstacle.is_some() && friction.law.follows_pressure() {
             friction.points.iter_mut().for_each(|point| point.follows = point.pressure != 0.0);
         }
-    }
-
-    /// Fixes the friction bounds at the sliding speeds of the points.
-    pub fn fix_speeds(&mut self) {
-        self.friction.iter_mut().for_each(|friction| friction.fix_speeds(true));
-    }
-
-    /// Lets friction bounds follow the sliding speeds again.
-    pub fn free_speeds(&mut self) {
-        self.friction.iter_mut().for_each(|friction| friction.fix_speeds(false));
     }
 
     /// Advances the histories of friction and wear by the current step, at its velocities with ghosts.
@@ -190,20 +150,9 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().is_some_and(|friction| friction.law.steepest_decrease(friction.context) > 0.0)
     }
 
-    /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
-    pub fn steepest_friction_decrease(&self) -> f64 {
-        self.friction.as_ref().map_or(0.0, Friction::steepest_decrease)
-    }
-
-    /// By how many Pa the friction bound grows for each Pa of contact pressure where a point comes under pressure, in the current step: the
-    /// largest at points on this rank.
-    pub fn rise_of_bound(&self) -> f64 {
-        self.friction.as_ref().map_or(0.0, Friction::rise_of_bound)
-    }
-
     /// Both laws.
     pub fn laws(&self) -> LawsOfContact<'_> {
-        LawsOfContact { normal: &self.law, friction: self.friction() }
+        LawsOfContact { normal: &self.law, friction: self.friction.as_ref().map(|friction| &friction.law) }
     }
 
     /// The steepest decrease in Pa s/m of the normal graph in the current step.

@@ -27,16 +27,4 @@ impl<const D: usize> Contact<D> {
         let points = self.points.iter().filter(|_| !self.needs_ghosts);
         points.map(|p| p.weight * (p.free_length * p.along(Body, nodal)).powi(2)).sum()
     }
-
-    /// Adds a unit velocity along a tangent at each point with friction to nodal values.
-    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
-        if let Some(friction) = &self.friction {
-            friction.add_unit_sliding(nodal);
-        }
-    }
-
-    /// `integral of w_tau^2` over the points with friction on this rank.
-    pub fn tangential_square(&self, nodal: &[f64]) -> f64 {
-        self.friction.as_ref().map_or(0.0, |friction| friction.square(nodal))
-    }
 }

@@ -6,10 +6,9 @@
 //! it elsewhere. Its minimum is therefore below the last one, and each solution follows the last one from the start of the step on (D.
 //! Hunter, K. Lange, A tutorial on MM algorithms, Am. Stat. 58, 2004).
 
-use super::Newton;
+use super::{Newton, frictions};
 use crate::{
     error::Result,
-    fem::effect::Contact,
     solver::stepping::{fallbacks::Search, problem::StepProblem, solver::Reduced},
 };
 
@@ -27,7 +26,7 @@ impl Newton {
         self.evaluate(problem, equations)?;
         for round in 0..MOST_ROUNDS {
             self.fix_bounds(problem, equations.system)?;
-            problem.body.contacts.iter_mut().for_each(Contact::fix_speeds);
+            frictions(&mut problem.body.contacts).for_each(|friction| friction.fix_speeds(true));
             self.scratch.restart();
             let failure = self.attempt(problem, equations, Search::ShortDescent, 1.0)?;
             if failure.is_some() && round == 0 {
@@ -38,7 +37,7 @@ impl Newton {
                 break;
             }
         }
-        problem.body.contacts.iter_mut().for_each(Contact::free_speeds);
+        frictions(&mut problem.body.contacts).for_each(|friction| friction.fix_speeds(false));
         Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Starts of Newton's method from solutions with friction points that yield.
 
-use super::{Newton, write_unknowns, write_velocities};
+use super::{Newton, frictions, write_unknowns, write_velocities};
 use crate::{
     error::Result,
     fem::{body::Body, effect::Contact},
@@ -33,7 +33,7 @@ impl Newton {
         equations: &mut Reduced<'_>,
     ) -> Result<()> {
         let solved = self.yield_less_and_less(problem, equations);
-        problem.body.contacts.iter_mut().for_each(|contact| contact.set_give(0.0));
+        frictions(&mut problem.body.contacts).for_each(|friction| friction.give = 0.0);
         solved
     }
 
@@ -152,5 +152,5 @@ impl Newton {
 
 /// Lets friction points yield by this ratio of the compliance of the body.
 fn set_give<const D: usize, const S: usize>(body: &mut Body<D, S>, ratio: f64) {
-    body.contacts.iter_mut().for_each(|contact| contact.set_give(ratio / contact.friction_scale()));
+    frictions(&mut body.contacts).for_each(|friction| friction.give = ratio / friction.scale);
 }
