@@ -658,6 +658,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
     }
 
+    /// The largest share of its coefficient of friction that a point of a contact lost on this rank in the step just committed; `None` where
+    /// coefficients cannot fall, on all ranks alike.
+    pub fn fall_of_friction(&self, state: &State) -> Result<Option<f64>> {
+        let (velocity, before) = (state.velocity.local()?, state.previous_velocity.local()?);
+        let velocities = [self.seen_by_contacts(&velocity), self.seen_by_contacts(&before)];
+        let [velocity, before] = &velocities;
+        let falls = self.contacts.iter().filter_map(|contact| contact.fall_of_friction([velocity, before]));
+        Ok(falls.reduce(larger))
+    }
+
     /// The largest strain or strain rate on this rank after a committed step as a share of that up to which the job asks for certificates,
     /// where elasticity or viscosity is a formula; `None` if there are none, on all ranks alike.
     pub fn range_share(&self, state: &State) -> Result<Option<f64>> {

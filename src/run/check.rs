@@ -97,7 +97,10 @@ pub(super) fn check<const D: usize, const S: usize>(
     report.warnings.extend(sizes.flat_map(|(at, size)| size.warnings(at + 1, loaded.job.time.end)));
     if let Some(began) = began {
         match trial::estimate(session, &loaded.job, ready, began)? {
-            Ok(seconds) => report.estimate.seconds = Some(seconds),
+            Ok((seconds, fall)) => {
+                report.warnings.extend(report.certificates.lagging_friction(fall, longest));
+                report.estimate.seconds = Some(seconds);
+            }
             Err(error) => {
                 report.fails = true;
                 report.warnings.push(format!("a step that was tried fails, as it will in a run: {error}"));

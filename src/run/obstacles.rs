@@ -6,12 +6,13 @@ use crate::{
     fem::{
         body::Body,
         effect::{Closeness, Contact, Gaps, LoadedMotion, OVERRUN},
-        space::longest_side,
+        space::{longest_side, surface_means},
         state::State,
     },
     job::{Job, Sliding},
     laws::contact::Gap,
-    linear_algebra::tensor::{Vector, larger},
+    linear_algebra::tensor::{Vector, larger, norm},
+    mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use serde::Serialize;
@@ -25,6 +26,10 @@ const LARGEST_SLIP: f64 = 0.5;
 /// The angle in rad between a boundary and a plane above which a warning is given: the tangential force of a frictionless plane is then
 /// missing, more than 3 % of the pressure.
 const TILTED: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// The angle in rad between facets and their mean at a corner from which on a boundary turns there, and the inverse of the share of such
+/// nodes from which on it is meant to be round: at nodes on edges facets do not turn.
+const TURNING: f64 = 1e-3;
+const SHARE_OF_CORNERS: usize = 8;
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -61,6 +66,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             continue;
         }
         out.extend(warning_of_tilt(session, (number, contact), &on, job.time.end));
+        out.extend(warning_of_straight_edges(session, &body.mesh, (number, contact), &on)?);
         if deepest > TOO_DEEP * size {
             out.push(format!(
                 "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject the body; correct the gap, the obstacle or [initial] displacement",
@@ -125,6 +131,40 @@ fn warning_of_tilt<const D: usize>(
             angle.to_degrees()
         )
     })
+}
+
+/// A warning about quadratic cells with straight edges along a boundary that is meant to be round, before an obstacle that is round: nodes
+/// on edges lie beside the arc through the corners. Collective.
+fn warning_of_straight_edges<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    (number, contact): (usize, &Contact<D>),
+    on: &str,
+) -> Result<Option<String>, Agreed> {
+    let is_round = matches!(contact.gap, Gap::Sphere(_) | Gap::Shape(_));
+    if mesh.order() == 1 || !is_round || session.total(usize::from(mesh.is_curved)) > 0 {
+        return Ok(None);
+    }
+    let of_facet = |facet: u32| {
+        let normal = facet_normal(&mesh.facet_corners(facet));
+        let measure = norm(&normal);
+        let size = if D == 2 { measure } else { (2.0 * measure).sqrt() };
+        std::array::from_fn(|i| if i < 3 { normal.get(i).map_or(0.0, |n| n / measure) } else { size })
+    };
+    let points = surface_means(session, mesh, contact.facets(), of_facet)?;
+    let turns = || {
+        let turn = |[x, y, z, size]: [f64; 4]| [norm(&[x, y, z]).min(1.0).acos(), size];
+        points.iter().map(move |(_, means)| turn(*means)).filter(|[angle, _]| *angle > TURNING)
+    };
+    let [beside] = session.largest([turns().map(|[angle, size]| 0.25 * angle * size).fold(0.0, larger)]);
+    let [turning, all] = [turns().count(), points.len()].map(|count| session.total(count));
+    Ok((turning > 0 && SHARE_OF_CORNERS * turning >= all).then(|| {
+        format!(
+            "contact.{number}: the quadratic cells along {on} have straight edges, whose middle nodes lie up to {beside:.1e} m beside the \
+             arc through their ends: a round obstacle touches the others first, and pressures are uneven; generate curved cells (Gmsh: \
+             Mesh.ElementOrder = 2), or take [mesh] order = 1"
+        )
+    }))
 }
 
 /// The gaps of a contact that depends on them. Names are those of `solver check --json`.

@@ -14,7 +14,7 @@ use crate::{
         state::State,
     },
     io::output::history::Totals,
-    job::{Job, Loaded},
+    job::{Job, Loaded, Scheme},
     linear_algebra::{petsc::DistributedVector, sparse::Precision, tensor::larger},
     mesh::{GlobalMesh, Mesh},
     parallel::{agreement::Agreed, session::Session},
@@ -118,6 +118,12 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if let Some(mine) = session.agree(body.slip_pressure(state))? {
             let [most] = session.largest([mine]);
             totals.max_slip_pressure = Some(totals.max_slip_pressure.map_or(most, |max| larger(max, most)));
+        }
+        if scheme.scheme() == Scheme::LaggedEuler
+            && let Some(mine) = session.agree(body.fall_of_friction(state))?
+        {
+            let [most] = session.largest([mine]);
+            totals.max_friction_fall = Some(totals.max_friction_fall.map_or(most, |max| larger(max, most)));
         }
         if let Some(mine) = session.agree(body.range_share(state))? {
             let [most] = session.largest([mine]);

@@ -98,6 +98,9 @@ pub struct Summary {
     /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds; to be compared with
     /// `certificates.slip_pressure_bound`.
     pub max_slip_pressure: Option<f64>,
+    /// Largest share of its coefficient of friction that a point lost in any step of `lagged_euler`; present where coefficients may fall.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_friction_fall: Option<f64>,
     /// Largest equivalent strain rate after any step over the reference rate, or strain over the reference strain; present if viscosity or
     /// elasticity is a formula.
     #[serde(skip_serializing_if = "Option::is_none")]

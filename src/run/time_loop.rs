@@ -418,7 +418,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let covered = body.covered();
         let summary = self.summary(status, error, restarted_from, errors);
         let written = self.session.agree(summary).and_then(|mut summary| {
-            summary.range_warnings(surface_has_mass, covered).for_each(|warning| self.log.warning(warning));
+            let lagging = summary
+                .certificates
+                .lagging_friction(summary.max_friction_fall, steps::longest_step(self.job));
+            let warnings = summary.range_warnings(surface_has_mass, covered).chain(lagging);
+            warnings.for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
             self.session.on_first(|| {
                 header::closing(&mut self.log, &summary, self.job);
@@ -507,6 +511,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             max_heat_imbalance: body.heat.is_some().then_some(totals.max_heat_imbalance),
             energy_of_scheme: totals.energy_of_scheme(),
             max_slip_pressure: totals.max_slip_pressure,
+            max_friction_fall: totals.max_friction_fall,
             max_rate_share: totals.max_rate_share,
             guesses: (totals.guessed_steps > 0).then_some(Guesses {
                 steps: totals.guessed_steps,

@@ -52,13 +52,14 @@ struct Tried {
     others: [f64; 2],
 }
 
-/// Tries steps of a job that was set up since `began`; `Ok(Err(..))` tells why one of them failed. Collective.
+/// Tries steps of a job that was set up since `began`; returns also the largest share of the coefficient of friction
+/// lost in one of them, where `lagged_euler` lags behind it. `Ok(Err(..))` tells why one of them failed. Collective.
 pub(super) fn estimate<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
     Setup { body, state, scheme, .. }: Setup<D, S>,
     began: Instant,
-) -> Result<Result<TimeEstimate, Agreed>, Agreed> {
+) -> Result<Result<(TimeEstimate, Option<f64>), Agreed>, Agreed> {
     let [set_up] = session.largest([began.elapsed().as_secs_f64()]);
     let others = match (scheme.is_nonlinear(), body.flows()) {
         (false, _) => AGAIN,
@@ -78,7 +79,7 @@ pub(super) fn estimate<const D: usize, const S: usize>(
         tried.steps.push([simulation.state.time, now - before]);
         before = now;
     }
-    Ok(Ok(tried.extrapolated(job, set_up)))
+    Ok(Ok((tried.extrapolated(job, set_up), simulation.totals.max_friction_fall)))
 }
 
 impl Tried {

@@ -639,3 +639,44 @@ fn a_heated_plate_that_nothing_but_friction_holds_has_a_solution_in_each_step() 
         }
     }
 }
+
+#[test]
+fn friction_that_falls_fast_under_lagged_euler_is_warned_of_by_checks_and_runs() {
+    for (scheme, is_warned) in [("lagged_euler", true), ("bdf2", false)] {
+        let case = Case::of("verification/fault_rupture")
+            .set("parameters.n", "1")
+            .set("time", &format!("{{ scheme = '{scheme}', end = 0.4, step = 0.02 }}"));
+        let run = case.run_with(1, &[]).expect(0);
+        let checked = launch::run_alone(&["check".as_ref(), case.written().as_os_str()]);
+        for outcome in [&run, &checked] {
+            let says = launch::unwrapped(&outcome.stdout);
+            assert_eq!(says.contains("of its coefficient in one step: lagged_euler"), is_warned, "{says}");
+        }
+        let fall = &case.results().summary()["max_friction_fall"];
+        assert_eq!(fall.as_f64().is_some_and(|fall| fall > 2e-3), is_warned, "{fall}");
+    }
+}
+
+#[test]
+fn friction_that_falls_with_the_speed_moves_a_block_without_mass_from_sticking_to_sliding_on_a_belt() {
+    let case = Case::written_as(
+        "
+        mesh.rectangle = { size = [0.5, 0.2], cells = [10, 4] }
+        material = { hypothesis = 'plane_strain', elasticity = { youngs_modulus = 1e8, poisson_ratio = 0.3 } }
+        support = [{ on = ['left'], stiffness = { normal = 1e7, tangential = 1e7 } }]
+        traction = [{ on = ['top'], value = [0, -1e5] }]
+        time = { end = 0.1, step = 0.01, scheme = 'implicit_euler' }
+        [[contact]]
+        on = ['bottom']
+        normal.unilateral = {}
+        friction.slip_weakening = { static = 0.5, dynamic = 0.3, decay_velocity = 0.1 }
+        obstacle.plane = { point = ['0.5*t', 0], normal = [0, 1] }",
+    );
+    let table = case.run(1).table("resultants.csv").only("source", "contact bottom");
+    let ratios: Vec<f64> =
+        table.numbers("force_x").iter().zip(table.numbers("force_y")).map(|(x, y)| x / y).collect();
+    // It sticks at first; at last all points slide at the speed of the belt.
+    let sliding = 0.3 + 0.2 * (-5.0f64).exp();
+    assert!(ratios[0] < 0.3, "{ratios:?}");
+    assert!((ratios[ratios.len() - 1] / sliding - 1.0).abs() < 1e-6, "{ratios:?}, not {sliding} at last");
+}

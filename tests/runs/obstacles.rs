@@ -5,6 +5,7 @@ use crate::{
     launch::{self, Outcome},
     results::assert_same_answer,
 };
+use std::path::Path;
 
 /// A clamped elastic block without mass, 2 m x 0.5 m, under this obstacle.
 fn under(obstacle: &str) -> Case {
@@ -394,7 +395,7 @@ fn a_contact_that_never_touched_is_warned_of_after_the_last_step() {
     for (obstacle, said) in [
         (plane("500 - t"), Some("the smallest gap after any step was 4.985e2 m")),
         (disc("600", 50.0), Some("the smallest gap after any step was 5.495e2 m")),
-        ("{sphere = {centre = [70, 2], radius = 1}}".into(), Some("no obstacle was along the normal")),
+        ("{plane = {point = [70, 0], normal = [-1, 0]}}".into(), Some("no obstacle was along the normal")),
         (plane("0.52 - 0.06*sin(pi*t)"), None),
     ] {
         let case = under(&obstacle);
@@ -448,10 +449,10 @@ fn a_check_prints_the_gaps_of_contacts() {
     let case = under("{plane = {point = [0, 0.75], normal = [1, -10]}}");
     let job = case.written();
     for ranks in [1, 2] {
-        // From 0.25 m at the left to 2 m times the slope of 0.1 more at the right.
+        // From 0.25 m at the left, there along the normal of the plane, to 2 m times the slope of 0.1 more at the right.
         launch::run(ranks, &["check", job.to_str().expect("a path")])
             .expect(0)
-            .says("gap        top: 2.5000e-1 m to 4.5000e-1 m");
+            .says("gap        top: 2.4876e-1 m to 4.5000e-1 m");
     }
     let case = under(&disc("0.8", 0.12));
     let outcome = launch::run(2, &["check", "--json", case.written().to_str().expect("a path")]).expect(0);
@@ -505,6 +506,24 @@ fn a_plane_that_is_inclined_to_the_body_is_warned_of() {
         let case = plane(normal);
         let checked = launch::run_alone(&["check".as_ref(), case.written().as_os_str()]);
         assert_eq!(launch::unwrapped(&checked.stdout).contains(words), angle, "{normal}\n{}", checked.stdout);
+    }
+}
+
+#[test]
+fn straight_edges_of_quadratic_cells_around_a_round_obstacle_are_warned_of() {
+    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/meshes");
+    for (mesh, order, is_warned) in [("straight", 2, true), ("straight", 1, false), ("curved", 2, false)] {
+        let file = meshes.join(format!("quarter_{mesh}.msh"));
+        let case = Case::written_as(&format!(
+            "mesh = {{ file = '{}', order = {order} }}\nmaterial.elasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0.3 }}\n\
+             [[support]]\non = ['bottom']\nfix = 'all'\n[[contact]]\non = ['mantle']\nnormal.unilateral = {{}}\n\
+             obstacle.shape = {{ distance = '1.1 - sqrt(x^2 + y^2)' }}\n\
+             [time]\nend = 1.0\nstep = 1.0\nscheme = 'implicit_euler'\n",
+            file.display()
+        ));
+        let checked = launch::run_alone(&["check".as_ref(), case.written().as_os_str()]);
+        let says = launch::unwrapped(&checked.stdout);
+        assert_eq!(says.contains("along mantle have straight edges"), is_warned, "{mesh}, {order}\n{says}");
     }
 }
 

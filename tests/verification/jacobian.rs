@@ -176,6 +176,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 obstacles: &mut ObstacleMotions::default(),
                 right_hand_side: &load,
                 floor: Floor::default(),
+                hiding_floor: Floor::default(),
                 scratch: &mut scratch,
                 linear_solver: &mut linear_solver,
                 session,

@@ -322,7 +322,7 @@ fn interference(session: &Session) {
             let text = format!(
                 "{}{}[[contact]]\non = [\"bottom\"]\n{law}{plane}",
                 body::<2>(false),
-                time(0.5, 2, "")
+                "[time]\nend = 1\nstep = 0.5\nscheme = \"implicit_euler\"\n"
             );
             let mut run = simulation::<2, 4>(session, &text, &crossed([4, 3]));
             while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}

@@ -125,6 +125,9 @@ pub struct Totals {
     pub peaks: Peaks,
     /// Largest contact pressure of any step, where friction weakens under a pressure that no law bounds.
     pub max_slip_pressure: Option<f64>,
+    /// Largest share of its coefficient of friction that a point lost in any step of `lagged_euler`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_friction_fall: Option<f64>,
     /// Largest equivalent strain rate after any step over the reference rate, or strain over the reference strain, where viscosity or
     /// elasticity is a formula.
     pub max_rate_share: Option<f64>,

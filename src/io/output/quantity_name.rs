@@ -44,7 +44,7 @@ impl<'a> TableQuantity<'a> {
 }
 
 /// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 28] = [
+const OF_SUMMARY: [&str; 29] = [
     "ranks",
     "dimension",
     "cells",
@@ -71,6 +71,7 @@ const OF_SUMMARY: [&str; 28] = [
     "max_energy_imbalance",
     "max_heat_imbalance",
     "max_slip_pressure",
+    "max_friction_fall",
     "max_rate_share",
     "peak_memory_bytes",
 ];

@@ -30,7 +30,7 @@ const MEMBERS: [(&str, &str, &str); 13] = [
 ];
 
 /// Those after the figures of fields.
-const MORE_MEMBERS: [(&str, &str, &str); 18] = [
+const MORE_MEMBERS: [(&str, &str, &str); 19] = [
     ("error_of_mesh", "estimated error of the stress at the end by the mesh, relative", ""),
     ("error_of_steps", "estimated error of stress and velocity at the end by the steps, relative", ""),
     ("max_inclusion_residual", "largest inclusion residual", ""),
@@ -38,6 +38,7 @@ const MORE_MEMBERS: [(&str, &str, &str); 18] = [
     ("max_energy_imbalance", "largest energy imbalance", ""),
     ("max_heat_imbalance", "largest imbalance of heat", ""),
     ("max_slip_pressure", "largest contact pressure with weakening friction", "Pa"),
+    ("max_friction_fall", "largest share of the coefficient of friction lost in a step", ""),
     ("max_rate_share", "largest strain or strain rate over the reference of its formula", ""),
     ("effects", "effects simulated", ""),
     ("scheme", "time scheme", ""),

@@ -16,6 +16,11 @@ pub struct Verdict {
     pub refusals: Vec<(String, String)>,
 }
 
+/// The share of the coefficient of friction that it may lose in a step of `lagged_euler`, and the share of the stability bound up to which
+/// steps are short enough for any.
+const LAGGING_FALL: f64 = 2e-3;
+const LAGGING_STEP: f64 = 0.02;
+
 impl Certificates {
     /// Evaluates the certificates for a fixed step of this length. `unique_step` is the largest step for which `theta_step` is
     /// below 1 by the margin, if it is known; `accepted` lists the limits that the job may exceed.
@@ -82,6 +87,21 @@ impl Certificates {
             }
         }
         verdict
+    }
+
+    /// A warning about friction that fell by this share of its coefficient in a step of `lagged_euler`, in steps up to this length in s: the
+    /// stress of such a step is that at its start, which drives what weakens too far. Measured with the job
+    /// `verification/fault_rupture`: at a share of 0.01 up to a third of the slip, with steps of a ninth of the bound.
+    pub fn lagging_friction(&self, fall: Option<f64>, longest: f64) -> Option<String> {
+        let fall = fall.filter(|fall| *fall > LAGGING_FALL)?;
+        let bound = self.explicit_step_bound.filter(|bound| longest > LAGGING_STEP * bound)?;
+        Some(format!(
+            "friction lost up to {} % of its coefficient in one step: lagged_euler takes the stress at the start of the step, so that slip \
+             which weakens friction goes too far, by tens of times this share, although steps are stable up to {} s; use [time] scheme = \
+             \"bdf2\" or \"implicit_euler\"",
+            Digits(100.0 * fall),
+            Digits(bound)
+        ))
     }
 
     /// In one line, whether steps of these lengths have one solution, where theta of a step is below 1.
@@ -330,5 +350,17 @@ mod tests {
         let all = [Accept::Uniqueness, Accept::ExplicitStability];
         let accepted = known.verdict(0.125, Some(0.05), &all);
         assert!(accepted.refusals.is_empty() && accepted.warnings.len() == 2);
+    }
+
+    #[test]
+    fn friction_that_falls_in_steps_of_the_size_of_the_bound_lags() {
+        let known = Certificates { explicit_step_bound: Some(0.02), ..paper() };
+        let says = known.lagging_friction(Some(0.037), 0.01).expect("a warning");
+        assert!(says.contains("3.7 %") && says.contains("0.02 s") && says.contains("bdf2"), "{says}");
+        assert_eq!(known.lagging_friction(Some(1e-3), 0.01), None);
+        assert_eq!(known.lagging_friction(Some(0.037), 1e-4), None);
+        assert_eq!(known.lagging_friction(None, 0.01), None);
+        let without = Certificates { explicit_step_bound: None, ..paper() };
+        assert_eq!(without.lagging_friction(Some(0.037), 0.01), None, "no stress lags");
     }
 }

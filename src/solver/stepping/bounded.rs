@@ -30,20 +30,20 @@ impl Bounded {
         Ok(Self { snes, settings: settings.clone(), lower, upper, residual })
     }
 
-    /// Solves for the velocity `trial`, starting from its values, and sets the pressures of the contacts; returns the iterations.
-    /// Collective.
+    /// Solves for the velocity `trial`, starting from its values, and sets the pressures of the contacts. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         trial: &mut DistributedVector,
-    ) -> Result<usize> {
+    ) -> Result<()> {
         let solved = self.solve_on_rank(&mut problem.body.contacts, system, trial);
         let outcome = problem.session.agree(solved)?;
+        problem.work.newton += outcome.iterations;
         if !outcome.converged() {
             return Err(problem.failed(outcome.description(), REMEDY));
         }
-        Ok(outcome.iterations)
+        Ok(())
     }
 
     fn solve_on_rank<const D: usize>(

@@ -128,6 +128,8 @@ const STAGNATION: f64 = 0.5;
 /// node by node, as that of a beam, they take as many iterations as there are nodes.
 const PROGRESS: f64 = 0.9;
 pub(super) const PATIENCE: usize = 50;
+/// The same where rounding errors hide that nothing holds a body yet.
+const HIDDEN_PATIENCE: usize = 5;
 
 /// Forces of the cells in addition to `K v`, at velocities without ghost values.
 pub trait CellForces {
@@ -161,6 +163,8 @@ pub struct ContactEquations<'a, const D: usize> {
     pub right_hand_side: &'a DistributedVector,
     /// Newton's method ends where the residual stagnates below this floor.
     pub floor: Floor,
+    /// See [`System::hiding_floor`](super::problem::System).
+    pub hiding_floor: Floor,
     /// Work vectors of the evaluation.
     pub scratch: &'a mut Scratch,
     /// Solves with the Jacobian; its constant matrix is `K`.
@@ -186,6 +190,8 @@ pub struct Scratch {
     residuals: [f64; 2],
     /// Whether the last residual stagnates below the floor.
     pub is_at_floor: bool,
+    /// Whether it is below the floor that hides what the equations lack.
+    is_hidden: bool,
     open: DistributedVector,
     /// The change of the velocities to equilibrium, where steps are solved in this way.
     correction: Option<DistributedVector>,
@@ -201,6 +207,7 @@ impl Scratch {
             velocity: like.like()?,
             residuals: [f64::NAN; 2],
             is_at_floor: false,
+            is_hidden: false,
             open: like.like()?,
             correction: None,
             ghosted: if ghosts { Some([like.like()?, like.like()?]) } else { None },
@@ -211,7 +218,7 @@ impl Scratch {
 impl Scratch {
     /// Forgets the residuals of the last equations.
     pub(super) fn restart(&mut self) {
-        (self.residuals, self.is_at_floor) = ([f64::NAN; 2], false);
+        (self.residuals, self.is_at_floor, self.is_hidden) = ([f64::NAN; 2], false, false);
     }
 
     /// Compares the first residual of similar equations at the same point with the last one: both may be rounding errors.
@@ -227,9 +234,7 @@ pub struct SolveCounts {
     pub residuals: usize,
     /// Norm in N of the first residual.
     pub first: f64,
-    /// Iterations of Newton's method.
-    pub newton_iterations: usize,
-    /// Krylov iterations.
+    /// Krylov iterations of the last search.
     pub linear_iterations: usize,
     /// Those of the last linear system.
     pub last_iterations: usize,
@@ -400,6 +405,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             self.scratch.residuals[0] = last;
             let speed = self.scratch.velocity.norm()? + self.obstacles.speed(self.contacts);
             self.scratch.is_at_floor = stagnates && self.floor.is_reached(last, speed);
+            self.scratch.is_hidden = self.hiding_floor.is_reached(last, speed);
             return Ok(());
         }
         let Scratch { velocity, open, correction, .. } = &mut *self.scratch;
@@ -427,7 +433,8 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         // Once the branches are those of the solution, few iterations remain, or rounding errors alone.
         let has_settled = self.counts.sets.last_chunk().is_some_and(|[one, other]| one == other);
         let after = if has_settled { 0 } else { self.counts.least.1 };
-        self.counts.sets.len() >= self.patience.saturating_add(after)
+        let patience = if self.scratch.is_hidden { HIDDEN_PATIENCE } else { self.patience };
+        self.counts.sets.len() >= patience.saturating_add(after)
     }
 
     fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
@@ -496,6 +503,10 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 }
 
+/// Linear equations count as solved by their own factor if this share of the right-hand side is left at most.
+const LARGEST_LINEAR_RESIDUAL: f64 = 0.01;
+const NEARLY_SINGULAR: &str = "the linear equations are nearly singular";
+
 impl<const D: usize> ContactEquations<'_, D> {
     /// Solves the linearised equations, which negative curvature ends early unless they are symmetric alone. Where all points slide, nothing resists
     /// the motion of a whole body along them, although at the solution some point sticks: such singular equations, on which iterations break
@@ -545,6 +556,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         }
         self.counts.coupled += usize::from(coupled);
         let kind = if coupled { ProjectedKind::Unsymmetric } else { kind };
+        let mut is_solved = true;
         let most = self.matrix.factor_pays_after();
         self.linear_solver.limit_iterations(most.unwrap_or(usize::MAX));
         let mut outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
@@ -556,10 +568,17 @@ impl<const D: usize> ContactEquations<'_, D> {
             let first = outcome.linear;
             outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
             outcome.linear = first.followed_by(outcome.linear);
+            // GMRES measures residuals behind the factor, which may hide those of equations that are nearly singular.
+            let mut left = open.like()?;
+            operator.apply(velocity, &mut left)?;
+            left.scale(-1.0)?;
+            left.add_scaled(1.0, open)?;
+            is_solved = left.norm()? <= LARGEST_LINEAR_RESIDUAL * open.norm()?;
         }
+        is_solved &= outcome.linear.converged();
         let is_on_springs = most.is_some()
             && may_be_singular
-            && !outcome.linear.converged()
+            && !is_solved
             && self.matrix.set_linearised(Rigid::OnSprings, &mut |map, column| operator.act(map, column))?;
         self.counts.singular += usize::from(is_on_springs);
         if is_on_springs {
@@ -570,11 +589,13 @@ impl<const D: usize> ContactEquations<'_, D> {
         self.counts.last_iterations = outcome.linear.iterations;
         self.counts.indefinite += usize::from(outcome.indefinite);
         self.counts.refreshed += usize::from(outcome.refreshed);
-        if !outcome.linear.converged() && !is_on_springs {
+        if !is_solved && !is_on_springs {
             if outcome.indefinite {
                 return Ok(Curvature::Negative);
             }
-            return Err(Error::Failed(outcome.linear.description().into()));
+            let reason =
+                if outcome.linear.converged() { NEARLY_SINGULAR } else { outcome.linear.description() };
+            return Err(Error::Failed(reason.into()));
         }
         direction.copy_from(velocity)?;
         if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction.is_some()) {

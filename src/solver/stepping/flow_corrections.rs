@@ -46,7 +46,7 @@ const LEAST_REDUCTION: f64 = 0.1;
 /// How corrections end, with their work.
 pub(super) enum Corrected {
     Solved(StepOutcome),
-    /// They are slow, or the contact failed; whether some were made from the start on.
+    /// They are slow, or the contact failed; whether they have come nearer to a solution.
     Unfinished(StepOutcome, bool),
 }
 
@@ -137,12 +137,9 @@ impl FlowCorrections {
             let tolerance = CONTACT_SHARE * system.tolerance;
             let of_contact = System { right_hand_side: &self.right_hand_side, tolerance, ..system };
             let reduced = solver.condense(of_contact, trial)?;
+            let before = problem.work.newton;
             match problem.session.agree(newton.solve(problem, reduced)) {
-                Ok(mut outcome) => {
-                    // A correction of the flow is an iteration, even if none of the contact is needed.
-                    outcome.newton_iterations = outcome.newton_iterations.max(1);
-                    sum = sum.followed_by(outcome);
-                }
+                Ok(outcome) => sum = sum.followed_by(outcome),
                 Err(failure) if failure.is_failure() => {
                     self.restart(problem, trial)?;
                     has_progressed = false;
@@ -150,6 +147,8 @@ impl FlowCorrections {
                 }
                 Err(error) => return Err(error.into()),
             }
+            // A correction of the flow is an iteration, even if the contact needs none.
+            problem.work.newton += usize::from(problem.work.newton == before);
             solver.expand(of_contact, trial)?;
             self.evaluate(problem, trial)?;
             self.subtract_stiffening(of_step, other, trial)?;

@@ -116,25 +116,13 @@ impl Newton {
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
-        equations: Reduced<'_>,
-    ) -> Result<StepOutcome> {
-        self.counts.restart();
-        let solved = self.try_fallbacks(problem, equations);
-        problem.work.newton += self.counts.newton_iterations;
-        problem.work.linear += self.counts.linear_iterations;
-        solved
-    }
-
-    /// The same, where work is not counted yet.
-    fn try_fallbacks<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
         mut equations: Reduced<'_>,
     ) -> Result<StepOutcome> {
+        self.counts.restart();
         let system = equations.system;
         if let Some(bounded) = &mut self.bounded {
             write_branches(problem.body, system.converged, &mut self.branches_before)?;
-            self.counts.newton_iterations = bounded.solve(problem, system, equations.velocity)?;
+            bounded.solve(problem, system, equations.velocity)?;
             let inclusion = self.inclusion_residual(problem, equations.velocity)?;
             return self.check_inclusion(problem, equations.velocity, inclusion);
         }
@@ -154,7 +142,11 @@ impl Newton {
             loop {
                 self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
                 match fallback.search {
-                    Search::Yielding => self.solve_yielding(problem, &mut equations)?,
+                    Search::Yielding => {
+                        let started = self.solve_yielding(problem, &mut equations);
+                        frictions(&mut problem.body.contacts).for_each(|friction| friction.give = 0.0);
+                        started?;
+                    }
                     Search::Falling => {
                         self.solve_falling(problem, &mut equations)?;
                         let contacts = &mut problem.body.contacts;
@@ -275,7 +267,7 @@ impl Newton {
             if failure.is_some() || (is_unchanged && round > 0) {
                 return Ok(failure);
             }
-            self.counts.newton_iterations += usize::from(is_unchanged);
+            problem.work.newton += usize::from(is_unchanged);
             self.scratch.go_on();
         }
         Ok(Some(format!(
@@ -348,7 +340,8 @@ impl Newton {
         }
         write_unknowns(&problem.body.contacts, equations.velocity)?;
         let solved = self.search(problem, equations, search, sharpness);
-        self.counts.newton_iterations += self.counts.sets.len();
+        problem.work.newton += self.counts.sets.len();
+        problem.work.linear += std::mem::take(&mut self.counts.linear_iterations);
         let mut failure = self.agree_on_failure(problem.session, solved)?;
         if search == Search::Equilibrated {
             equations.velocity.copy_from(&self.scratch.velocity)?;
@@ -419,6 +412,7 @@ impl Newton {
             obstacles: &mut self.obstacles,
             right_hand_side: system.right_hand_side,
             floor: if is_equilibrated { Floor::default() } else { system.floor },
+            hiding_floor: system.hiding_floor,
             scratch: &mut self.scratch,
             linear_solver: krylov,
             session: problem.session,

@@ -53,6 +53,8 @@ pub(super) struct System<'a> {
     pub tolerance: f64,
     /// The residual that rounding errors leave.
     pub floor: Floor,
+    /// The residual below which rounding errors may hide that nothing holds a body yet: equations are given up soon.
+    pub hiding_floor: Floor,
     /// Whether the step is tried from another start, too, if few fallbacks do not solve it.
     pub is_first_try: bool,
     /// The velocity of the converged state.

@@ -28,7 +28,12 @@ impl Newton {
             self.fix_bounds(problem, equations.system)?;
             frictions(&mut problem.body.contacts).for_each(|friction| friction.fix_speeds(true));
             self.scratch.restart();
-            let failure = self.attempt(problem, equations, Search::ShortDescent, 1.0)?;
+            let mut failure = self.attempt(problem, equations, Search::ShortDescent, 1.0)?;
+            // Full steps pass the kinks at which descents end.
+            if failure.is_some() {
+                self.scratch.restart();
+                failure = self.attempt(problem, equations, Search::FullSteps, 1.0)?;
+            }
             if failure.is_some() && round == 0 {
                 self.go_back(problem, equations)?;
             }

@@ -26,18 +26,8 @@ const YIELDING_TOLERANCE: f64 = 1e5;
 
 impl Newton {
     /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
-    /// none. Afterwards no point yields, whatever the outcome. Collective.
+    /// none. Points still yield afterwards. Collective.
     pub(super) fn solve_yielding<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-    ) -> Result<()> {
-        let solved = self.yield_less_and_less(problem, equations);
-        frictions(&mut problem.body.contacts).for_each(|friction| friction.give = 0.0);
-        solved
-    }
-
-    fn yield_less_and_less<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         equations: &mut Reduced<'_>,
@@ -98,7 +88,7 @@ impl Newton {
         self.go_to_reached(problem, equations)?;
         self.fix_bounds(problem, equations.system)?;
         self.go_to_reached(problem, equations)?;
-        self.solve_with_bounds(problem, equations, fallback)
+        self.attempt(problem, equations, fallback.search, 1.0)
     }
 
     /// Evaluates the contacts at the velocity from which they are solved. Collective.

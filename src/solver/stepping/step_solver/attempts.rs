@@ -37,6 +37,9 @@ const LARGEST_FLOOR: f64 = 1e-4;
 /// The largest residual at which Newton's method stagnates by rounding errors, as a multiple of those of `K v`.
 const STAGNANT: f64 = 4.0;
 
+/// Rounding errors may hide that nothing holds a body in residuals below this multiple of them.
+const HIDING: f64 = 10.0;
+
 /// Number of factors with derivatives at velocities of a step after which Newton's method solves it.
 const MOST_FACTORS: usize = 15;
 
@@ -437,10 +440,16 @@ impl Accuracy {
         scales: &'a [[f64; 2]],
     ) -> System<'a> {
         let Self { tolerance, floor, awaits_pressure, is_first_try, .. } = self;
-        let floor = if awaits_pressure { Floor::default() } else { floor };
+        let [floor, hiding_floor] =
+            if awaits_pressure { [Floor::default(), hiding(floor)] } else { [floor, Floor::default()] };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
-        System { matrix, right_hand_side, tolerance, floor, is_first_try, converged, scales }
+        System { matrix, right_hand_side, tolerance, floor, hiding_floor, is_first_try, converged, scales }
     }
+}
+
+/// The residual below which these rounding errors may hide that nothing holds a body.
+fn hiding(Floor { slope, largest }: Floor) -> Floor {
+    Floor { slope: HIDING * slope, largest: HIDING * largest }
 }
 
 /// Keeps a copy of a vector.
