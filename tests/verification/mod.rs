@@ -18,6 +18,7 @@ mod damping;
 mod effects;
 mod energy;
 mod fast_flow;
+mod flow_matrices;
 mod flowing_contact;
 mod free_bodies;
 mod half_models;

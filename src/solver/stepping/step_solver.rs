@@ -296,23 +296,27 @@ impl StepSolver {
         problem: &mut StepProblem<'_, D, S>,
         velocity: &DistributedVector,
     ) -> Result<bool> {
-        let (Some(flowing), Some(mut prepared)) = (&mut self.flowing, self.active.take()) else {
+        let (Some(flowing), Some(Lengths { matrix: length, .. })) = (&mut self.flowing, self.prepared) else {
             return Err(unassembled());
         };
         let began = Instant::now();
         let tangents = flowing.tangents(problem, velocity)?;
         let (session, body, like) = (problem.session, &*problem.body, problem.forces);
-        let Some(Lengths { matrix: length, .. }) = self.prepared else { return Err(unassembled()) };
         let rows = body.matrix_with(session, length, &tangents)?;
         let matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        let rows = self.springs.add(session, body, (rows, length))?;
+        let mut prepared = self.active.take().ok_or_else(unassembled)?;
         let of_step = std::mem::replace(&mut prepared.matrix, matrix);
         self.step_matrix.get_or_insert(of_step);
         prepared.has_tangents = true;
-        let rows = self.springs.add(session, body, (rows, length))?;
-        let is_factored = self.complete(session, body, &mut prepared, rows, like);
+        let is_factored = session.agree(self.complete(session, body, &mut prepared, rows, like));
         self.active = Some(prepared);
         self.refactoring += began.elapsed();
-        is_factored
+        match is_factored {
+            // Where the flow softens, its derivatives may make the matrix indefinite.
+            Err(error) if error.is_failure() => Ok(false),
+            is_factored => Ok(is_factored?),
+        }
     }
 
     /// Replaces the factor by one without derivatives, in the precision of the next factors. Collective.

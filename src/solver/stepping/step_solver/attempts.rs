@@ -303,12 +303,7 @@ impl StepSolver {
                     return Ok(earlier.followed_by(work).followed_by(outcome));
                 }
             }
-            let is_factored = match session.agree(self.refactor_with_tangents(problem, trial)) {
-                // Where the flow softens, its derivatives may make the matrix indefinite.
-                Err(error) if error.is_failure() => false,
-                is_factored => is_factored?,
-            };
-            if !is_factored {
+            if !session.agree(self.refactor_with_tangents(problem, trial))? {
                 session.agree(self.refactor(problem))?;
                 factors = MOST_FACTORS;
             }
