@@ -16,8 +16,6 @@ pub(super) struct Prepared {
     /// Length in s of the steps to which the matrix belongs.
     pub length: f64,
     pub matrix: Matrix,
-    /// Whether the matrix contains derivatives of what cells add to the stress, so that it is not that of any step.
-    pub has_tangents: bool,
     pub solver: Box<dyn LinearSolver>,
     /// The parameters of each contact's graphs.
     pub scales: Vec<[f64; 2]>,
@@ -39,11 +37,6 @@ impl FactorCache {
     pub(super) fn insert(&mut self, prepared: Prepared) -> Option<Prepared> {
         self.entries.push(prepared);
         (self.entries.len() > self.capacity).then(|| self.entries.remove(0))
-    }
-
-    /// Removes entries with derivatives at velocities of earlier steps.
-    pub(super) fn forget_tangents(&mut self) {
-        self.entries.retain(|prepared| !prepared.has_tangents);
     }
 
     /// Removes and returns the entry of this length.

@@ -38,6 +38,8 @@ use std::cell::RefCell;
 const SLOW: f64 = 0.2;
 /// The same with derivatives of the flow in the factor, in 2D and 3D: new ones cost as much as a few corrections, and as more of them in 3D.
 const SLOW_WITH_TANGENTS: [f64; 2] = [0.1, 0.3];
+/// Fallbacks of Newton's method for the contact in a correction: where a plastic body hardly resists, others are in vain.
+const MOST_FALLBACKS: usize = 4;
 /// A correction is shortened until this share of the power along it is left, at most so often, each time by at least this share of the range.
 const LEFT_POWER: f64 = 0.5;
 const MOST_SHORTER: usize = 8;
@@ -135,7 +137,10 @@ impl FlowCorrections {
             self.right_hand_side.copy_from(system.right_hand_side)?;
             self.right_hand_side.add_scaled(-1.0, &self.given)?;
             let tolerance = CONTACT_SHARE * system.tolerance;
-            let of_contact = System { right_hand_side: &self.right_hand_side, tolerance, ..system };
+            let fallbacks =
+                if has_tangents { system.fallbacks.min(MOST_FALLBACKS) } else { system.fallbacks };
+            let of_contact =
+                System { right_hand_side: &self.right_hand_side, tolerance, fallbacks, ..system };
             let reduced = solver.condense(of_contact, trial)?;
             let before = problem.work.newton;
             match problem.session.agree(newton.solve(problem, reduced)) {

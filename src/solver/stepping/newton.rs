@@ -79,9 +79,6 @@ const PATIENCE_OF_FLOW: usize = 10;
 
 const NO_MINIMUM: &str = "no minimum of the energy was found";
 
-/// Fallbacks that are tried before a body that contact alone holds starts from elsewhere: without any pressure, the equations are singular.
-const FIRST_FALLBACKS: usize = 2;
-
 impl Newton {
     /// Newton's method for unknowns with the layout of `like`.
     pub(super) fn new<const D: usize>(
@@ -134,9 +131,8 @@ impl Newton {
         }
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let mut failure = String::new();
-        let most = if system.is_first_try { FIRST_FALLBACKS } else { usize::MAX };
         let is_yielding = |fallback: &Fallback| fallback.search == Search::Yielding;
-        let mut rest = conditions.fallbacks().take(most);
+        let mut rest = conditions.fallbacks().take(system.fallbacks);
         let (mut next, mut has_yielded) = (rest.next(), false);
         while let Some(fallback) = next {
             loop {

@@ -55,8 +55,8 @@ pub(super) struct System<'a> {
     pub floor: Floor,
     /// The residual below which rounding errors may hide that nothing holds a body yet: equations are given up soon.
     pub hiding_floor: Floor,
-    /// Whether the step is tried from another start, too, if few fallbacks do not solve it.
-    pub is_first_try: bool,
+    /// The number of fallbacks that are tried.
+    pub fallbacks: usize,
     /// The velocity of the converged state.
     pub converged: &'a DistributedVector,
     /// The parameters of each contact's graphs, along the normal and of friction: equal to the resistance of the body to motions of

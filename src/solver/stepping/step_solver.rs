@@ -50,6 +50,8 @@ pub(super) struct StepSolver {
     precision: Precision,
     /// The matrix to which the preconditioner in use belongs.
     active: Option<Prepared>,
+    /// A matrix with derivatives of what cells add to the stress at a velocity, where a step needed one.
+    with_tangents: Option<Prepared>,
     /// The matrix of the step, if its length is not that of the preconditioner.
     step_matrix: Option<Matrix>,
     /// The lengths for which matrix and preconditioner are prepared.
@@ -97,6 +99,7 @@ impl StepSolver {
             flowing,
             precision: problem.factor_precision(),
             active: None,
+            with_tangents: None,
             step_matrix: None,
             prepared: None,
             matrix_norm: 0.0,
@@ -131,10 +134,7 @@ impl StepSolver {
 
     /// Forgets factors with derivatives at velocities of earlier steps, so that the next step is solved as after a restart.
     pub(super) fn forget_tangents(&mut self) {
-        if self.active.as_ref().is_some_and(|active| active.has_tangents) {
-            (self.active, self.step_matrix, self.prepared) = (None, None, None);
-        }
-        self.cache.iter_mut().for_each(FactorCache::forget_tangents);
+        self.with_tangents = None;
     }
 
     /// The time spent within steps on their matrices and factors since it was last taken.
@@ -164,6 +164,7 @@ impl StepSolver {
         let mut is_new = false;
         if self.active.as_ref().is_none_or(|active| active.length != length) {
             let cached = self.cache.as_mut().and_then(|cache| cache.remove(length));
+            self.with_tangents = None;
             self.store_active::<D>(session, body.mesh.total_nodes * D)?;
             is_new = cached.is_none();
             self.active = match cached {
@@ -171,7 +172,7 @@ impl StepSolver {
                 cached => cached,
             };
         }
-        if lengths.matrix != length || self.active.as_ref().is_some_and(|active| active.has_tangents) {
+        if lengths.matrix != length {
             let rows = matrix_rows(session, body, lengths.matrix)?;
             self.step_matrix = Some(session.agree(Matrix::symmetric(D, &rows))?);
         }
@@ -213,7 +214,7 @@ impl StepSolver {
         let matrix = session.agree(Matrix::symmetric(D, &rows))?;
         let rows = self.springs.add(session, body, (rows, length))?;
         let solver = self.kind.another(like)?;
-        let mut prepared = Prepared { length, matrix, has_tangents: false, solver, scales: Vec::new() };
+        let mut prepared = Prepared { length, matrix, solver, scales: Vec::new() };
         if !self.complete(session, body, &mut prepared, rows, like)? {
             self.kind = Box::new(Whole::new(session, body, like, &self.settings)?);
             (self.newton, self.flowing) = nonlinear(session, body, &*self.kind, like, &self.settings)?;
@@ -289,8 +290,7 @@ impl StepSolver {
         self.active.as_mut().ok_or_else(unassembled)?.solver.solve(r, z)
     }
 
-    /// Replaces the factor by one of the matrix with the derivatives of what cells add to the stress at this velocity; returns whether there
-    /// is one. Collective.
+    /// Factors the matrix with the derivatives of what cells add to the stress at this velocity; returns whether it has a factor. Collective.
     fn refactor_with_tangents<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -305,30 +305,26 @@ impl StepSolver {
         let rows = body.matrix_with(session, length, &tangents)?;
         let matrix = session.agree(Matrix::symmetric(D, &rows))?;
         let rows = self.springs.add(session, body, (rows, length))?;
-        let mut prepared = self.active.take().ok_or_else(unassembled)?;
-        let of_step = std::mem::replace(&mut prepared.matrix, matrix);
-        self.step_matrix.get_or_insert(of_step);
-        prepared.has_tangents = true;
-        let is_factored = session.agree(self.complete(session, body, &mut prepared, rows, like));
-        self.active = Some(prepared);
-        self.refactoring += began.elapsed();
-        match is_factored {
+        let solver = match self.with_tangents.take() {
+            Some(last) => last.solver,
+            None => self.kind.another(like)?,
+        };
+        let mut prepared = Prepared { length, matrix, solver, scales: Vec::new() };
+        let is_factored = match session.agree(self.complete(session, body, &mut prepared, rows, like)) {
             // Where the flow softens, its derivatives may make the matrix indefinite.
-            Err(error) if error.is_failure() => Ok(false),
-            is_factored => Ok(is_factored?),
-        }
+            Err(error) if error.is_failure() => false,
+            is_factored => is_factored?,
+        };
+        self.with_tangents = is_factored.then_some(prepared);
+        self.refactoring += began.elapsed();
+        Ok(is_factored)
     }
 
-    /// Replaces the factor by one without derivatives, in the precision of the next factors. Collective.
+    /// Factors the matrix again, in the precision of the next factors. Collective.
     fn refactor<const D: usize, const S: usize>(&mut self, problem: &StepProblem<'_, D, S>) -> Result<()> {
         let Some(mut prepared) = self.active.take() else { return Err(unassembled()) };
         let (session, body, like) = (problem.session, &*problem.body, problem.forces);
         let rows = matrix_rows(session, body, prepared.length)?;
-        if std::mem::take(&mut prepared.has_tangents) {
-            prepared.matrix = session.agree(Matrix::symmetric(D, &rows))?;
-            let is_of_step = self.prepared.is_some_and(|lengths| lengths.matrix == prepared.length);
-            self.step_matrix = self.step_matrix.take().filter(|_| !is_of_step);
-        }
         let rows = self.springs.add(session, body, (rows, prepared.length))?;
         self.complete(session, body, &mut prepared, rows, like)?;
         self.active = Some(prepared);

@@ -40,6 +40,8 @@ const STAGNANT: f64 = 4.0;
 /// Rounding errors may hide that nothing holds a body in residuals below this multiple of them.
 const HIDING: f64 = 10.0;
 
+/// Fallbacks of Newton's method that are tried before a body that contact alone holds starts from elsewhere.
+const FIRST_FALLBACKS: usize = 2;
 /// Number of factors with derivatives at velocities of a step after which Newton's method solves it.
 const MOST_FACTORS: usize = 15;
 
@@ -90,8 +92,8 @@ struct Accuracy {
     /// Whether that holds only after something is pressed on: where contact alone holds a body, a direction may be any rigid motion, whose
     /// rounding errors hide that nothing holds it.
     awaits_pressure: bool,
-    /// Whether few fallbacks of Newton's method are tried, because others start from elsewhere.
-    is_first_try: bool,
+    /// The number of fallbacks of Newton's method that are tried.
+    fallbacks: usize,
     /// The forces to which its residual is compared: not below those of which rounding errors are the tolerance.
     reference: f64,
 }
@@ -176,7 +178,7 @@ impl StepSolver {
                     return Ok(false);
                 }
                 self.start_from_springs(problem, trial)?;
-                (accuracy.awaits_pressure, accuracy.is_first_try) = (false, false);
+                (accuracy.awaits_pressure, accuracy.fallbacks) = (false, usize::MAX);
                 Ok(true)
             }
             Change::OnContacts => Ok(self.springs.are_needed() && self.start_on_contacts(problem, trial)?),
@@ -269,6 +271,10 @@ impl StepSolver {
         accuracy: Accuracy,
     ) -> Result<StepOutcome> {
         let session = problem.session;
+        if problem.body.flows_beside_viscosity() {
+            // Those of the last step help no more than those without, and a rejected step leaves no trace.
+            self.forget_tangents();
+        }
         self.flowing.iter_mut().for_each(|flowing| flowing.begin());
         let (mut factors, mut earlier) = (0, StepOutcome::default());
         loop {
@@ -304,7 +310,6 @@ impl StepSolver {
                 }
             }
             if !session.agree(self.refactor_with_tangents(problem, trial))? {
-                session.agree(self.refactor(problem))?;
                 factors = MOST_FACTORS;
             }
         }
@@ -332,19 +337,22 @@ impl StepSolver {
     }
 
     fn parts(&mut self) -> Result<Parts<'_>> {
-        let Self { active, step_matrix, newton, flowing, products, .. } = self;
-        let Prepared { matrix, has_tangents, solver, scales, .. } =
-            active.as_mut().ok_or_else(unassembled)?;
+        let Self { active, with_tangents, step_matrix, newton, flowing, products, .. } = self;
+        let Prepared { matrix, solver, scales, .. } = active.as_mut().ok_or_else(unassembled)?;
+        let of_step = CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products };
+        let (factored, solver, scales) = match (with_tangents, &*step_matrix) {
+            (Some(Prepared { matrix, solver, scales, .. }), _) => {
+                (FactorOf::Tangents(CountedMatrix { matrix, products }), solver, scales)
+            }
+            (None, Some(_)) => (FactorOf::AnotherLength, solver, scales),
+            (None, None) => (FactorOf::Step, solver, scales),
+        };
         Ok(Parts {
             newton: newton.as_deref_mut(),
             flowing: flowing.as_deref_mut(),
             solver: &mut **solver,
-            matrix: CountedMatrix { matrix: step_matrix.as_ref().unwrap_or(matrix), products },
-            factored: match step_matrix {
-                _ if *has_tangents => FactorOf::Tangents(CountedMatrix { matrix, products }),
-                Some(_) => FactorOf::AnotherLength,
-                None => FactorOf::Step,
-            },
+            matrix: of_step,
+            factored,
             scales,
         })
     }
@@ -406,7 +414,8 @@ impl StepSolver {
             size: all,
             floor,
             awaits_pressure: is_held_by_contact,
-            is_first_try: is_held_by_contact,
+            // Others start from elsewhere: without any pressure, the equations are singular.
+            fallbacks: if is_held_by_contact { FIRST_FALLBACKS } else { usize::MAX },
             reference,
         })
     }
@@ -434,11 +443,11 @@ impl Accuracy {
         matrix: &'a dyn StepMatrix,
         scales: &'a [[f64; 2]],
     ) -> System<'a> {
-        let Self { tolerance, floor, awaits_pressure, is_first_try, .. } = self;
+        let Self { tolerance, floor, awaits_pressure, fallbacks, .. } = self;
         let [floor, hiding_floor] =
             if awaits_pressure { [Floor::default(), hiding(floor)] } else { [floor, Floor::default()] };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
-        System { matrix, right_hand_side, tolerance, floor, hiding_floor, is_first_try, converged, scales }
+        System { matrix, right_hand_side, tolerance, floor, hiding_floor, fallbacks, converged, scales }
     }
 }
 
