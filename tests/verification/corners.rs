@@ -57,6 +57,7 @@ fn squares(session: &Session) {
     let plane = "plane = { point = [0, -0.01], normal = [0, 1] }";
     let both = "[\"bottom\", \"left\"]";
     let disc = "sphere = { centre = [0, -0.51], radius = 0.5 }";
+    let shell = "sphere = { centre = [0, 1.99], radius = 2, hollow = true }";
     let box_ = "shape = { distance = \"max(abs(x) - 0.3, abs(y + 0.11) - 0.1)\" }";
     for (degrees, on, obstacle) in [
         (45.0, both, plane),
@@ -64,6 +65,7 @@ fn squares(session: &Session) {
         (10.0, "[\"left\"]", plane),
         (5.0, "[\"bottom\"]", plane),
         (45.0, "[\"bottom\"]", disc),
+        (45.0, both, shell),
         (30.0, both, box_),
     ] {
         let mut mesh = rectangle([0.1, 0.1], [2, 2], Diagonal::Right, [1.0; 2]).expect("mesh");

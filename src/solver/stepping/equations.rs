@@ -163,7 +163,7 @@ pub struct ContactEquations<'a, const D: usize> {
     pub right_hand_side: &'a DistributedVector,
     /// Newton's method ends where the residual stagnates below this floor.
     pub floor: Floor,
-    /// See [`System::hiding_floor`](super::problem::System).
+    /// The residual below which rounding errors may hide that nothing holds a body yet: equations are given up soon.
     pub hiding_floor: Floor,
     /// Work vectors of the evaluation.
     pub scratch: &'a mut Scratch,
@@ -508,9 +508,9 @@ const LARGEST_LINEAR_RESIDUAL: f64 = 0.01;
 const NEARLY_SINGULAR: &str = "the linear equations are nearly singular";
 
 impl<const D: usize> ContactEquations<'_, D> {
-    /// Solves the linearised equations, which negative curvature ends early unless they are symmetric alone. Where all points slide, nothing resists
-    /// the motion of a whole body along them, although at the solution some point sticks: such singular equations, on which iterations break
-    /// down, are solved as if soft springs held the body as well.
+    /// Solves the linearised equations, which negative curvature ends early unless they are symmetric alone. Where all points slide, nothing
+    /// resists the motion of a whole body along them, although at the solution some point sticks: such singular equations, on which
+    /// iterations break down, are solved as if soft springs held the body as well.
     fn solve_linearised(
         &mut self,
         residual: &DistributedVector,

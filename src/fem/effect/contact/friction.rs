@@ -42,7 +42,7 @@ pub struct Friction<const D: usize> {
     pub(super) context: SlidingContext,
     /// `c` in the parameter `s = c v + q`, in Pa s/m.
     pub scale: f64,
-    /// Velocity per traction in m/(Pa s) that is added to the sliding velocity of the law, see [`TangentialPoint::resolve`]; 0 in solutions.
+    /// Velocity per traction in m/(Pa s) that is added to the sliding velocity of the law, see `TangentialPoint::resolve`; 0 in solutions.
     pub give: f64,
     /// Whether the bound depends on the pressure while a step is solved.
     pub(super) follows: bool,

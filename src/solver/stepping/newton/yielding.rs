@@ -68,8 +68,8 @@ impl Newton {
     }
 
     /// Goes on by full steps from a solution that followed points which yield: their energies are flat near it, so that descents end within
-    /// the tolerance but far from the accuracy of Newton's method. Goes back to that solution where full steps find none; returns the reason for failure, if that is none
-    /// any more. Collective.
+    /// the tolerance but far from the accuracy of Newton's method. Goes back to that solution where full steps find none; returns the
+    /// reason for failure, if that is none any more. Collective.
     pub(super) fn sharpen<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
