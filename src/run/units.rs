@@ -209,9 +209,11 @@ impl BodySize {
         let longest = self.extent.iter().fold(0.0, |a: f64, b| a.max(*b));
         let is_in_pascal = self.youngs_modulus > STIFFEST_IN_MEGAPASCAL;
         let is_metal = (METALS[0]..METALS[1]).contains(&self.density);
-        if let Some(speed) = self.wave_speed.filter(|speed| is_in_pascal && *speed > FASTEST) {
+        // Along a bar: compression waves are as fast as can be where the material is nearly incompressible.
+        let along_bar = self.wave_speed.map(|_| (self.youngs_modulus / self.density).sqrt());
+        if let Some(speed) = along_bar.filter(|speed| is_in_pascal && *speed > FASTEST) {
             warn(format!(
-                "has compression waves of {} m/s, but no solid has waves faster than {FASTEST} m/s: with Young's modulus in Pa the density \
+                "has waves of {} m/s along a bar, but no solid has waves faster than {FASTEST} m/s: with Young's modulus in Pa the density \
                  is in kg/m^3, with the density in t/mm^3 Young's modulus is in MPa and lengths in mm",
                 Digits(rounded(speed))
             ));
@@ -304,6 +306,8 @@ mod tests {
         assert_eq!(in_millimetres().warnings(1, 0.001), Vec::<String>::new());
         let rock = BodySize { extent: vec![1e5; 3], density: 2700.0, youngs_modulus: 5e10, ..bar() };
         assert_eq!(rock.warnings(1, 0.001), Vec::<String>::new(), "a block of the Earth");
+        let rubber = BodySize { density: 1000.0, youngs_modulus: 1e7, wave_speed: Some(1.29e5), ..bar() };
+        assert_eq!(rubber.warnings(1, 0.001), Vec::<String>::new(), "nearly incompressible");
     }
 
     #[test]

@@ -34,7 +34,7 @@ const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
     (ProbedQuantity::Acceleration, &[Source::Acceleration]),
     (
         ProbedQuantity::EquivalentViscoplasticStrain,
-        &[Source::OfCells("equivalent_viscoplastic_strain", "viscoplastic flow")],
+        &[Source::OfCells("equivalent_viscoplastic_strain", "viscoplastic flow with hardening")],
     ),
     (ProbedQuantity::Damage, &[Source::OfCells("damage", "[material.damage]")]),
     (ProbedQuantity::ContactPressure, &[Source::Field(Position::CONTACT_PRESSURE)]),
