@@ -66,7 +66,8 @@ fn stress_that_relaxes_at_once_stays_on_the_yield_surface() {
         assert!(results.table("history.csv").last("viscoplastic_dissipation") > 0.0, "{hypothesis}");
         assert!(results.number("max_energy_imbalance") < 1e-10);
         let iterations = results.number("newton_iterations");
-        assert!(iterations < 12.0 * 16.0, "{hypothesis}: {iterations} Newton iterations");
+        // Among them the corrections before Newton's method for the whole body, three in a step.
+        assert!(iterations < 14.0 * 16.0, "{hypothesis}: {iterations} Newton iterations");
     }
 }
 
