@@ -48,8 +48,9 @@ fn read(file: &Path, world: &SimpleCommunicator) -> Result<()> {
     let _ = header.map(|header| header.step);
     for (set, total, width) in [("nodes", 4, 2), ("cells", 2, 3)] {
         let wanted: Vec<u64> = (0..total).collect();
+        let rows = checkpoint.rows(set, total, &wanted)?;
         for name in checkpoint.tables(set)? {
-            checkpoint.read(set, total, &[(&name, width)], &wanted)?;
+            rows.read(&name, width)?;
         }
     }
     Ok(())
