@@ -41,7 +41,7 @@ def sweep(
     `vary` has a list of values for each key, as in `{"contact.0.friction.coulomb.coefficient": [0.1, 0.2]}`, or random values,
     `{"from": 0.1, "to": 0.4, "draws": 8}`. `responses` are quantities as in `[check]` of a job, also means, amplitudes and periods; with
     a window of time in s: `{"of": .., "from": 1.0}`. As many runs execute side by side as there are `ranks`, or these over `ranks_of_run`.
-    Finished runs in the folder are reused. Runs that fail are listed in `failed`, and do not raise.
+    Finished runs in the folder are reused. Runs that fail are listed in `failed`, and do not raise; those that warn in `warnings`.
     """
     target = Path(folder).absolute()
     if not vary or not responses:
@@ -111,7 +111,8 @@ class Sweep:
 
     @property
     def columns(self) -> tables.Table:
-        """A row for each run: its name, the values of the keys, `status`, and the responses; `nan` where a run failed."""
+        """A row for each run: its name, the values of the keys, `status`, the number of `warnings`, and the responses, `nan` where a run
+        failed."""
         header, rows = tables.records(self.folder / RESPONSES)
         columns: dict[str, list[Any]] = {}
         for at, name in enumerate(header):
@@ -137,6 +138,11 @@ class Sweep:
     def failed(self) -> dict[str, str]:
         """The runs that failed or were refused, with the reason."""
         return {run["name"]: str(run["error"]) for run in self.study["runs"] if run["status"] != "completed"}
+
+    @property
+    def warnings(self) -> dict[str, list[str]]:
+        """The warnings of the runs that have any; `columns` has their numbers."""
+        return {run["name"]: run["warnings"] for run in self.study["runs"] if run["warnings"]}
 
     def run(self, name: str) -> Results:
         """The results of a run by its name in the table."""

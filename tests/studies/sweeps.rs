@@ -40,9 +40,9 @@ fn members_of_a_sweep_give_the_results_of_runs_alone_and_a_failed_one_does_not_s
     let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
     let csv = read("responses.csv");
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
-    assert_eq!(rows[0][..4], ["run", "time.step", "status", "max_von_mises"]);
-    assert_eq!(rows[1], ["step-0.25", "0.25", "failed", "", "", ""]);
-    assert_eq!(rows[3][3].parse(), Ok(number(&results, "/runs/2/response/0")));
+    assert_eq!(rows[0][..5], ["run", "time.step", "status", "warnings", "max_von_mises"]);
+    assert_eq!(rows[1], ["step-0.25", "0.25", "failed", "0", "", "", ""]);
+    assert_eq!(rows[3][4].parse(), Ok(number(&results, "/runs/2/response/0")));
     assert_eq!(rows.len(), 4);
     let text = read("study.md");
     assert!(text.contains("| step-0.25 | 0.25 | failed | failed | failed |"), "{text}");
@@ -223,4 +223,35 @@ probe = [{ name = "middle", point = [0.5, 0.5] }]
         scene.path("out/study/response-probe-middle-period-displacement_x--from-0-1-s-.svg"),
     );
     assert!(chart.expect("a chart").contains("displacement_x (from 0.1 s) / s"));
+}
+
+#[test]
+fn warnings_of_runs_are_counted_and_their_first_words_said() {
+    // After a tenth of the time the strain is small; after all of it the theory of small strains does not hold.
+    let study =
+        "set = [\"time.step=0.1\"]\n[sweep]\n\"time.end\" = [0.1, 1.0]\n[[response]]\nof = \"max_strain\"\n";
+    let scene = Scene::new(super::scene::SQUARE, study);
+    let said = |outcome: crate::launch::Outcome| {
+        let text = outcome.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains("s, 1 warning: the strain reached "), "{text}");
+        assert!(text.contains("end-1.0: 1 warning: the strain reached "), "{text}");
+        assert_eq!(text.matches("warning").count(), 3, "the table has a column: {text}");
+    };
+    said(scene.study(1, &[]).expect(0));
+    let results = scene.results();
+    assert_eq!(results["runs"][0]["warnings"], serde_json::json!([]));
+    let warning = results["runs"][1]["warnings"][0].as_str().expect("a text");
+    let out = scene.path("out/study");
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+    let summary: Value = serde_json::from_str(&read("runs/end-1.0/summary.json")).expect("JSON");
+    assert_eq!(summary["warnings"], serde_json::json!([warning]));
+    let csv = read("responses.csv");
+    let row = |at: usize| csv.lines().nth(at).expect("a row").split(',').collect::<Vec<_>>();
+    assert_eq!(row(0)[2..4], ["status", "warnings"]);
+    assert_eq!([row(1)[3], row(2)[3]], ["0", "1"]);
+    assert!(read("study.md").contains("end-1.0: 1 warning: the strain reached "));
+    assert!(read("study.csv").lines().nth(2).is_some_and(|row| row.contains(",completed,1,")));
+    // Those of runs that are used again are not forgotten.
+    let again = scene.study(1, &[]).expect(0);
+    assert!(again.stdout.contains("already finished, 1 warning: "), "{}", again.stdout);
 }

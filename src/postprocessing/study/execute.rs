@@ -2,7 +2,7 @@
 
 use super::{
     plan::Planned,
-    record::{Ran, Record, digest},
+    record::{Ran, Record, counted, digest},
 };
 use crate::{
     error::{Exit, Result},
@@ -82,8 +82,12 @@ pub(super) fn announced(
     let line = |words: &str| format!("run {count:<9} {:<40} {words}", planned.name);
     match &record.error {
         Some(error) => speaker.complain(&line(&format!("failed: {error}"))),
-        None if found => speaker.say(&line("already finished")),
-        None => speaker.say(&line(&format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()))),
+        None => {
+            let seconds = || record.seconds.iter().map(|s| s.total).sum::<f64>();
+            let ended = if found { "already finished".into() } else { format!("{:.2} s", seconds()) };
+            let warned = counted(&record.warnings).map(|words| format!(", {words}"));
+            speaker.say(&line(&(ended + &warned.unwrap_or_default())));
+        }
     }
     Ok(Some(Ran { record: *record, found }))
 }

@@ -18,6 +18,9 @@ const RESULTS: [&str; 6] =
 /// Name of the file in the folder of the run.
 const FILE: &str = "run.json";
 
+/// Words of the first warning of a run that a study repeats.
+const FIRST_WORDS: usize = 12;
+
 /// A run, finished or failed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Record {
@@ -36,6 +39,8 @@ pub(super) struct Record {
     pub counts: Counts,
     /// Effects that were simulated.
     pub effects: Vec<String>,
+    /// Warnings of the last repetition.
+    pub warnings: Vec<String>,
     /// Wall seconds of each repetition.
     pub seconds: Vec<Seconds>,
     /// Digests of the files from which errors and responses are computed.
@@ -107,6 +112,7 @@ impl Record {
             cells: 0,
             counts: Counts::default(),
             effects: Vec::new(),
+            warnings: Vec::new(),
             seconds: Vec::new(),
             files: BTreeMap::new(),
         }
@@ -128,8 +134,11 @@ impl Record {
         self.dimension = count("dimension") as usize;
         self.cells = count("cells");
         self.counts = Counts::deserialize(&summary).map_err(|error| Error::unreadable(&path, error))?;
-        let names = summary["effects"].as_array().into_iter().flatten();
-        self.effects = names.filter_map(|name| name.as_str().map(str::to_owned)).collect();
+        let texts = |key: &str| {
+            let all = summary[key].as_array().into_iter().flatten();
+            all.filter_map(|text| text.as_str().map(str::to_owned)).collect()
+        };
+        (self.effects, self.warnings) = (texts("effects"), texts("warnings"));
         let total = seconds("total");
         self.seconds.push(Seconds { total, computing: total - seconds("output"), solve: seconds("solve") });
         Ok(())
@@ -191,6 +200,15 @@ impl Record {
         let read = serde_json::from_slice(&bytes);
         read.map(Some).map_err(|error| Error::Internal(format!("a run's record can't be shared: {error}")))
     }
+}
+
+/// The number of warnings, if there are any, and the first words of the first one.
+pub(super) fn counted(warnings: &[String]) -> Option<String> {
+    let words: Vec<&str> = warnings.first()?.split_whitespace().collect();
+    let more = if words.len() > FIRST_WORDS { " .." } else { "" };
+    let words = words[..words.len().min(FIRST_WORDS)].join(" ");
+    let count = warnings.len();
+    Some(format!("{count} warning{}: {words}{more}", if count == 1 { "" } else { "s" }))
 }
 
 /// Digest of all data that determine a run; of the number of ranks only if the run is not one of several side by side.

@@ -75,6 +75,8 @@ pub struct RunResult {
     pub status: String,
     /// The reason why it failed or could not be compared.
     pub error: Option<String>,
+    /// Its warnings, as in its `summary.json`.
+    pub warnings: Vec<String>,
     /// What the reader should know about its errors.
     pub notes: Vec<String>,
     /// Whether an earlier study had finished it.

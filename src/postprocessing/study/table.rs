@@ -2,6 +2,7 @@
 
 use super::{
     document::{Norm, Over, ProbeError, Quantity, Space, Study},
+    record::counted,
     results::{ErrorResult, NormResult, Results, RunResult},
 };
 use crate::{
@@ -370,9 +371,10 @@ fn ablation(results: &Results) -> Option<ResultTable> {
 }
 
 fn failures(results: &Results) -> Option<ResultTable> {
-    let mut table = ResultTable { title: "Failed runs and notes".into(), ..ResultTable::default() };
+    let mut table = ResultTable { title: "Failed runs, warnings and notes".into(), ..ResultTable::default() };
     for run in results.runs.iter().chain(&results.reference) {
         table.notes.extend(run.error.iter().map(|words| format!("{}: {}", run.name, words.trim())));
+        table.notes.extend(counted(&run.warnings).map(|words| format!("{}: {words}", run.name)));
         table.notes.extend(run.notes.iter().map(|words| format!("{}: {words}", run.name)));
     }
     (!table.notes.is_empty()).then_some(table)

@@ -8,7 +8,7 @@ use crate::{
 };
 use std::path::Path;
 
-const HEADER: &str = "run,scheme,cells,step,adaptive,tolerance,status,norm,error,relative_error,error_of_steps,\
+const HEADER: &str = "run,scheme,cells,step,adaptive,tolerance,status,warnings,norm,error,relative_error,error_of_steps,\
     error_of_mesh,order_mesh,order_step,order_both,expected_order,published,ratio,published_order,unknowns,steps,\
     rejected_steps,set_ups,unknowns_times_steps,seconds_total,seconds_computing,seconds_solve,digits_per_second";
 /// Columns of a norm.
@@ -55,13 +55,14 @@ fn over_time(results: &Results) -> String {
 /// `responses.csv`: a row for each run.
 fn responses(results: &Results) -> String {
     let header = ["run"].into_iter().chain(results.sweep.iter().map(String::as_str));
-    let header = header.chain(["status"]).chain(results.response.iter().map(String::as_str));
+    let header = header.chain(["status", "warnings"]).chain(results.response.iter().map(String::as_str));
     let mut out = line(header.map(entry));
     for run in &results.runs {
         let swept = (0..results.sweep.len())
             .map(|at| run.sweep.get(at).map_or(String::new(), |value| cell(&value.text())));
         let values = run.response.iter().map(|value| number(*value));
-        out += &line([entry(&run.name)].into_iter().chain(swept).chain([entry(&run.status)]).chain(values));
+        let ended = [entry(&run.status), run.warnings.len().to_string()];
+        out += &line([entry(&run.name)].into_iter().chain(swept).chain(ended).chain(values));
     }
     out
 }
@@ -89,6 +90,7 @@ fn csv(results: &Results) -> String {
             number(run.adaptive),
             format!("{:e}", run.tolerance),
             entry(&run.status),
+            run.warnings.len().to_string(),
         ];
         let seconds = |pick: fn(&super::record::Seconds) -> f64| number(run.seconds.as_ref().map(pick));
         let cost = [
