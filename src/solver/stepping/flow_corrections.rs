@@ -42,7 +42,7 @@ const SLOW_WITH_TANGENTS: [f64; 2] = [0.1, 0.3];
 const MOST_FALLBACKS: usize = 4;
 /// A correction is shortened until this share of the power along it is left, at most so often, each time by at least this share of the range.
 const LEFT_POWER: f64 = 0.5;
-const MOST_SHORTER: usize = 8;
+const MOST_SHORTER: usize = 7;
 const LEAST_REDUCTION: f64 = 0.1;
 
 /// How corrections end, with their work.
@@ -126,8 +126,7 @@ impl FlowCorrections {
         let share = if has_tangents { SLOW_WITH_TANGENTS[usize::from(D == 3)] } else { SLOW };
         self.earlier.restart();
         self.start.copy_from(trial)?;
-        self.evaluate(problem, trial)?;
-        self.subtract_stiffening(of_step, other, trial)?;
+        self.evaluate(problem, of_step, other, trial)?;
         self.given.copy_from(&self.found)?;
         solver.start(system, trial)?;
         let mut sum = StepOutcome::default();
@@ -155,8 +154,7 @@ impl FlowCorrections {
             // A correction of the flow is an iteration, even if the contact needs none.
             problem.work.newton += usize::from(problem.work.newton == before);
             solver.expand(of_contact, trial)?;
-            self.evaluate(problem, trial)?;
-            self.subtract_stiffening(of_step, other, trial)?;
+            self.evaluate(problem, of_step, other, trial)?;
             let left = self.residual()?;
             if left <= (1.0 - CONTACT_SHARE) * system.tolerance {
                 trial.update_ghosts()?;
@@ -165,7 +163,7 @@ impl FlowCorrections {
             let last = std::mem::replace(&mut self.left, left);
             let (is_better, is_slow) = (left <= last, left.is_nan() || left > share * last);
             if is_slow && has_tangents && number == 0 {
-                self.shorten(problem, of_step, trial)?;
+                self.shorten(problem, of_step, system.matrix, trial)?;
                 break;
             }
             if is_better {
@@ -195,54 +193,43 @@ impl FlowCorrections {
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         of_step: &dyn StepMatrix,
+        factored: &dyn StepMatrix,
         trial: &mut DistributedVector,
     ) -> Result<()> {
-        // The forces of flow with which the correction was made, at its end; and the correction.
-        self.evaluate(problem, trial)?;
-        self.given.copy_from(&self.found)?;
-        self.given.add_scaled(-1.0, &self.change)?;
         self.right_hand_side.copy_from(trial)?;
         self.right_hand_side.add_scaled(-1.0, &self.start)?;
-        let of_matrix = of_step.power(&self.right_hand_side)?;
+        let at_end = self.right_hand_side.dot(&self.change)?;
+        if at_end < 0.0 {
+            return Ok(()); // The energy falls up to the end.
+        }
+        let of_matrix = factored.power(&self.right_hand_side)?;
         let made_with = self.right_hand_side.dot(&self.given)?;
         let mut power = |share: f64| -> Result<f64> {
             trial.copy_from(&self.start)?;
             trial.add_scaled(share, &self.right_hand_side)?;
-            self.evaluate(problem, trial)?;
+            self.evaluate(problem, of_step, Some(factored), trial)?;
             Ok(self.right_hand_side.dot(&self.found)? - made_with - (1.0 - share) * of_matrix)
         };
         let first = power(0.0)?;
-        let mut ends = [(0.0, first), (1.0, f64::INFINITY)];
-        let mut share = 1.0;
-        for number in 0..MOST_SHORTER {
+        // The energy does not fall at all, or up to nearly the end.
+        if first >= 0.0 || at_end <= LEFT_POWER * first.abs() {
+            trial.copy_from(&self.start)?;
+            return trial.add_scaled(1.0, &self.right_hand_side);
+        }
+        let mut ends = [(0.0, first), (1.0, at_end)];
+        for _ in 0..MOST_SHORTER {
+            let [(near, low), (far, high)] = ends;
+            let (root, margin) = (near - low * (far - near) / (high - low), LEAST_REDUCTION * (far - near));
+            let share =
+                if root.is_finite() { root.clamp(near + margin, far - margin) } else { 0.5 * (near + far) };
             let value = power(share)?;
-            // The energy falls up to the end, or does not fall at all.
-            let is_whole = number == 0 && (value < 0.0 || first >= 0.0);
-            if is_whole || value.abs() <= LEFT_POWER * first.abs() {
+            if value.abs() <= LEFT_POWER * first.abs() {
                 break;
             }
             let is_near = value < 0.0;
             ends[usize::from(!is_near)] = (share, value);
-            let [(near, low), (far, high)] = ends;
-            let (root, margin) = (near - low * (far - near) / (high - low), LEAST_REDUCTION * (far - near));
-            share =
-                if root.is_finite() { root.clamp(near + margin, far - margin) } else { 0.5 * (near + far) };
         }
         Ok(())
-    }
-
-    /// Takes from the forces in `found` what another factored matrix has beyond that of the step. Collective.
-    fn subtract_stiffening(
-        &mut self,
-        of_step: &dyn StepMatrix,
-        other: Option<&dyn StepMatrix>,
-        velocity: &DistributedVector,
-    ) -> Result<()> {
-        let Some(other) = other else { return Ok(()) };
-        other.multiply(velocity, &mut self.product)?;
-        self.found.add_scaled(-1.0, &self.product)?;
-        of_step.multiply(velocity, &mut self.product)?;
-        self.found.add_scaled(1.0, &self.product)
     }
 
     /// The derivatives of the forces of flow at a velocity. Collective.
@@ -283,15 +270,22 @@ impl FlowCorrections {
         outcome
     }
 
-    /// Writes the forces of flow at a velocity to `found`. Collective.
+    /// Writes the forces of flow at a velocity to `found`, without what another factored matrix has beyond that of the step. Collective.
     fn evaluate<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
+        of_step: &dyn StepMatrix,
+        other: Option<&dyn StepMatrix>,
         velocity: &DistributedVector,
     ) -> Result<()> {
         let start = problem.flow_start;
         let (cells, _) = problem.body.cells_and_contacts();
-        self.flow.of(cells, start).write_forces(velocity, &mut self.found)
+        self.flow.of(cells, start).write_forces(velocity, &mut self.found)?;
+        let Some(other) = other else { return Ok(()) };
+        other.multiply(velocity, &mut self.product)?;
+        self.found.add_scaled(-1.0, &self.product)?;
+        of_step.multiply(velocity, &mut self.product)?;
+        self.found.add_scaled(1.0, &self.product)
     }
 
     /// Writes the residual of a correction to `change`, and gives its norm. Collective.

@@ -84,10 +84,10 @@ impl Newton {
         if self.attempt(problem, equations, Search::FullSteps, SHARP)?.is_none() {
             return Ok(None);
         }
+        // Bounds follow the pressures of the solution before they are fixed there.
+        self.go_to_reached(problem, equations)?;
         self.set_graph_parameters(&mut problem.body.contacts, scales, fallback);
-        self.go_to_reached(problem, equations)?;
         self.fix_bounds(problem, equations.system)?;
-        self.go_to_reached(problem, equations)?;
         self.attempt(problem, equations, fallback.search, 1.0)
     }
 
