@@ -283,13 +283,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
                     far[side + 1] = larger(far[side + 1], moved);
                 }
             };
-            for (node, size) in contact.facing_nothing() {
+            for (node, size) in contact.normal.facing_nothing() {
                 add(0, node);
                 least = least.min(size);
             }
             let facets = pair.against.iter().flat_map(|facet| self.mesh.facet_nodes(*facet));
             facets.for_each(|node| add(2, node as usize));
-            let mut all = [contact.slip(&seen); 14];
+            let mut all = [contact.normal.slip(&seen); 14];
             all[1] = -least;
             all[2..].copy_from_slice(far.as_flattened());
             let [slip, size, far @ ..] = session.largest(all);
@@ -655,7 +655,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         let velocity = state.velocity.local()?;
         let velocity = self.seen_by_contacts(&velocity);
-        Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
+        Ok(weakening.map(|contact| contact.normal.largest_pressure(&velocity)).reduce(larger))
     }
 
     /// The largest share of its coefficient of friction that a point of a contact lost on this rank in the step just committed; `None` where

@@ -144,9 +144,8 @@ impl<const D: usize> Resultants<D> {
         );
         let mut sources: Vec<Source> = (0..supports.len()).map(Source::Support).collect();
         sources.extend((0..body.contacts.len()).map(Source::Contact));
-        sources.extend(
-            (0..body.contacts.len()).filter(|at| body.contacts[*at].is_paired()).map(Source::Against),
-        );
+        sources
+            .extend((0..body.contacts.len()).filter(|at| body.contacts[*at].is_paired).map(Source::Against));
         sources.extend((0..body.load.tractions.len()).map(Source::Traction));
         if body.load.has_body_forces() {
             sources.push(Source::BodyForce);
@@ -360,7 +359,7 @@ impl<const D: usize> Sums<'_, D> {
             std::mem::swap(&mut own, &mut other);
         }
         self.add_and_react(own, node, force);
-        if let Some(coupling) = body.coupling.as_ref().filter(|_| body.contacts[contact].is_paired()) {
+        if let Some(coupling) = body.coupling.as_ref().filter(|_| body.contacts[contact].is_paired) {
             let paired = nodes_of(&body.pairs, contact).unwrap_or_default();
             let paired = paired.binary_search_by_key(&node, |paired| paired.node).map(|at| &paired[at]);
             let is_own =

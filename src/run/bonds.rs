@@ -30,9 +30,9 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             Some(strength) => (strength, "strength"),
             None => ((law.stiffness * law.energy).sqrt(), "stiffness"),
         };
-        let thickness = thickness(session, mesh, contact.facets());
+        let thickness = thickness(session, mesh, &contact.facets);
         let (mut longest, mut shortest) = (0.0, f64::INFINITY);
-        for &facet in contact.facets() {
+        for &facet in &contact.facets {
             let Some(modulus) = modulus_behind(job, mesh, facet) else { continue };
             let thick = 2.0 * modulus * law.energy / (strength * strength);
             shortest = f64::min(shortest, thick.min(thick.powf(0.25) * thickness.powf(0.75)));

@@ -57,7 +57,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     };
     let surface_effects = surface_effects(session, &job.contact, &mesh, points)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
-    if contacts.iter().any(|contact| !contact.needs_ghosts()) {
+    if contacts.iter().any(|contact| !contact.normal.needs_ghosts) {
         state.contact_traction = Some(state.velocity.like()?);
     }
     if job.time.scheme.states() > 1 {
@@ -123,9 +123,8 @@ fn contacts<const D: usize>(
         let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
         laws.turn_edges(session, mesh, held, job.time.end)?;
         if let Some(motion) = motion {
-            let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired()
-            {
-                laws.surface_points().collect()
+            let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired {
+                laws.normal.surface_points().collect()
             } else {
                 surface_points(session, mesh, &facets)?.into_iter().map(|point| held.whole(point)).collect()
             };

@@ -167,7 +167,7 @@ fn report<const D: usize, const S: usize>(
         },
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
-        motion: match body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
+        motion: match body.contacts.iter().any(|contact| contact.normal.law.depends_on_displacement()) {
             _ if !body.has_form(Form::Mass) => Dynamics::Slow,
             true => Dynamics::Impacts { may_conserve: may_conserve(job, body) },
             false => Dynamics::Inertia,

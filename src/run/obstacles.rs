@@ -46,16 +46,16 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
-        if !contact.law.depends_on_displacement() {
+        if !contact.normal.law.depends_on_displacement() {
             continue;
         }
         let deepest = -gaps_of_all(session, contact, 0.0, &displacement).smallest;
         let on = table.on.join(", ");
-        if contact.is_paired() {
+        if contact.is_paired {
             let other = table.against.join(", ");
             // The state of another run may press on a law that gives way.
             let has_state = job.initial.as_ref().is_some_and(|initial| initial.from.is_some());
-            let is_interference = !has_state || contact.law.has_vertical_parts();
+            let is_interference = !has_state || contact.normal.law.has_vertical_parts();
             if deepest > ROUNDING * size && !table.closed && is_interference {
                 out.push(format!(
                     "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside {other}, which presses them apart: if they are \
@@ -151,7 +151,7 @@ fn warning_of_straight_edges<const D: usize>(
         let size = if D == 2 { measure } else { (2.0 * measure).sqrt() };
         std::array::from_fn(|i| if i < 3 { normal.get(i).map_or(0.0, |n| n / measure) } else { size })
     };
-    let points = surface_means(session, mesh, contact.facets(), of_facet)?;
+    let points = surface_means(session, mesh, &contact.facets, of_facet)?;
     let turns = || {
         let turn = |[x, y, z, size]: [f64; 4]| [norm(&[x, y, z]).min(1.0).acos(), size];
         points.iter().map(move |(_, means)| turn(*means)).filter(|[angle, _]| *angle > TURNING)
@@ -204,17 +204,18 @@ pub(super) fn gaps<const D: usize, const S: usize>(
     let displacement = session.agree(state.displacement.local())?;
     let displacement = body.seen_by_contacts(&displacement);
     let contacts = body.contacts.iter().zip(&job.contact);
-    let gaps =
-        contacts.filter(|(contact, _)| contact.law.depends_on_displacement()).map(|(contact, table)| {
+    let gaps = contacts.filter(|(contact, _)| contact.normal.law.depends_on_displacement()).map(
+        |(contact, table)| {
             let Gaps { smallest, largest, without } =
                 gaps_of_all(session, contact, state.time, &displacement);
             ContactGaps {
                 on: table.on.clone(),
                 range: (smallest <= largest).then_some([smallest, largest]),
-                points: session.total(contact.point_count()),
+                points: session.total(contact.normal.point_count()),
                 points_without_obstacle: without,
             }
-        });
+        },
+    );
     Ok(gaps.collect())
 }
 
@@ -253,7 +254,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                 table.against.join(", ")
             ));
         }
-        if !contact.law.depends_on_displacement() {
+        if !contact.normal.law.depends_on_displacement() {
             continue;
         }
         if held > OVERRUN * size {
@@ -305,7 +306,7 @@ fn nodes_of_bodies<const D: usize, const S: usize>(
     contact: &Contact<D>,
 ) -> Result<Vec<usize>, Agreed> {
     let of_node = body.mesh.bodies(session)?.of_nodes(&body.mesh);
-    let mine: Vec<u32> = contact.nodes().filter_map(|node| of_node[node]).collect();
+    let mine: Vec<u32> = contact.normal.nodes().filter_map(|node| of_node[node]).collect();
     let touched: BTreeSet<u32> = gather(session.world(), &mine)?.into_iter().collect();
     let is_own = |node: &usize| of_node[*node].is_some_and(|number| touched.contains(&number));
     Ok((0..of_node.len()).filter(is_own).collect())

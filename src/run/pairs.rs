@@ -230,7 +230,7 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
         }
     }
     for (number, contact) in contacts.iter().enumerate() {
-        let of_others = contact.nodes().filter_map(|node| Some((node, *paired.get(&node)?)));
+        let of_others = contact.normal.nodes().filter_map(|node| Some((node, *paired.get(&node)?)));
         for (node, pair) in of_others.filter(|(_, pair)| *pair != number) {
             found.get_or_insert((node, pair, format!("{ALSO}{number}")));
         }

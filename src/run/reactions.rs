@@ -5,7 +5,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Contact, ELASTIC, Form, Step, Supports},
+        effect::{ELASTIC, Form, Step, Supports},
         pairs::PairedNode,
         space::{Held, SurfacePoint, facets, surface_points},
         state::State,
@@ -272,7 +272,7 @@ fn residual<const D: usize, const S: usize>(
             }
         }
         let rest = vec![0.0; values.len()];
-        for contact in body.contacts.iter().filter(|contact| contact.needs_ghosts()) {
+        for contact in body.contacts.iter().filter(|contact| contact.normal.needs_ghosts) {
             contact.forces(&rest, |node, force| {
                 let sums = &mut values[node as usize * D..][..D];
                 sums.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
@@ -286,9 +286,9 @@ fn residual<const D: usize, const S: usize>(
     session.agree(body.write_loads(0.0, &mut loads))?;
     session.agree(forces.add_scaled(1.0, &loads))?;
     let mut of_node: BTreeMap<u32, Vec<SurfacePoint<D>>> = BTreeMap::new();
-    let nodal = body.contacts.iter().filter(|contact| !contact.needs_ghosts() && !contact.is_paired());
+    let nodal = body.contacts.iter().filter(|contact| !contact.normal.needs_ghosts && !contact.is_paired);
     for contact in nodal {
-        contact.surface_points().for_each(|point| of_node.entry(point.node).or_default().push(point));
+        contact.normal.surface_points().for_each(|point| of_node.entry(point.node).or_default().push(point));
     }
     let add_tractions = |forces: &mut DistributedVector| {
         let Some(traction) = &state.contact_traction else { return Ok(()) };
@@ -325,7 +325,7 @@ fn lost_contact<const D: usize, const S: usize>(
         nodes.extend(nodes_of(&facets)?);
     }
     nodes.extend(nodes_of(&facets(&body.mesh, against))?);
-    let own = body.contacts.iter().map(Contact::facets);
+    let own = body.contacts.iter().map(|contact| &*contact.facets);
     for facets in own.chain(body.pairs.iter().map(|pair| &pair.against[..])) {
         for node in nodes_of(facets)? {
             nodes.remove(&node);

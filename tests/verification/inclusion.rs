@@ -43,12 +43,12 @@ fn judged(session: &Session) {
                 contact.friction.iter_mut().for_each(|friction| friction.set_parameter(scale, true));
             };
             for stiffer in [1.0 / 30.0, 10.0, 100.0] {
-                let normal = contact.scale;
-                contact.scale = stiffer * normal;
+                let normal = contact.normal.scale;
+                contact.normal.scale = stiffer * normal;
                 set(contact, stiffer * tangential);
                 let again = contact.inclusion_residual(&velocity, &open, range);
                 assert_eq!(again, distance, "{law}, {solver}: {stiffer} times stiffer");
-                contact.scale = normal;
+                contact.normal.scale = normal;
                 set(contact, tangential);
             }
             session.largest([distance])[0]

@@ -144,7 +144,7 @@ fn falling<const D: usize, const S: usize>(
     }
     let rest = run.state.velocity.like().expect("vector");
     let rest = rest.local().expect("values");
-    contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&rest));
+    contacts.iter_mut().for_each(|contact| contact.normal.linearise_velocities(&rest));
     let slopes = |x: &[f64], forces: &mut [f64]| contacts.iter().for_each(|c| c.add_slopes(x, forces));
     dense_form(session, run, slopes).into_iter().map(|row| row.into_iter().map(|x| -x).collect()).collect()
 }
@@ -224,8 +224,8 @@ fn compare<const D: usize, const S: usize>(
     }
     // Gauss points integrate squares exactly, with any quadrature in the job.
     let exact = |contact: &Contact<D>| {
-        let law = contact.law.clone();
-        let facets = contact.facets();
+        let law = contact.normal.law.clone();
+        let facets = &contact.facets;
         Contact::new(
             session,
             &run.body.mesh,
@@ -235,7 +235,7 @@ fn compare<const D: usize, const S: usize>(
         )
         .expect("contact")
     };
-    let falling_contacts = run.body.contacts.iter().filter(|c| c.law.monotonicity_constant(1.0) > 0.0);
+    let falling_contacts = run.body.contacts.iter().filter(|c| c.normal.law.monotonicity_constant(1.0) > 0.0);
     let mut exact: Vec<Contact<D>> = falling_contacts.map(exact).collect();
     choose_unknowns(&mut exact, &run.body.mesh).expect("Gauss points");
     let exact = falling(session, &run, &mut exact);

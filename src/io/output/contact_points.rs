@@ -29,7 +29,7 @@ pub(super) fn contact_points<const D: usize, const S: usize>(
     at: Converged<'_, D, S>,
 ) -> Result<Vec<(usize, PointState<D>)>> {
     let Some(traction) = &at.state.contact_traction else { return Ok(Vec::new()) };
-    let contacts = || at.body.contacts.iter().enumerate().filter(|(_, contact)| !contact.needs_ghosts());
+    let contacts = || at.body.contacts.iter().enumerate().filter(|(_, contact)| !contact.normal.needs_ghosts);
     let mut points: Vec<(usize, PointState<D>)> = Vec::new();
     let mut given: Vec<Given<VALUES>> = Vec::new();
     let mut visit_all = || {
@@ -40,7 +40,7 @@ pub(super) fn contact_points<const D: usize, const S: usize>(
         contacts().try_for_each(|(number, contact)| {
             contact.states(at.state.time, nodal, |node, state| {
                 points.push((node, state));
-                if contact.is_paired() {
+                if contact.is_paired {
                     given.push(Given { contact: number, node, values: values_of(&state) });
                 }
             })
@@ -65,7 +65,7 @@ pub(super) fn contact_points<const D: usize, const S: usize>(
     points.sort_by(in_order);
     let others = at.body.pairs.iter().flat_map(|pair| &pair.against);
     let facets: Vec<u32> =
-        contacts().flat_map(|(_, contact)| contact.facets()).chain(others).copied().collect();
+        contacts().flat_map(|(_, contact)| &contact.facets).chain(others).copied().collect();
     let of_midside = |node: u32, normal: &Vector<D>| {
         let along = |state: &&PointState<D>| dot(&state.normal, normal);
         points_at(&points, node as usize).max_by(|a, b| along(a).total_cmp(&along(b))).map(values_of)
@@ -126,7 +126,7 @@ pub(super) fn fill_corners<const D: usize, const S: usize>(
         kept.into_iter().any(|history| history.quantity == quantity)
     };
     let others = at.body.pairs.iter().filter(|pair| keeps(&&at.body.contacts[pair.contact]));
-    let facets = at.body.contacts.iter().filter(keeps).flat_map(|contact| contact.facets());
+    let facets = at.body.contacts.iter().filter(keeps).flat_map(|contact| &contact.facets);
     let facets: Vec<u32> = facets.chain(others.flat_map(|pair| &pair.against)).copied().collect();
     let of_midside = |node: u32, _: &Vector<D>| Some([values[node as usize]]);
     for (point, [mean]) in corner_means(at.session, &at.body.mesh, &facets, of_midside)? {
@@ -149,7 +149,8 @@ pub(super) fn fill_faced<const D: usize, const S: usize>(
         .flat_map(|pair| pair.nodes.iter().map(|node| (pair.contact, node.node as usize)));
     let given: Vec<Given<1>> =
         nodes.map(|(contact, node)| Given { contact, node, values: [values[node]] }).collect();
-    let with_law: BTreeSet<usize> = at.body.contacts.iter().flat_map(Contact::nodes).collect();
+    let with_law: BTreeSet<usize> =
+        at.body.contacts.iter().flat_map(|contact| contact.normal.nodes()).collect();
     for FacedPoint { point, of_places: [mean], .. } in faced_points(at, &given)? {
         let node = point.node as usize;
         if !with_law.contains(&node) {
@@ -176,7 +177,7 @@ pub(super) fn further_tractions<const D: usize, const S: usize>(
         let traction: Vector<D> = force.map(|force| -force / weight);
         let target = &mut values[*node as usize * D..][..D];
         (0..D).for_each(|i| target[i] += traction[i]);
-        if at.body.contacts[*contact].is_paired() {
+        if at.body.contacts[*contact].is_paired {
             given.push(Given { contact: *contact, node: *node as usize, values: traction });
         }
     }
@@ -185,7 +186,7 @@ pub(super) fn further_tractions<const D: usize, const S: usize>(
         (0..D).for_each(|i| target[i] -= of_forces[i]);
     }
     let others = at.body.pairs.iter().flat_map(|pair| &pair.against);
-    let facets = at.body.contacts.iter().flat_map(Contact::facets).chain(others);
+    let facets = at.body.contacts.iter().flat_map(|contact| &contact.facets).chain(others);
     let facets: Vec<u32> = facets.copied().collect();
     let of_midside = |node: u32, _: &Vector<D>| Some(std::array::from_fn(|i| values[node as usize * D + i]));
     let corners: Vec<(SurfacePoint<D>, Vector<D>)> = corner_means(at.session, mesh, &facets, of_midside)?;

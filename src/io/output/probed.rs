@@ -88,7 +88,7 @@ pub(crate) fn fault<const D: usize, const S: usize>(
                 (name, needed, body.cell_histories().any(|history| history.name() == name))
             }
             Source::Field(Position::CONTACT_TRACTION) => {
-                let is_there = body.contacts.iter().any(|contact| !contact.needs_ghosts());
+                let is_there = body.contacts.iter().any(|contact| !contact.normal.needs_ghosts);
                 ("contact_traction", "a contact", is_there)
             }
             Source::Field(Position::TEMPERATURE) => ("temperature", "[material.heat]", body.heat.is_some()),

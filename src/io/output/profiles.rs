@@ -70,7 +70,7 @@ impl<const D: usize> Profiles<D> {
         };
         let contacts = || boundaries.iter().flat_map(|(_, contacts)| contacts).map(|at| &body.contacts[*at]);
         let with = OptionalColumns {
-            gap: contacts().any(|contact| contact.law.depends_on_displacement()),
+            gap: contacts().any(|contact| contact.normal.law.depends_on_displacement()),
             friction: contacts().any(|contact| contact.friction.is_some()),
         };
         Ok(Self { profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?, with, file: None })
@@ -162,8 +162,8 @@ impl<const D: usize> Profile<D> {
                 .filter(|state| along_normal(state) > SAME_SIDE)
                 .max_by(|a, b| along_normal(a).total_cmp(&along_normal(b)));
             let pressure = match self.contacts.first() {
-                Some(&contact) if body.contacts[contact].needs_ghosts() => {
-                    body.contacts[contact].law.pressure(normal_velocity, NodeContext::default())
+                Some(&contact) if body.contacts[contact].normal.needs_ghosts => {
+                    body.contacts[contact].normal.law.pressure(normal_velocity, NodeContext::default())
                 }
                 Some(_) => here.map_or(0.0, |state| state.pressure),
                 None => by_stress[at],

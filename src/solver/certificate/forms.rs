@@ -24,7 +24,7 @@ pub(super) fn add_trace<const D: usize>(
         std::array::from_fn(|i| tangential * value[i] + (normal - tangential) * along * normal_at[i])
     };
     let value = |n: u32| -> [f64; D] { std::array::from_fn(|i| x[n as usize * D + i]) };
-    for &facet in contact.facets() {
+    for &facet in &contact.facets {
         if mesh.order() > 1 || mesh.is_revolved {
             let (nodes, points) = facet_points(mesh, facet);
             for point in points {

@@ -105,7 +105,7 @@ impl Certificates {
             if viscous && decrease.is_none() {
                 known.theta = Some(if falling { suprema.find(Supremum::Theta)? } else { 0.0 });
             }
-            let normals = body.contacts.iter().flat_map(Contact::normal_directions);
+            let normals = body.contacts.iter().flat_map(|contact| contact.normal.directions());
             if !moves_rigidly(session, body, normals, false)? {
                 known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?);
             }
@@ -196,7 +196,7 @@ fn moves_rigidly<const D: usize, const S: usize>(
 fn growth<const D: usize>(contacts: &[Contact<D>]) -> std::result::Result<Option<[f64; 2]>, &'static str> {
     let mut all: Option<[f64; 2]> = None;
     for contact in contacts {
-        let [rest, slope] = contact.law.growth_constants()?;
+        let [rest, slope] = contact.normal.law.growth_constants()?;
         let [most, steepest] = all.unwrap_or_default();
         all = Some([rest.max(most), slope.max(steepest)]);
     }

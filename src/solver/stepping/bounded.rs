@@ -56,7 +56,7 @@ impl Bounded {
         self.upper.fill(UNBOUNDED)?;
         {
             let (mut lower, mut upper) = (self.lower.owned_mut()?, self.upper.owned_mut()?);
-            contacts.iter().for_each(|contact| contact.add_bounds(&mut lower, &mut upper));
+            contacts.iter().for_each(|contact| contact.normal.add_bounds(&mut lower, &mut upper));
         }
         let bounds = [&self.lower, &self.upper];
         let Some(matrix) = system.matrix.assembled() else {
@@ -73,7 +73,7 @@ impl Bounded {
         self.residual.copy_from(self.snes.residual())?;
         let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);
         for contact in contacts.iter_mut() {
-            contact.set_reactions(&velocity, &residual);
+            contact.normal.set_reactions(&velocity, &residual);
         }
         contacts.iter().for_each(|contact| contact.add_forces(&velocity, &mut residual));
         Ok(outcome)
@@ -94,7 +94,7 @@ pub(super) fn refuse_other_contacts<const D: usize, const S: usize>(body: &Body<
                 .into(),
         ));
     }
-    match body.contacts.iter().find_map(Contact::oblique_normal) {
+    match body.contacts.iter().find_map(|contact| contact.normal.oblique_normal()) {
         None => Ok(()),
         Some(place) => Err(Error::Refused(format!(
             "[solver] method = \"vinewtonrsls\" limits components of the velocity, but the normal at {place:?} m is not parallel to \

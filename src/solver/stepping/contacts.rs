@@ -50,11 +50,11 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     }
     let (converged, start) = (state.displacement.local()?, start.local()?);
     let (converged, start) = (body.seen_by_contacts(&converged), body.seen_by_contacts(&start));
-    if body.contacts.iter().any(Contact::keeps_depths) {
+    if body.contacts.iter().any(|contact| contact.normal.keeps_depths()) {
         let velocity = state.velocity.local()?;
         let velocity = body.seen_by_contacts(&velocity);
         let ahead: Vec<f64> = converged.iter().zip(&*velocity).map(|(u, v)| u + step.length * v).collect();
-        body.contacts.iter_mut().for_each(|contact| contact.allow_depths(&ahead));
+        body.contacts.iter_mut().for_each(|contact| contact.normal.allow_depths(&ahead));
     }
     for contact in &mut body.contacts {
         if let Some((friction, heat)) = contact.friction.as_mut().zip(body.heat.as_ref()) {
@@ -108,7 +108,7 @@ pub(super) fn multiple_to_touch<const D: usize, const S: usize>(
     let motion = motion.local()?;
     let mut most = 1.0_f64;
     for contact in &body.contacts {
-        let [negative] = session.largest([-contact.multiple_to_touch(&motion)]);
+        let [negative] = session.largest([-contact.normal.multiple_to_touch(&motion)]);
         most = if negative.is_finite() { most.max(-2.0 * negative) } else { most };
     }
     Ok(most)
@@ -127,7 +127,8 @@ pub(super) fn rest_on_contacts<const D: usize, const S: usize>(
     let found = {
         let motions = [&*motion.local()?, &*rigid.local()?];
         let open = |multiple: f64| {
-            let powers = body.contacts.iter().map(|contact| contact.power_of_pressures(motions, multiple));
+            let powers =
+                body.contacts.iter().map(|contact| contact.normal.power_of_pressures(motions, multiple));
             session.sum([powers.sum()])[0] - power
         };
         let (mut low, mut high) = (-1.0, 1.0);
@@ -156,7 +157,7 @@ pub(super) fn rest_on_contacts<const D: usize, const S: usize>(
         }
         let share = -ends[0] / (ends[1] - ends[0]);
         for contact in &mut body.contacts {
-            contact.set_pressures_between(motions, [low, high], share);
+            contact.normal.set_pressures_between(motions, [low, high], share);
         }
         low + share * (high - low)
     };

@@ -11,7 +11,7 @@ use super::{
     substructuring::{MAX_INTERFACE_UNKNOWNS, interface_nodes},
 };
 use crate::{
-    fem::{body::Body, effect::Contact},
+    fem::body::Body,
     linear_algebra::petsc::Precision,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -85,7 +85,7 @@ impl ProblemSize {
             interface: interface_nodes(session, &body.mesh)?.len() * D + motions,
             contact: !contacts.is_empty(),
             condensed: !contacts.is_empty()
-                && !contacts.iter().any(Contact::needs_ghosts)
+                && !contacts.iter().any(|contact| contact.normal.needs_ghosts)
                 && (!body.flows() || body.only_cells_flow() || body.only_surface_acts())
                 && motions <= MAX_CONDENSED_MOTIONS,
             friction: contacts.iter().any(|contact| contact.friction.is_some()),

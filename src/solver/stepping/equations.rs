@@ -202,7 +202,7 @@ pub struct Scratch {
 impl Scratch {
     /// Work vectors with the layout of `like`, for these contacts.
     pub fn new<const D: usize>(like: &DistributedVector, contacts: &[Contact<D>]) -> Result<Self> {
-        let ghosts = contacts.iter().any(Contact::needs_ghosts);
+        let ghosts = contacts.iter().any(|contact| contact.normal.needs_ghosts);
         Ok(Self {
             velocity: like.like()?,
             residuals: [f64::NAN; 2],
@@ -318,7 +318,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         if let Some(cells) = &mut self.cells {
             cells.set_softening(share);
         }
-        self.contacts.iter_mut().for_each(|contact| contact.set_softening(share));
+        self.contacts.iter_mut().for_each(|contact| contact.normal.softening = share);
     }
 
     /// As [`NonlinearProblem::solve_jacobian`], where the derivative is positive definite; otherwise `direction` is not changed. If the
@@ -454,10 +454,10 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             values.copy_from(velocity)?;
             values.update_ghosts()?;
             let values = values.local()?;
-            self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&values));
+            self.contacts.iter_mut().for_each(|contact| contact.normal.linearise_velocities(&values));
         } else {
             let velocity = velocity.owned()?;
-            self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&velocity));
+            self.contacts.iter_mut().for_each(|contact| contact.normal.linearise_velocities(&velocity));
         }
         self.linearise_obstacles()?;
         let digests = self.contacts.iter().map(Contact::set_digest);
@@ -598,7 +598,7 @@ impl<const D: usize> ContactEquations<'_, D> {
             return Err(Error::Failed(reason.into()));
         }
         direction.copy_from(velocity)?;
-        if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction.is_some()) {
+        if self.contacts.iter().any(|c| c.normal.law.has_vertical_parts() || c.friction.is_some()) {
             operator.multiply(velocity, open)?;
             open.scale(-1.0)?;
             open.add_scaled(1.0, residual)?;
@@ -672,7 +672,9 @@ impl<const D: usize> ProjectedOperator for ReducedJacobian<'_, D> {
     }
 
     fn may_project(&self) -> bool {
-        self.contacts.iter().any(|contact| contact.law.has_vertical_parts() || contact.friction.is_some())
+        self.contacts
+            .iter()
+            .any(|contact| contact.normal.law.has_vertical_parts() || contact.friction.is_some())
     }
 
     fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {

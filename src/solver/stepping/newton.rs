@@ -295,7 +295,7 @@ impl Newton {
             has_user_search: self.has_user_search,
             // Motions of obstacles are not in equilibrium with those of the contact points alone.
             interior_is_linear: !flows
-                && !contacts.iter().any(|contact| contact.needs_ghosts() || contact.obstacle.is_some()),
+                && !contacts.iter().any(|contact| contact.normal.needs_ghosts || contact.obstacle.is_some()),
             flows,
             rubs,
             rubs_obstacles: rubs && !self.obstacles.is_empty(),
@@ -314,7 +314,7 @@ impl Newton {
         let follows = fallback.iteration == FrictionIteration::Newton;
         for ((contact, scales), decrease) in contacts.iter_mut().zip(scales).zip(&self.steepest_decreases) {
             let [normal, tangential] = scales.map(|scale| fallback.stiffness_factor * scale);
-            contact.scale = normal.max(2.0 * contact.monotonicity_constant());
+            contact.normal.scale = normal.max(2.0 * contact.monotonicity_constant());
             if let Some(friction) = &mut contact.friction {
                 friction.set_parameter(tangential.max(decrease / INITIAL_DECREASE_RATIO), follows);
             }
@@ -533,7 +533,7 @@ fn frictions<const D: usize>(contacts: &mut [Contact<D>]) -> impl Iterator<Item 
 
 /// Whether a contact may have several equilibria: not where pressures depend on the velocity alone.
 fn may_fall<const D: usize>(contact: &Contact<D>) -> bool {
-    contact.law.depends_on_displacement() || contact.friction.is_some()
+    contact.normal.law.depends_on_displacement() || contact.friction.is_some()
 }
 
 /// The reason why Newton's method failed, as a message.

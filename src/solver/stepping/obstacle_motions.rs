@@ -179,7 +179,7 @@ impl ObstacleMotions {
             let motion = &mut self.motions[at];
             (motion.place, motion.inertia, motion.held, motion.approach) = (place, inertia, 0.0, None);
             let (contact, freedom) = place;
-            let has_stops = freedom == Freedom::Translation && contacts[contact].has_stops();
+            let has_stops = freedom == Freedom::Translation && contacts[contact].normal.has_stops();
             (motion.has_stops, motion.stop) = (session.total(usize::from(has_stops)) > 0, None);
             motion.velocities.fill(0.0)?;
             contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
@@ -520,9 +520,9 @@ fn change_to_press<const D: usize>(
         Freedom::Rotation => f64::INFINITY,
     };
     let nearest = -session.largest([-nearest])[0];
-    let [area] = session.sum([laws.area()]);
+    let [area] = session.sum([laws.normal.area()]);
     let left = open.abs() - motion.inertia * nearest;
-    (left > 0.0).then(|| sign * (nearest + left / (motion.inertia + laws.scale * area)))
+    (left > 0.0).then(|| sign * (nearest + left / (motion.inertia + laws.normal.scale * area)))
 }
 
 /// Lets the unknowns of the contacts follow their obstacles, except those that are apart at the velocities from which a step starts.
@@ -534,7 +534,7 @@ fn find_contacts<const D: usize>(
 ) -> Result<()> {
     let velocity = start.owned()?;
     for contact in contacts.iter_mut().filter(|contact| contact.obstacle.is_some()) {
-        let mut touches = contact.has_tractions() || contact.would_touch(&velocity);
+        let mut touches = contact.has_tractions() || contact.normal.would_touch(&velocity);
         let [along, _] = contact.driven();
         if let Some(change) = along.map(LoadedMotion::change_to_free) {
             touches |= contact.change_to_touch(&velocity, change.signum()) <= change.abs();

@@ -21,8 +21,8 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{
-            CONTACT, Contact, Energy, Form, Freedom, Heat, LoadedMotion, NUMERICAL, Role,
-            SLIP_BETWEEN_PAIRINGS, Step, THERMAL_WORK, VISCOUS, WORK,
+            CONTACT, Energy, Form, Freedom, Heat, LoadedMotion, NUMERICAL, Role, SLIP_BETWEEN_PAIRINGS, Step,
+            THERMAL_WORK, VISCOUS, WORK,
         },
         resultants::BalancedMotion,
         state::State,
@@ -340,8 +340,8 @@ impl Stepper {
         self.clock.solve += solving.elapsed().saturating_sub(assembly);
         self.traffic.add_solve(self.solver.traffic(session.ranks())?);
         let outcome = outcome?;
-        if body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
-            if body.coupling.is_some() || body.contacts.iter().any(Contact::needs_ghosts) {
+        if body.contacts.iter().any(|contact| contact.normal.law.depends_on_displacement()) {
+            if body.coupling.is_some() || body.contacts.iter().any(|contact| contact.normal.needs_ghosts) {
                 self.trial.update_ghosts()?;
             }
             session.agree(refuse_passage(body, state, step, &self.trial))?;

@@ -1,7 +1,7 @@
 //! Contacts whose laws are bounds on one velocity component at each point.
 
 use super::{
-    Contact,
+    normal::NormalContact,
     point::{Unknown, Vectors::Newton},
 };
 use crate::laws::contact::NodeContext;
@@ -9,7 +9,7 @@ use crate::laws::contact::NodeContext;
 /// Largest deviation of a unit normal from an axis.
 const ALIGNED: f64 = 1e-9;
 
-impl<const D: usize> Contact<D> {
+impl<const D: usize> NormalContact<D> {
     /// The first position in m where the law is not merely a bound on a velocity component, if there is one.
     pub fn oblique_normal(&self) -> Option<&[f64; D]> {
         let is_bound = self.law.velocity_bound(NodeContext::default()).is_some();

@@ -34,7 +34,7 @@ impl<const D: usize> Contact<D> {
         end: f64,
     ) -> Result<(), Agreed> {
         let has_obstacle = !self.is_paired && !matches!(self.gap, Gap::Distance(_));
-        if self.needs_ghosts || !has_obstacle || !self.law.depends_on_displacement() {
+        if self.normal.needs_ghosts || !has_obstacle || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
         let all: Vec<u32> = (0..mesh.facets.len() as u32).collect();
@@ -42,7 +42,7 @@ impl<const D: usize> Contact<D> {
         for SurfacePoint { node, normal, .. } in surface_points(session, mesh, &all)? {
             faces.entry(node).or_default().push(normal);
         }
-        let points = std::mem::take(&mut self.points);
+        let points = std::mem::take(&mut self.normal.points);
         for of_node in points.chunk_by(|a, b| a.node() == b.node()) {
             let place = of_node[0].place;
             let own: Vec<Vector<D>> = of_node.iter().map(|point| point.normal).collect();
@@ -54,21 +54,11 @@ impl<const D: usize> Contact<D> {
                 .flatten()
                 .and_then(|direction| nearest_in_cone(&direction, &cone));
             match touching {
-                Some(direction) => self.points.extend(turned(of_node, &direction, held)),
-                None => self.points.extend_from_slice(of_node),
+                Some(direction) => self.normal.points.extend(turned(of_node, &direction, held)),
+                None => self.normal.points.extend_from_slice(of_node),
             }
         }
         Ok(())
-    }
-
-    /// The nodal points of the boundary, with the normals along which they touch.
-    pub fn surface_points(&self) -> impl Iterator<Item = SurfacePoint<D>> {
-        let nodal = self.points.iter().filter(|_| !self.needs_ghosts);
-        nodal.map(|point| SurfacePoint {
-            node: point.node() as u32,
-            normal: point.normal,
-            weight: point.weight,
-        })
     }
 }
 

@@ -49,16 +49,19 @@ impl<const D: usize> Contact<D> {
     /// Counts the points on this rank by state, at velocities in a vector of Newton's method.
     pub fn count(&self, velocity: &[f64]) -> PointCount {
         let mut count = PointCount::default();
-        for point in self.points.iter().filter(|point| point.carries(&self.law)) {
-            count.open += usize::from(point.pressure_at(&self.law, Newton, velocity) == 0.0);
+        for point in self.normal.points.iter().filter(|point| point.carries(&self.normal.law)) {
+            count.open += usize::from(point.pressure_at(&self.normal.law, Newton, velocity) == 0.0);
             let along = point.velocity_along_normal(Newton, velocity);
             let branch = if point.unknown.has_pressure() {
-                let found =
-                    self.law.resolve_worn(self.scale * along + point.pressure, self.scale, point.context);
+                let found = self.normal.law.resolve_worn(
+                    self.normal.scale * along + point.pressure,
+                    self.normal.scale,
+                    point.context,
+                );
                 count.held += usize::from(found.derivative == 0.0);
                 found.branch
             } else {
-                self.law.branch(along, point.context)
+                self.normal.law.branch(along, point.context)
             };
             count.branches[branch.min(BRANCHES - 1)] += 1;
         }

@@ -1,6 +1,10 @@
 //! The motions of nodes on which contact laws act.
 
-use super::{Contact, point::Unknown, tangential_point::span_without};
+use super::{
+    Contact,
+    point::{Unknown, Vectors::Body},
+    tangential_point::span_without,
+};
 use crate::{fem::space::Held, linear_algebra::tensor::Vector};
 use std::collections::BTreeMap;
 
@@ -23,7 +27,7 @@ pub fn contact_nodes<const D: usize>(
 ) -> Vec<ContactNode<D>> {
     let mut nodes: BTreeMap<usize, Vec<Option<Vector<D>>>> = BTreeMap::new();
     for contact in contacts {
-        for point in &contact.points {
+        for point in &contact.normal.points {
             let active = match point.unknown {
                 Unknown::Parameter => Some(point.direction),
                 Unknown::Velocity => None,
@@ -60,23 +64,10 @@ impl<const D: usize> Contact<D> {
     /// Nodes of this rank with directions along which the contact can resist a motion of a body at rest: the normal, unless the law
     /// never presses, and the tangents of friction.
     pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
-        let presses = !self.law.is_zero();
+        let presses = !self.normal.law.is_zero();
         let rubs = self.friction.as_ref().is_some_and(|friction| presses || !friction.law.follows_pressure());
-        let normals = presses.then(|| self.normal_directions()).into_iter().flatten();
+        let normals = presses.then(|| self.normal.directions()).into_iter().flatten();
         normals.chain(rubs.then(|| self.tangential_directions()).into_iter().flatten()).collect()
-    }
-
-    /// The nodes of this rank that its points have.
-    pub fn nodes(&self) -> impl Iterator<Item = usize> {
-        self.points.iter().flat_map(|point| point.nodes().map(|(node, _)| node).collect::<Vec<_>>())
-    }
-
-    /// The nodes of this rank, each with the normals of its points.
-    pub fn normal_directions(&self) -> impl Iterator<Item = (usize, Vector<D>)> {
-        self.points.iter().flat_map(|point| {
-            let normal = point.normal;
-            point.nodes().map(move |(node, _)| (node, normal)).collect::<Vec<_>>()
-        })
     }
 
     /// The nodes of this rank with friction, each with the free tangents of its points.
@@ -85,5 +76,17 @@ impl<const D: usize> Contact<D> {
             .iter()
             .flat_map(|friction| &friction.points)
             .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)))
+    }
+
+    /// Adds the derivative of half of `sum of w (normal x_nu^2 + tangential |x_tau|^2)` to `forces`: over the quadrature points
+    /// and those with friction, with the weights and directions with which laws act there. Both vectors have ghosts; `x` is zero at
+    /// prescribed components.
+    pub fn add_squares(&self, [normal, tangential]: [f64; 2], x: &[f64], forces: &mut [f64]) {
+        for point in &self.normal.points {
+            point.add_force(Body, normal * point.normal_component(Body, x), forces);
+        }
+        if let Some(friction) = &self.friction {
+            friction.add_squares(tangential, x, forces);
+        }
     }
 }

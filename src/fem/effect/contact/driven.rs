@@ -12,6 +12,7 @@
 use super::{
     Contact,
     loaded_obstacle::{Freedom, LoadedMotion},
+    normal::NormalContact,
     point::{Point, Unknown, Vectors::Newton},
 };
 use crate::{
@@ -27,19 +28,40 @@ const NEAR: f64 = 1e-6;
 /// Distance from a point that stops the obstacle at which they touch, as a share of the body's size.
 const TOUCH: f64 = 1e-12;
 
-/// The penetration in m of a point at the end of the step, at these velocities of Newton's method.
-fn depth<const D: usize>(point: &Point<D>, velocity: &[f64]) -> f64 {
-    point.context.penetration + point.context.step_length * point.normal_component(Newton, velocity)
-}
-
 /// Whether a point and the obstacle touch at the end of the step, at these velocities of Newton's method; the size is that of the body in m.
 fn is_touched<const D: usize>(point: &Point<D>, velocity: &[f64], size: f64) -> bool {
-    depth(point, velocity) >= -TOUCH * size
+    point.depth(velocity) >= -TOUCH * size
 }
 
 /// The place at which the ray of a point meets the obstacle relative to its centre.
 fn arm<const D: usize>(point: &Point<D>, seen: &Vector<D>, reach: f64, centre: &Vector<D>) -> Vector<D> {
     add_scaled(&add_scaled(seen, reach, &point.normal), -1.0, centre)
+}
+
+impl<const D: usize> NormalContact<D> {
+    /// The change in m/s of the normal velocity with which a point in the obstacle comes under pressure: a dashpot lets go of a surface that
+    /// recedes fast, however deep it is.
+    fn change_to_press(&self, point: &Point<D>, velocity: &[f64]) -> f64 {
+        let now = point.normal_component(Newton, velocity);
+        let presses = |change: f64| self.law.pressure(now + change, point.context) > 0.0;
+        let size = now.abs() + point.depth(velocity) / point.context.step_length;
+        let mut bracket = [0.0, NEAR * size];
+        // Bisection of numbers without full precision would not end.
+        if self.law.has_vertical_parts() || presses(0.0) || bracket[1] < f64::MIN_POSITIVE / NEAR {
+            return 0.0;
+        }
+        while !presses(bracket[1]) {
+            bracket = [bracket[1], 2.0 * bracket[1]];
+            if !bracket[1].is_finite() {
+                return f64::INFINITY;
+            }
+        }
+        while bracket[1] - bracket[0] > NEAR * bracket[1] {
+            let middle = f64::midpoint(bracket[0], bracket[1]);
+            bracket[usize::from(presses(middle))] = middle;
+        }
+        bracket[1]
+    }
 }
 
 impl<const D: usize> Contact<D> {
@@ -68,11 +90,11 @@ impl<const D: usize> Contact<D> {
     /// Evaluates gaps and velocities of the obstacle after its velocities have been set.
     pub fn place_obstacle(&mut self) -> Result<()> {
         let Some(obstacle) = &self.obstacle else { return Ok(()) };
-        if !self.law.depends_on_displacement() {
+        if !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
         let [change, _] = obstacle.changes();
-        for point in self.points.iter_mut().filter(|_| obstacle.moves()) {
+        for point in self.normal.points.iter_mut().filter(|_| obstacle.moves()) {
             let seen = obstacle.seen_after(&point.place);
             point.set_gap(self.gap.of_moved(self.rate.time, &seen, &point.normal, point.moved)?);
             point.carried = point.follows * change;
@@ -85,7 +107,7 @@ impl<const D: usize> Contact<D> {
         let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.moves()) else { return };
         let ([direction, _], [change, _]) = (obstacle.velocities_at(&[0.0; D]), obstacle.changes());
         self.follows = follows;
-        for point in &mut self.points {
+        for point in &mut self.normal.points {
             let along = direction.map_or(0.0, |direction| dot(&point.normal, &direction));
             point.follows = if follows && point.can_touch() { along } else { 0.0 };
             point.carried = point.follows * change;
@@ -96,13 +118,13 @@ impl<const D: usize> Contact<D> {
     /// in it, at these velocities of Newton's method; all of them where friction needs no pressure. Elsewhere they would carry the motion
     /// of the obstacle to and fro, only to lose digits. Collective.
     pub fn follow_along_tangents(&mut self, session: &Session, velocity: &[f64]) {
-        let depths = self.points.iter().map(|point| depth(point, velocity));
+        let depths = self.normal.points.iter().map(|point| point.depth(velocity));
         let [deepest] = session.largest([depths.fold(0.0, larger)]);
-        let points = &self.points;
+        let points = &self.normal.points;
         if let Some(friction) = &mut self.friction {
             for point in &mut friction.points {
                 let touches =
-                    points[point.at].pressure != 0.0 || depth(&points[point.at], velocity) >= -deepest;
+                    points[point.at].pressure != 0.0 || points[point.at].depth(velocity) >= -deepest;
                 point.follows = touches || !friction.law.follows_pressure();
             }
         }
@@ -111,7 +133,7 @@ impl<const D: usize> Contact<D> {
     /// Lets the unknowns follow the obstacle at points that have come under pressure; returns whether they did not at some point on this
     /// rank.
     pub fn follow_along_new_tangents(&mut self) -> bool {
-        let points = &self.points;
+        let points = &self.normal.points;
         let mut is_new = false;
         let friction = self.friction.iter_mut().filter(|friction| friction.follows);
         for point in friction.flat_map(|friction| &mut friction.points) {
@@ -130,13 +152,8 @@ impl<const D: usize> Contact<D> {
     /// Whether points on this rank have tractions.
     pub fn has_tractions(&self) -> bool {
         let friction = self.friction.iter().flat_map(|friction| &friction.points);
-        self.points.iter().any(|point| point.pressure != 0.0) || { friction }
+        self.normal.points.iter().any(|point| point.pressure != 0.0) || { friction }
             .any(|point| point.traction != [0.0; D])
-    }
-
-    /// Whether points on this rank would touch the obstacle where it is, at these velocities of Newton's method.
-    pub fn would_touch(&self, velocity: &[f64]) -> bool {
-        self.points.iter().any(|point| point.unknown == Unknown::Parameter && depth(point, velocity) >= 0.0)
     }
 
     /// Sets the places at which the rays along the normals meet an obstacle that a moment turns, relative to its centre; zero where they
@@ -145,7 +162,7 @@ impl<const D: usize> Contact<D> {
         let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.turns()) else { return };
         let [[start, _], _] = self.rate.before;
         let [centre, before] = [self.rate.time, start].map(|time| self.gap.centre(time));
-        let arms = self.points.iter().map(|point| {
+        let arms = self.normal.points.iter().map(|point| {
             if point.reach == f64::INFINITY {
                 return [0.0; D];
             }
@@ -163,7 +180,7 @@ impl<const D: usize> Contact<D> {
     /// The change of the velocity of the obstacle's material at a point with the velocity of its translation, in a step in which it also
     /// turns: the ray along the normal meets it at another place.
     fn sweep(&self, at: usize) -> Result<Vector<D>> {
-        let point = &self.points[at];
+        let point = &self.normal.points[at];
         let Some(obstacle) = &self.obstacle else { return Ok([0.0; D]) };
         let (Some((direction, way)), true) = (obstacle.translation(), point.reach < f64::INFINITY) else {
             return Ok([0.0; D]);
@@ -201,7 +218,7 @@ impl<const D: usize> Contact<D> {
 
     /// Subtracts from nodal velocities those of the obstacle that they follow.
     pub fn subtract_obstacle(&self, values: &mut [f64]) {
-        for point in self.points.iter().filter(|point| point.unknown == Unknown::Parameter) {
+        for point in self.normal.points.iter().filter(|point| point.unknown == Unknown::Parameter) {
             point.add_along(Newton, -point.carried / point.free_length, values);
         }
         self.friction.iter().for_each(|friction| friction.add_obstacle_velocities(-1.0, values));
@@ -218,7 +235,7 @@ impl<const D: usize> Contact<D> {
     /// The largest velocity in m/s that moves in the step by a distance from which the gap of a point on this rank is evaluated: that of its
     /// place from the origin, and from the centre of the obstacle.
     pub fn speed_of_places(&self) -> f64 {
-        if !self.law.depends_on_displacement() {
+        if !self.normal.law.depends_on_displacement() {
             return 0.0;
         }
         let centre = self.gap.centre(self.rate.time);
@@ -226,7 +243,7 @@ impl<const D: usize> Contact<D> {
             let distance = norm(&point.place) + norm(&add_scaled(&point.place, -1.0, &centre));
             if point.context.step_length > 0.0 { distance / point.context.step_length } else { 0.0 }
         };
-        self.points.iter().filter(|point| point.can_touch()).map(speed).fold(0.0, larger)
+        self.normal.points.iter().filter(|point| point.can_touch()).map(speed).fold(0.0, larger)
     }
 
     /// Adds the change of nodal velocities, a vector of Newton's method, with the velocity of a motion at fixed unknowns.
@@ -234,7 +251,7 @@ impl<const D: usize> Contact<D> {
         if !self.follows {
             return;
         }
-        let parameters = self.points.iter().filter(|point| point.unknown == Unknown::Parameter);
+        let parameters = self.normal.points.iter().filter(|point| point.unknown == Unknown::Parameter);
         for point in parameters.filter(|_| freedom == Freedom::Translation) {
             point.add_along(Newton, point.follows / point.free_length, nodal);
         }
@@ -247,8 +264,8 @@ impl<const D: usize> Contact<D> {
     /// The resultant of the tractions on the obstacle for a motion, in N or N m, of points on this rank at these velocities, a vector of
     /// Newton's method with ghosts.
     pub fn resultant(&self, freedom: Freedom, velocity: &[f64]) -> f64 {
-        let normal = self.points.iter().enumerate().map(|(at, point)| {
-            let pressure = point.pressure_at(&self.law, Newton, velocity);
+        let normal = self.normal.points.iter().enumerate().map(|(at, point)| {
+            let pressure = point.pressure_at(&self.normal.law, Newton, velocity);
             point.weight * pressure * dot(&point.normal, &self.carrying(freedom, at))
         });
         let friction = self.friction.iter().flat_map(|friction| &friction.points);
@@ -260,7 +277,8 @@ impl<const D: usize> Contact<D> {
     /// A measure of how firmly points on this rank hold a motion at the last linearisation, in m^(D-1); 0 where nothing touches.
     pub fn grip(&self, freedom: Freedom) -> f64 {
         let square = |value: f64| value * value;
-        let normal = self.points.iter().enumerate().filter(|(_, point)| point.unknown == Unknown::Parameter);
+        let normal =
+            self.normal.points.iter().enumerate().filter(|(_, point)| point.unknown == Unknown::Parameter);
         let normal = normal.map(|(at, point)| {
             let along = dot(&point.normal, &self.carrying(freedom, at));
             point.weight
@@ -281,25 +299,23 @@ impl<const D: usize> Contact<D> {
         let Some((direction, way)) = translation.filter(|_| freedom == Freedom::Translation) else {
             return 0.0;
         };
-        let held =
-            self.points.iter().filter(|point| point.unknown == Unknown::Held && self.is_pressed(point));
+        let held = self
+            .normal
+            .points
+            .iter()
+            .filter(|point| point.unknown == Unknown::Held && self.normal.is_pressed(point));
         held.map(|point| {
-            let slope = self.law.slope(point.normal_component(Newton, velocity), point.context);
+            let slope = self.normal.law.slope(point.normal_component(Newton, velocity), point.context);
             let along = dot(&point.normal, direction);
             point.weight * slope / point.context.step_length * way * along * along
         })
         .sum()
     }
 
-    /// Whether points on this rank may stop the obstacle.
-    pub fn has_stops(&self) -> bool {
-        self.points.iter().any(|point| point.unknown == Unknown::Stop)
-    }
-
     /// The points on this rank that may stop the obstacle, each with the component of its normal along the direction of the obstacle.
     fn stops(&self) -> impl Iterator<Item = (&Point<D>, f64)> {
         let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
-        let points = self.points.iter().filter(|point| point.unknown == Unknown::Stop);
+        let points = self.normal.points.iter().filter(|point| point.unknown == Unknown::Stop);
         points
             .filter_map(move |point| translation.map(|(direction, _)| (point, dot(&point.normal, direction))))
     }
@@ -309,8 +325,8 @@ impl<const D: usize> Contact<D> {
     pub fn room(&self, velocity: &[f64]) -> [f64; 2] {
         let [mut least, mut greatest] = [f64::NEG_INFINITY, f64::INFINITY];
         for (point, along) in self.stops() {
-            let depth = depth(point, velocity);
-            let depth = if depth.abs() <= TOUCH * self.size { 0.0 } else { depth };
+            let depth = point.depth(velocity);
+            let depth = if depth.abs() <= TOUCH * self.body_size { 0.0 } else { depth };
             let change = depth / (along * point.context.step_length);
             if along > 0.0 {
                 least = f64::max(least, change);
@@ -326,7 +342,7 @@ impl<const D: usize> Contact<D> {
     pub fn stopping_area(&self, sign: f64, velocity: &[f64]) -> f64 {
         let touched = self
             .stops()
-            .filter(|(point, along)| is_touched(point, velocity, self.size) && sign * along < 0.0);
+            .filter(|(point, along)| is_touched(point, velocity, self.body_size) && sign * along < 0.0);
         touched.map(|(point, along)| point.weight * along * along).sum()
     }
 
@@ -339,40 +355,11 @@ impl<const D: usize> Contact<D> {
     /// points to 0. Of all pressures with the same resultant these have the smallest sum of squares over the area.
     pub fn stop(&mut self, sign: f64, share: f64, velocity: &[f64]) {
         let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
-        for point in self.points.iter_mut().filter(|point| point.unknown == Unknown::Stop) {
+        for point in self.normal.points.iter_mut().filter(|point| point.unknown == Unknown::Stop) {
             let along = translation.map_or(0.0, |(direction, _)| dot(&point.normal, direction));
-            let stops = is_touched(point, velocity, self.size) && sign * along < 0.0;
+            let stops = is_touched(point, velocity, self.body_size) && sign * along < 0.0;
             point.pressure = if stops { share * along } else { 0.0 };
         }
-    }
-
-    /// Whether the obstacle may press on a point with a known or unknown pressure.
-    fn is_pressed(&self, point: &Point<D>) -> bool {
-        point.unknown != Unknown::Velocity && point.carries(&self.law) && point.can_touch()
-    }
-
-    /// The change in m/s of the normal velocity with which a point in the obstacle comes under pressure: a dashpot lets go of a surface that
-    /// recedes fast, however deep it is.
-    fn change_to_press(&self, point: &Point<D>, velocity: &[f64]) -> f64 {
-        let now = point.normal_component(Newton, velocity);
-        let presses = |change: f64| self.law.pressure(now + change, point.context) > 0.0;
-        let size = now.abs() + depth(point, velocity) / point.context.step_length;
-        let mut bracket = [0.0, NEAR * size];
-        // Bisection of numbers without full precision would not end.
-        if self.law.has_vertical_parts() || presses(0.0) || bracket[1] < f64::MIN_POSITIVE / NEAR {
-            return 0.0;
-        }
-        while !presses(bracket[1]) {
-            bracket = [bracket[1], 2.0 * bracket[1]];
-            if !bracket[1].is_finite() {
-                return f64::INFINITY;
-            }
-        }
-        while bracket[1] - bracket[0] > NEAR * bracket[1] {
-            let middle = f64::midpoint(bracket[0], bracket[1]);
-            bracket[usize::from(presses(middle))] = middle;
-        }
-        bracket[1]
     }
 
     /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it presses on a point on this rank in the step, at these
@@ -385,15 +372,20 @@ impl<const D: usize> Contact<D> {
                 _ => point.follows,
             };
             let approach = -sign * along;
-            let depth = depth(point, velocity);
+            let depth = point.depth(velocity);
             if approach <= 0.0 || !depth.is_finite() {
                 f64::INFINITY
             } else if depth < 0.0 {
                 -depth / (approach * point.context.step_length)
             } else {
-                self.change_to_press(point, velocity) / approach
+                self.normal.change_to_press(point, velocity) / approach
             }
         };
-        self.points.iter().filter(|point| self.is_pressed(point)).map(change).fold(f64::INFINITY, f64::min)
+        self.normal
+            .points
+            .iter()
+            .filter(|point| self.normal.is_pressed(point))
+            .map(change)
+            .fold(f64::INFINITY, f64::min)
     }
 }

@@ -7,8 +7,6 @@ use super::{
 use crate::{
     error::Result,
     fem::effect::{EnergyKind, Role},
-    laws::contact::NodeContext,
-    linear_algebra::tensor::larger,
 };
 
 /// Dissipated by contact, or absorbed by contact memory.
@@ -42,17 +40,17 @@ impl<const D: usize> Contact<D> {
     /// friction there.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> ContactEnergy {
         let mut sum = ContactEnergy::default();
-        for point in &self.points {
+        for point in &self.normal.points {
             let v = point.normal_component(Body, velocity);
-            let pressure = point.pressure_at(&self.law, Body, velocity);
+            let pressure = point.pressure_at(&self.normal.law, Body, velocity);
             let of_supports = point.weight * pressure * point.held_velocity(velocity);
-            if !self.law.depends_on_displacement() {
+            if !self.normal.law.depends_on_displacement() {
                 sum.dissipated_power += point.weight * pressure * v;
                 sum.driving_power += of_supports;
                 continue;
             }
             let mean = if self.blend.earlier != 0.0 {
-                0.5 * (pressure + self.pressure_before(point))
+                0.5 * (pressure + self.normal.pressure_before(point))
             } else {
                 pressure
             };
@@ -64,11 +62,13 @@ impl<const D: usize> Contact<D> {
                 if pressure == 0.0 || !way.is_finite() { 0.0 } else { pressure * way }
             };
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
-            let energies = self.law.energy(after).zip(self.law.energy(point.penetration_before));
+            let energies =
+                self.normal.law.energy(after).zip(self.normal.law.energy(point.penetration_before));
             let (stored, lost) = match energies {
-                Some(energies) => {
-                    (energies.0 - energies.1, self.lost_at_wall(pressure, [point.penetration_before, after]))
-                }
+                Some(energies) => (
+                    energies.0 - energies.1,
+                    self.normal.lost_at_wall(pressure, [point.penetration_before, after]),
+                ),
                 None => (0.0, times(pressure, after - before)),
             };
             // The growth of the wear that this step has seen, which is no longer stored.
@@ -92,18 +92,10 @@ impl<const D: usize> Contact<D> {
         sum
     }
 
-    /// What a rigid obstacle behind a law that stores energy dissipates of the work of this pressure in Pa in J/m^(D-1), where the
-    /// penetration in m changes from the first to the second value: that inside of it, beyond what the law stores.
-    fn lost_at_wall(&self, pressure: f64, penetrations: [f64; 2]) -> f64 {
-        let Some([wall, stored]) = self.law.wall() else { return 0.0 };
-        let [before, after] = penetrations.map(|penetration| larger(penetration - wall, 0.0));
-        if pressure > stored { (pressure - stored) * (after - before) } else { 0.0 }
-    }
-
     /// Power in W/m^(D-1) that the dashpot at a point dissipates at the end of the step, at this penetration in m, which has grown by
     /// this mean rate in m/s.
     fn damping_power(&self, point: &Point<D>, after: f64, growth: f64) -> f64 {
-        if self.law.damping() == 0.0 || !growth.is_finite() {
+        if self.normal.law.damping() == 0.0 || !growth.is_finite() {
             return 0.0;
         }
         let rate = if self.blend.earlier == 0.0 {
@@ -111,31 +103,19 @@ impl<const D: usize> Contact<D> {
         } else {
             (after.max(0.0) - point.context.depth_before) / point.context.step_length
         };
-        self.law.damping_pressure(after, point.context) * rate
-    }
-
-    /// Pressure in Pa at a point before the step.
-    fn pressure_before(&self, point: &Point<D>) -> f64 {
-        let is_stored = point.unknown.has_pressure() && self.law.damping() > 0.0;
-        if self.law.has_vertical_parts() || is_stored {
-            return point.pressure_before;
-        }
-        let penetration = point.penetration_before;
-        let context =
-            NodeContext { penetration, depth_before: penetration.max(0.0), ..NodeContext::AT_THE_GAP };
-        self.law.pressure(0.0, context)
+        self.normal.law.damping_pressure(after, point.context) * rate
     }
 
     /// Energy in J stored at `time`, from displacements with ghosts.
     pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> Result<f64> {
-        if self.law.energy(0.0).is_none() {
+        if self.normal.law.energy(0.0).is_none() {
             return Ok(0.0);
         }
         let energy = |point: &Point<D>| {
             let [along, gap] = self.position_at(time, displacement, point)?;
-            let stored = self.law.energy(along - gap);
+            let stored = self.normal.law.energy(along - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };
-        self.points.iter().map(energy).sum()
+        self.normal.points.iter().map(energy).sum()
     }
 }

@@ -34,12 +34,12 @@ mod friction;
 mod inclusion;
 mod loaded_obstacle;
 mod newton;
+mod normal;
 mod point;
 mod prepare;
 mod reference;
 mod resultant;
 mod sliding;
-mod squares;
 mod starts;
 mod sweep;
 mod tangential_point;
@@ -57,6 +57,7 @@ use crate::{
     mesh::Mesh,
     parallel::session::Session,
 };
+use normal::NormalContact;
 use point::{Point, Vectors::Body, gauss_points};
 use std::collections::BTreeSet;
 
@@ -91,8 +92,8 @@ pub struct ContactConditions<const D: usize> {
 /// A law on a contact boundary.
 #[derive(Debug)]
 pub struct Contact<const D: usize> {
-    /// The law.
-    pub law: NormalResponse,
+    /// The law along the normal, with the points.
+    pub normal: NormalContact<D>,
     /// Distance to the obstacle along the normal.
     pub gap: Gap,
     /// The motion of the obstacle, if a force moves it.
@@ -108,8 +109,6 @@ pub struct Contact<const D: usize> {
     pub shares_of_heat: [f64; 2],
     /// How near body and obstacle have come in the steps so far, on this rank.
     pub closeness: Closeness,
-    /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
-    pub scale: f64,
     /// The formula of the obstacle's velocity in the current step.
     rate: Rate,
     /// The blend of earlier states from which the current step starts.
@@ -117,11 +116,11 @@ pub struct Contact<const D: usize> {
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
     pub reference: ReferenceValues,
     /// The longest side of the box around the body in m.
-    size: f64,
-    facets: Vec<u32>,
+    pub body_size: f64,
+    /// Facets of this rank, by local numbers.
+    pub facets: Vec<u32>,
     /// Whether it is against another body.
-    is_paired: bool,
-    points: Vec<Point<D>>,
+    pub is_paired: bool,
     /// Nodes that this rank owns.
     owned: usize,
     /// Friction, if there is any.
@@ -129,9 +128,6 @@ pub struct Contact<const D: usize> {
     /// Nodes at which points meet whose normals are not orthogonal, as lists of contacts and their points; each node is in the list of
     /// one of these contacts.
     edges: Vec<Vec<(usize, usize)>>,
-    needs_ghosts: bool,
-    /// The share of the slopes of decreasing branches in the derivatives.
-    softening: f64,
 }
 
 impl<const D: usize> Contact<D> {
@@ -175,7 +171,7 @@ impl<const D: usize> Contact<D> {
         let needs_ghosts = quadrature == Quadrature::Gauss;
         let reference = ReferenceValues::default();
         Ok(Self {
-            law,
+            normal: NormalContact { law, scale, softening: 1.0, needs_ghosts, points },
             gap,
             obstacle: None,
             follows: true,
@@ -183,26 +179,22 @@ impl<const D: usize> Contact<D> {
             wear: None,
             shares_of_heat: [1.0, 0.0],
             closeness: Closeness::default(),
-            scale,
             rate: Rate::euler(0.0, 1.0),
             blend: Blend::euler(0.0),
             reference,
-            size: longest_side(session, &mesh.nodes),
+            body_size: longest_side(session, &mesh.nodes),
             facets: facets.to_vec(),
             is_paired,
-            points,
             owned: mesh.owned,
             friction: None,
             edges: Vec::new(),
-            needs_ghosts,
-            softening: 1.0,
         })
     }
 
     /// Adds to the weight of a point and of its friction.
     fn add_weight(&mut self, at: usize, weight: f64) {
-        let factor = 1.0 + weight / self.points[at].weight;
-        self.points[at].scale_weight(factor);
+        let factor = 1.0 + weight / self.normal.points[at].weight;
+        self.normal.points[at].scale_weight(factor);
         let friction = self.friction.iter_mut().flat_map(|friction| &mut friction.points);
         friction.filter(|point| point.at == at).for_each(|point| point.weight *= factor);
     }
@@ -220,7 +212,7 @@ impl<const D: usize> Contact<D> {
             friction.partly_held.iter_mut().for_each(|(at, _)| *at = after(*at));
         }
         let mut number = 0..;
-        self.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));
+        self.normal.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));
     }
 
     /// Commits the motion of the obstacle in a step.
@@ -242,41 +234,16 @@ impl<const D: usize> Contact<D> {
         Ok(point.stretch * self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
     }
 
-    /// Whether it is against another body.
-    pub fn is_paired(&self) -> bool {
-        self.is_paired
-    }
-
     /// Whether the surface of the obstacle may move.
     fn surface_may_move(&self) -> bool {
         self.obstacle.is_some() || self.gap.surface_may_move()
     }
 
-    /// Whether velocities of ghost nodes are read and forces on them are written.
-    pub fn needs_ghosts(&self) -> bool {
-        self.needs_ghosts
-    }
-
-    /// Quadrature points on this rank.
-    pub fn point_count(&self) -> usize {
-        self.points.len()
-    }
-
-    /// Facets of this rank, by local numbers.
-    pub fn facets(&self) -> &[u32] {
-        &self.facets
-    }
-
-    /// Size of the boundary on this rank, in m^(D-1).
-    pub fn area(&self) -> f64 {
-        self.points.iter().map(Point::area).sum()
-    }
-
     /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`
     /// along the free normal, or along the normal where the point stops the obstacle, and `-sigma_tau` with what supports take up of it.
     pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
-        for point in self.points.iter().filter(|_| !self.needs_ghosts) {
-            point.add_traction(point.pressure_at(&self.law, Body, velocity), nodal);
+        for point in self.normal.points.iter().filter(|_| !self.normal.needs_ghosts) {
+            point.add_traction(point.pressure_at(&self.normal.law, Body, velocity), nodal);
         }
         if let Some(friction) = &self.friction {
             friction.add_tractions(nodal);

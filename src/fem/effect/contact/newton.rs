@@ -15,7 +15,7 @@ impl<const D: usize> Contact<D> {
     /// Sets the numbers of all nodes in the vectors of Newton's method, given their local numbers. Before this call both are
     /// the same. The solver of a run's steps calls this function when it is created.
     pub fn number_unknowns(&mut self, number: impl Fn(usize) -> usize) {
-        self.points.iter_mut().for_each(|point| point.number_unknowns(&number));
+        self.normal.points.iter_mut().for_each(|point| point.number_unknowns(&number));
         for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
             point.numbers[Newton as usize] = number(point.node());
         }
@@ -24,14 +24,15 @@ impl<const D: usize> Contact<D> {
     /// Converts velocities into unknowns, with the pressures of the law at these velocities; where its graph has vertical parts or depends
     /// on the sliding velocity, with the pressures of the points.
     pub fn unmap(&self, values: &mut [f64]) {
-        let has_own_pressures = self.law.has_vertical_parts() || self.wear.is_some();
-        for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
+        let has_own_pressures = self.normal.law.has_vertical_parts() || self.wear.is_some();
+        for point in self.normal.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let pressure = if has_own_pressures {
                 point.pressure
             } else {
-                self.law.pressure(point.normal_component(Newton, values), point.context)
+                self.normal.law.pressure(point.normal_component(Newton, values), point.context)
             };
-            let parameter = pressure / (self.scale * point.free_length) - point.carried / point.free_length;
+            let parameter =
+                pressure / (self.normal.scale * point.free_length) - point.carried / point.free_length;
             point.add_along(Newton, parameter, values);
         }
         if let Some(friction) = &self.friction {
@@ -42,8 +43,8 @@ impl<const D: usize> Contact<D> {
     /// Converts unknowns into velocities, and sets the corresponding pressures of the points.
     pub fn map(&mut self, values: &mut [f64]) {
         self.erode(values);
-        let (law, scale) = (&self.law, self.scale);
-        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+        let (law, scale) = (&self.normal.law, self.normal.scale);
+        for point in self.normal.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let along = point.along(Newton, values);
             let found = point.resolve(law, scale, along);
             point.pressure = found.pressure;
@@ -52,15 +53,15 @@ impl<const D: usize> Contact<D> {
             point.add_along(Newton, found.velocity / point.free_length, values);
         }
         if let Some(friction) = &mut self.friction {
-            friction.map(&self.points, values);
+            friction.map(&self.normal.points, values);
         }
     }
 
     /// Adds the contact forces in N to `forces`: those of the pressures of the points, or, at points whose unknown is the velocity,
     /// of the pressures at `velocity`.
     pub fn add_forces(&self, velocity: &[f64], forces: &mut [f64]) {
-        for point in &self.points {
-            point.add_force(Newton, point.pressure_at(&self.law, Newton, velocity), forces);
+        for point in &self.normal.points {
+            point.add_force(Newton, point.pressure_at(&self.normal.law, Newton, velocity), forces);
         }
         if let Some(friction) = &self.friction {
             friction.add_forces(forces);
@@ -69,15 +70,20 @@ impl<const D: usize> Contact<D> {
 
     /// The branch of every point at these velocities, to count changes of the active set.
     pub fn branches(&self, velocity: &[f64], out: &mut Vec<u8>) {
-        out.extend(self.points.iter().map(|point| {
+        out.extend(self.normal.points.iter().map(|point| {
             let along = point.normal_component(Newton, velocity);
             let branch = match point.unknown {
                 Unknown::Parameter => {
-                    self.law
-                        .resolve_worn(self.scale * along + point.pressure, self.scale, point.context)
+                    self.normal
+                        .law
+                        .resolve_worn(
+                            self.normal.scale * along + point.pressure,
+                            self.normal.scale,
+                            point.context,
+                        )
                         .branch
                 }
-                Unknown::Velocity => self.law.branch(along, point.context),
+                Unknown::Velocity => self.normal.law.branch(along, point.context),
                 Unknown::Stop => usize::from(point.pressure > 0.0),
                 Unknown::Held => 0,
             };
@@ -90,7 +96,7 @@ impl<const D: usize> Contact<D> {
 
     /// Removes from nodal values the motions of all nodal points.
     pub fn remove_motions(&self, values: &mut [f64]) {
-        for point in &self.points {
+        for point in &self.normal.points {
             match point.unknown {
                 Unknown::Parameter => point.add_along(Newton, -point.along(Newton, values), values),
                 Unknown::Velocity => values[point.first(Newton) * D..][..D].fill(0.0),
@@ -102,18 +108,12 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Sets the share of the slopes of decreasing branches in the derivatives: with 1 these are the derivatives of the graphs, with 0
-    /// decreasing branches count as constant, so that no derivative is negative.
-    pub fn set_softening(&mut self, share: f64) {
-        self.softening = share;
-    }
-
     /// Computes the derivatives of the laws at these unknowns, and converts `velocity`, a copy of the unknowns, into velocities as
     /// [`map`](Self::map) does.
     pub fn linearise_parameters(&mut self, unknowns: &[f64], velocity: &mut [f64]) {
         self.map(velocity);
-        let (law, scale, softening) = (&self.law, self.scale, self.softening);
-        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+        let (law, scale, softening) = (&self.normal.law, self.normal.scale, self.normal.softening);
+        for point in self.normal.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let derivative = point.resolve(law, scale, point.along(Newton, unknowns)).derivative;
             point.theta = scale * derivative;
             point.slope = if derivative > 0.0 { 1.0 / derivative - scale } else { 0.0 };
@@ -123,36 +123,28 @@ impl<const D: usize> Contact<D> {
             }
         }
         if let Some(friction) = &mut self.friction {
-            friction.linearise(&self.points, unknowns);
+            friction.linearise(&self.normal.points, unknowns);
             friction.keep_share_of_decreases(softening);
-        }
-    }
-
-    /// Computes the slopes of the law at these velocities, where the velocity is the unknown.
-    pub fn linearise_velocities(&mut self, velocity: &[f64]) {
-        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Velocity) {
-            point.slope = self.law.slope(point.normal_component(Newton, velocity), point.context);
-            point.slope *= if point.slope < 0.0 { self.softening } else { 1.0 };
         }
     }
 
     /// Converts a change of the unknowns into the change of the velocities, and sets the changes of the pressures of the points.
     pub fn map_direction(&mut self, values: &mut [f64]) {
-        let scale = self.scale;
-        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+        let scale = self.normal.scale;
+        for point in self.normal.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let along = point.along(Newton, values);
             point.change = scale * point.free_length * (1.0 - point.theta) * along;
             point.add_along(Newton, (point.theta - 1.0) * along, values);
         }
         if let Some(friction) = &mut self.friction {
-            friction.map_direction(&self.points, values);
+            friction.map_direction(&self.normal.points, values);
         }
     }
 
     /// Adds the change of the contact forces: of the direction last mapped or, where the unknown is the velocity, of the change
     /// `direction` of the velocity.
     pub fn add_derivative(&self, direction: &[f64], forces: &mut [f64]) {
-        self.add_changes(direction, |point| point.change, forces);
+        self.normal.add_changes(direction, |point| point.change, forces);
         if let Some(friction) = &self.friction {
             friction.add_derivative(forces);
         }
@@ -161,23 +153,9 @@ impl<const D: usize> Contact<D> {
     /// Adds the change of the contact forces with the velocity; zero where the graph is vertical.
     pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
         let change = |point: &Point<D>| point.slope * point.free_length * point.along(Newton, direction);
-        self.add_changes(direction, change, forces);
+        self.normal.add_changes(direction, change, forces);
         if let Some(friction) = &self.friction {
-            friction.add_slopes(&self.points, direction, forces);
-        }
-    }
-
-    /// Adds the forces of the changes of the pressures: of these where the unknown is the parameter, and of the change `direction` of the
-    /// velocity where it is the velocity.
-    #[inline]
-    fn add_changes(&self, direction: &[f64], of_parameter: impl Fn(&Point<D>) -> f64, forces: &mut [f64]) {
-        for point in &self.points {
-            let change = match point.unknown {
-                Unknown::Parameter => of_parameter(point),
-                Unknown::Velocity => point.slope * point.normal_component(Newton, direction),
-                Unknown::Held | Unknown::Stop => continue,
-            };
-            point.add_force(Newton, change, forces);
+            friction.add_slopes(&self.normal.points, direction, forces);
         }
     }
 
@@ -185,13 +163,13 @@ impl<const D: usize> Contact<D> {
     /// of the velocities.
     pub fn reduce(&self, values: &mut [f64]) {
         if let Some(friction) = &self.friction {
-            friction.reduce(&self.points, values);
+            friction.reduce(&self.normal.points, values);
         }
     }
 
     /// Removes from nodal values the motions of points on vertical parts of the graph.
     pub fn project(&self, values: &mut [f64]) {
-        self.points.iter().filter(|p| p.theta == 0.0).for_each(|point| point.hold(Newton, values));
+        self.normal.points.iter().filter(|p| p.theta == 0.0).for_each(|point| point.hold(Newton, values));
         if let Some(friction) = &self.friction {
             friction.project(values);
         }
@@ -200,23 +178,23 @@ impl<const D: usize> Contact<D> {
     /// Converts a change of velocities into the change of the unknowns. `open` contains the forces in N that remain unbalanced
     /// after the change of velocities.
     pub fn unmap_direction(&self, open: &[f64], values: &mut [f64]) {
-        for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
+        for point in self.normal.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let change = if point.theta == 0.0 {
                 point.share(Newton, open)
-                    / (self.scale * point.weight * point.free_length * point.free_length)
+                    / (self.normal.scale * point.weight * point.free_length * point.free_length)
             } else {
                 (1.0 / point.theta - 1.0) * point.along(Newton, values)
             };
             point.add_along(Newton, change, values);
         }
         if let Some(friction) = &self.friction {
-            friction.unmap_direction(&self.points, self.scale, open, values);
+            friction.unmap_direction(&self.normal.points, self.normal.scale, open, values);
         }
     }
 
     /// Hash that differs between linearisations whose points are on different branches.
     pub fn set_digest(&self) -> u64 {
-        let normal = self.points.iter().flat_map(|p| [p.theta, p.slope]);
+        let normal = self.normal.points.iter().flat_map(|p| [p.theta, p.slope]);
         let numbers = normal.chain(self.friction.iter().flat_map(Friction::numbers));
         let mut digest = Xxh3::new();
         numbers.for_each(|number| digest.update(&number.to_le_bytes()));

@@ -266,6 +266,16 @@ impl<const D: usize> Point<D> {
         sum
     }
 
+    /// How far it moves along its normal in the step, in m, at these velocities.
+    pub(super) fn advance(&self, vectors: Vectors, velocity: &[f64]) -> f64 {
+        self.context.step_length * self.normal_component(vectors, velocity)
+    }
+
+    /// Its penetration in m at the end of the step, at these velocities of Newton's method.
+    pub(super) fn depth(&self, velocity: &[f64]) -> f64 {
+        self.context.penetration + self.advance(Vectors::Newton, velocity)
+    }
+
     /// Magnitude of the mean of velocities in vectors of Newton's method.
     pub(super) fn speed(&self, nodal: &[f64]) -> f64 {
         let mean =

@@ -1,10 +1,6 @@
 //! Preparation of a step at the points of a contact. Vectors are those of the body.
 
-use super::{
-    Contact,
-    point::{Point, Vectors::Body},
-    tangential_point::ROUNDING,
-};
+use super::{Contact, point::Vectors::Body, tangential_point::ROUNDING};
 use crate::{
     error::{Error, Result},
     fem::effect::{Blend, Step},
@@ -21,13 +17,13 @@ impl<const D: usize> Contact<D> {
         self.blend = blend;
         let time = blend.balanced(step).time;
         self.friction.iter_mut().for_each(|friction| friction.start_step(blend, time));
-        if !self.law.depends_on_displacement() {
+        if !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
         let (time, time_before) = (step.time, step.start());
         let step_length = blend.way();
-        for at in 0..self.points.len() {
-            let point = &self.points[at];
+        for at in 0..self.normal.points.len() {
+            let point = &self.normal.points[at];
             let [after, before] = match &self.obstacle {
                 None => [point.place; 2],
                 Some(obstacle) => [obstacle.seen_after(&point.place), obstacle.seen_before(&point.place)],
@@ -37,7 +33,7 @@ impl<const D: usize> Contact<D> {
             let allowance = point.allowance;
             let gap = self.gap_of(point, time, &after, along - worn)? + allowance;
             let before = self.gap_of(point, time_before, &before, along - worn)? + allowance;
-            let point = &mut self.points[at];
+            let point = &mut self.normal.points[at];
             point.reach = gap;
             point.moved = along - worn;
             point.penetration_before = along - before - worn;
@@ -58,9 +54,9 @@ impl<const D: usize> Contact<D> {
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
         if let Some(friction) = &mut self.friction {
-            friction.mark_bare_points(&self.points);
+            friction.mark_bare_points(&self.normal.points);
         }
-        if self.law.damping() > 0.0 {
+        if self.normal.law.damping() > 0.0 {
             self.set_depths_before(time_before - step.previous_length)?;
         }
         self.follow_obstacle(true);
@@ -72,8 +68,8 @@ impl<const D: usize> Contact<D> {
     /// Sets the depths from which dashpots move in the step, where `earlier` is the time in s before the last step.
     fn set_depths_before(&mut self, earlier: f64) -> Result<()> {
         let blend = self.blend;
-        for at in 0..self.points.len() {
-            let point = &self.points[at];
+        for at in 0..self.normal.points.len() {
+            let point = &self.normal.points[at];
             let recent = point.penetration_before.max(0.0);
             let depth = if blend.earlier == 0.0 {
                 recent
@@ -86,36 +82,25 @@ impl<const D: usize> Contact<D> {
                 let gap = self.gap_of(point, earlier, &seen, moved)?;
                 blend.of(recent, (moved - gap).max(0.0)).max(0.0)
             };
-            self.points[at].context.depth_before = depth;
+            self.normal.points[at].context.depth_before = depth;
         }
         Ok(())
     }
 
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
     pub fn restore_pressures(&mut self, traction: &[f64]) {
-        for point in self.points.iter_mut().filter(|p| p.unknown.has_pressure()) {
+        for point in self.normal.points.iter_mut().filter(|p| p.unknown.has_pressure()) {
             point.pressure = point.pressure_in(traction);
             point.pressure_before = point.pressure;
         }
         if let Some(friction) = &mut self.friction {
-            friction.restore_pressures(&self.points, traction);
+            friction.restore_pressures(&self.normal.points, traction);
         }
     }
 
     /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
     pub fn has_moving_obstacle(&self) -> bool {
         self.friction.is_some() && self.surface_may_move()
-    }
-
-    /// The sum over points on this rank of the squares of the forces in N that would push them out of the obstacle in the started step,
-    /// each alone.
-    pub fn square_of_closing_forces(&self) -> f64 {
-        let force = |point: &Point<D>| {
-            let NodeContext { penetration, step_length, .. } = point.context;
-            let speed = if penetration > 0.0 { penetration / step_length } else { 0.0 };
-            point.weight * self.reference.resistance[0] * speed
-        };
-        self.points.iter().map(|point| force(point).powi(2)).sum()
     }
 
     /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
@@ -134,7 +119,7 @@ impl<const D: usize> Contact<D> {
             return Ok(());
         };
         let obstacle = self.obstacle.as_ref();
-        let (points, motion) = (&self.points, self.gap.motion::<D>(rate)?);
+        let (points, motion) = (&self.normal.points, self.gap.motion::<D>(rate)?);
         let velocity = |at: usize| {
             let point = &points[at];
             let seen = obstacle.map_or(point.place, |obstacle| obstacle.seen_after(&point.place));

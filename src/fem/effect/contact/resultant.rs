@@ -57,8 +57,8 @@ impl<const D: usize> Contact<D> {
     /// Areas and pressures on this rank in the step just solved, at its velocities with ghosts.
     pub fn areas(&self, velocity: &[f64]) -> ContactAreas {
         let mut areas = ContactAreas { largest_pressure: f64::NEG_INFINITY, ..ContactAreas::default() };
-        for point in self.points.iter().filter(|point| point.carries(&self.law)) {
-            let pressure = point.pressure_at(&self.law, Body, velocity);
+        for point in self.normal.points.iter().filter(|point| point.carries(&self.normal.law)) {
+            let pressure = point.pressure_at(&self.normal.law, Body, velocity);
             if pressure == 0.0 {
                 areas.open += point.area();
             } else {
@@ -69,7 +69,7 @@ impl<const D: usize> Contact<D> {
         }
         if let Some(friction) = &self.friction {
             for ((motion, weight), tangential) in friction.motions(Body, velocity).zip(&friction.points) {
-                let area = self.points[tangential.at].stretch * weight;
+                let area = self.normal.points[tangential.at].stretch * weight;
                 match motion {
                     FrictionStatus::Sticks => areas.sticking += area,
                     FrictionStatus::Slides => areas.slipping += area,
@@ -88,14 +88,14 @@ impl<const D: usize> Contact<D> {
         [displacement, velocity, traction]: [&[f64]; 3],
         mut visit: impl FnMut(usize, PointState<D>),
     ) -> Result<()> {
-        if self.needs_ghosts {
+        if self.normal.needs_ghosts {
             return Ok(());
         }
         let friction = self.friction.as_ref();
         let mut moving =
             friction.into_iter().flat_map(|friction| friction.sliding(Body, velocity)).peekable();
         let mut motions = friction.into_iter().flat_map(|friction| friction.motions(Body, velocity));
-        for (at, point) in self.points.iter().enumerate() {
+        for (at, point) in self.normal.points.iter().enumerate() {
             let mut state =
                 PointState { normal: point.normal, direction: point.direction, ..PointState::default() };
             while let Some((tangential, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
@@ -104,18 +104,19 @@ impl<const D: usize> Contact<D> {
                 state.friction = add_scaled(&free, 1.0, &held);
                 state.sticks = motions.next().map(|(motion, _)| motion == FrictionStatus::Sticks);
             }
-            if point.carries(&self.law) {
+            if point.carries(&self.normal.law) {
                 let along = point.velocity_along_normal(Body, velocity);
                 if point.unknown.has_pressure() {
                     state.pressure = point.pressure_in(traction);
-                    let parameter = self.scale * along + state.pressure;
-                    state.branch = self.law.resolve_worn(parameter, self.scale, point.context).branch;
+                    let parameter = self.normal.scale * along + state.pressure;
+                    state.branch =
+                        self.normal.law.resolve_worn(parameter, self.normal.scale, point.context).branch;
                 } else {
-                    state.pressure = point.pressure_at(&self.law, Body, velocity);
-                    state.branch = self.law.branch(along, point.context);
+                    state.pressure = point.pressure_at(&self.normal.law, Body, velocity);
+                    state.branch = self.normal.law.branch(along, point.context);
                 }
             }
-            if self.law.depends_on_displacement() {
+            if self.normal.law.depends_on_displacement() {
                 let [along, gap] = self.position_at(time, displacement, point)?;
                 state.gap = (gap - along) / point.stretch;
             }
@@ -127,8 +128,8 @@ impl<const D: usize> Contact<D> {
     /// Visits the forces in N on the body at the nodes of points on this rank in the step just solved, at its velocities with ghosts.
     /// They include those that supports take up.
     pub fn forces(&self, velocity: &[f64], mut visit: impl FnMut(u32, Vector<D>)) {
-        for point in &self.points {
-            point.forces(point.pressure_at(&self.law, Body, velocity), &mut visit);
+        for point in &self.normal.points {
+            point.forces(point.pressure_at(&self.normal.law, Body, velocity), &mut visit);
         }
         for point in self.friction.iter().flat_map(|friction| &friction.points) {
             visit(point.node() as u32, point.whole_traction().map(|q| -point.weight * q));

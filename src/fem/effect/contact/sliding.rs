@@ -5,7 +5,7 @@ use super::{
     friction::Friction,
     point::{
         Point, Unknown,
-        Vectors::{self, Body, Newton},
+        Vectors::{Body, Newton},
     },
     tangential_point::TangentialPoint,
 };
@@ -28,12 +28,12 @@ impl<const D: usize> Contact<D> {
     /// [`choose_unknowns`](super::choose_unknowns). Refuses supports that leave no tangent, and missing pressure where the law
     /// needs one.
     pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, held: &Held<D>) -> Result<()> {
-        if self.needs_ghosts {
+        if self.normal.needs_ghosts {
             return Err(Error::Refused(
                 "friction is not available at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
-        self.friction = Some(Friction::new(law, &self.points, self.surface_may_move(), mesh, held)?);
+        self.friction = Some(Friction::new(law, &self.normal.points, self.surface_may_move(), mesh, held)?);
         Ok(())
     }
 
@@ -41,7 +41,7 @@ impl<const D: usize> Contact<D> {
     /// forces drive.
     pub fn fix_bounds(&mut self) {
         let Some(friction) = &mut self.friction else { return };
-        friction.update_pressures(&self.points);
+        friction.update_pressures(&self.normal.points);
         if self.obstacle.is_some() && friction.law.follows_pressure() {
             friction.points.iter_mut().for_each(|point| point.follows = point.pressure != 0.0);
         }
@@ -54,7 +54,7 @@ impl<const D: usize> Contact<D> {
         friction.advance_histories(velocity, blend);
         let Some(wear) = self.wear else { return };
         for (sliding, slip) in friction.sliding(Body, velocity) {
-            let point = &mut self.points[sliding.at];
+            let point = &mut self.normal.points[sliding.at];
             let after = worn_after(point, wear, (velocity, norm(&slip)));
             point.worn = [after, point.worn[0]];
         }
@@ -68,7 +68,7 @@ impl<const D: usize> Contact<D> {
     pub(super) fn erode(&mut self, values: &[f64]) {
         let Some((wear, friction)) = self.wear.zip(self.friction.as_ref()) else { return };
         for sliding in &friction.points {
-            let point = &mut self.points[sliding.at];
+            let point = &mut self.normal.points[sliding.at];
             if point.unknown != Unknown::Parameter {
                 continue;
             }
@@ -78,7 +78,7 @@ impl<const D: usize> Contact<D> {
             point.context.erosion = 0.0;
             for _ in 0..EROSION_ITERATIONS {
                 let pressure = if friction.follows {
-                    point.resolve(&self.law, self.scale, along).pressure
+                    point.resolve(&self.normal.law, self.normal.scale, along).pressure
                 } else {
                     sliding.pressure
                 };
@@ -116,7 +116,7 @@ impl<const D: usize> Contact<D> {
         let Some(friction) = &self.friction else { return out };
         let blend = self.blend.to_end();
         for (sliding, slip) in friction.sliding(Body, velocity) {
-            let (speed, point) = (friction.speed(sliding, &slip), &self.points[sliding.at]);
+            let (speed, point) = (friction.speed(sliding, &slip), &self.normal.points[sliding.at]);
             if let Some(history) = friction.law.history() {
                 let after = friction.law.history_after(sliding.history, blend, speed);
                 let values = [after, sliding.history[0], sliding.history[1], history.initial];
@@ -172,20 +172,15 @@ impl<const D: usize> Contact<D> {
 
     /// Both laws.
     pub fn laws(&self) -> LawsOfContact<'_> {
-        LawsOfContact { normal: &self.law, friction: self.friction.as_ref().map(|friction| &friction.law) }
+        LawsOfContact {
+            normal: &self.normal.law,
+            friction: self.friction.as_ref().map(|friction| &friction.law),
+        }
     }
 
     /// The steepest decrease in Pa s/m of the normal graph in the current step.
     pub fn monotonicity_constant(&self) -> f64 {
-        self.law.monotonicity_constant(self.blend.way())
-    }
-
-    /// The largest contact pressure in Pa at points on this rank, at least 0, in the step just solved, at its velocities with
-    /// ghosts.
-    pub fn largest_pressure(&self, velocity: &[f64]) -> f64 {
-        self.points
-            .iter()
-            .fold(0.0, |most, point| larger(most, point.pressure_at(&self.law, Vectors::Body, velocity)))
+        self.normal.law.monotonicity_constant(self.blend.way())
     }
 }
 
@@ -212,7 +207,7 @@ const WEAR: Quantity = quantity!("wear");
 impl<const D: usize> HistoryStore for Contact<D> {
     fn values(&self, moment: Moment) -> Option<History<'_>> {
         let friction = self.friction.as_ref().filter(|_| self.wear.is_some())?;
-        let worn = |at: usize| self.points[at].worn[moment as usize];
+        let worn = |at: usize| self.normal.points[at].worn[moment as usize];
         let values = friction.points.iter().map(|sliding| (sliding.node(), worn(sliding.at)));
         Some(History::of_nodes((WEAR, moment), self.owned, values))
     }
@@ -224,7 +219,7 @@ impl<const D: usize> HistoryStore for Contact<D> {
         };
         // Of the points at an edge only one has friction, and wears.
         for sliding in &friction.points {
-            self.points[sliding.at].worn[moment as usize] = values[sliding.node()];
+            self.normal.points[sliding.at].worn[moment as usize] = values[sliding.node()];
         }
     }
 }

@@ -4,10 +4,8 @@ use super::{
     Contact,
     closeness::{Closeness, Gaps},
     loaded_obstacle::LoadedObstacle,
-    point::{
-        Point, Unknown,
-        Vectors::{self, Body},
-    },
+    normal::NormalContact,
+    point::{Point, Unknown, Vectors::Body},
     tangential_point::tangents,
 };
 use crate::{
@@ -31,18 +29,49 @@ fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
     along / point.stretch / point.facet_size
 }
 
+impl<const D: usize> NormalContact<D> {
+    /// The largest slip of points on this rank along another body since they began to face it, as a share of the size of the facets there,
+    /// at displacements that are relative to it.
+    pub fn slip(&self, displacement: &[f64]) -> f64 {
+        let facing = self.points.iter().filter(|point| point.distance.is_finite());
+        facing.map(|point| slip(point, displacement)).fold(0.0, larger)
+    }
+
+    /// The nodes of the points on this rank that face nothing of the other body, with the sizes in m of the facets there.
+    pub fn facing_nothing(&self) -> impl Iterator<Item = (usize, f64)> {
+        let points = self.points.iter().filter(|point| !point.distance.is_finite());
+        points.map(|point| (point.node(), point.facet_size))
+    }
+
+    /// Whether points may be inside of the body that they face, see [`allow_depths`](Self::allow_depths).
+    pub fn keeps_depths(&self) -> bool {
+        self.points.iter().any(|point| point.overlap > 0.0)
+    }
+
+    /// Sets the depths that points may have in the body that they face in the next step, at whose end they will be at these displacements
+    /// relative to it if they move on as they do. What nodes face on a surface that is inclined or deformed jumps when it is found anew. A law
+    /// without a finite pressure would remove the depth within one step, however short, and thus throw the bodies apart; over the slip
+    /// until they face anew they move as the surface rises.
+    pub fn allow_depths(&mut self, displacement: &[f64]) {
+        for point in &mut self.points {
+            let left = 1.0 - slip(point, displacement) / SLIP_BETWEEN_PAIRINGS;
+            point.allowance = point.overlap * left.max(0.0);
+        }
+    }
+}
+
 impl<const D: usize> Contact<D> {
     /// Fails where the obstacle has passed a point in the step just solved, from displacements at its start and velocities at its end
     /// (with ghosts), and where it is beyond points that should have stopped it.
     pub fn refuse_passage(&self, step: Step, displacement: &[f64], velocity: &[f64]) -> Result<()> {
-        if !self.law.depends_on_displacement() || matches!(self.gap, Gap::Distance(_)) {
+        if !self.normal.law.depends_on_displacement() || matches!(self.gap, Gap::Distance(_)) {
             return Ok(());
         }
         let times = [step.start(), step.time];
         let is_loaded = self.obstacle.as_ref().is_some_and(LoadedObstacle::moves);
-        for point in &self.points {
-            let depth = point.context.penetration + self.advance(point, Body, velocity);
-            if point.unknown == Unknown::Stop && depth > OVERRUN * self.size {
+        for point in &self.normal.points {
+            let depth = point.context.penetration + point.advance(Body, velocity);
+            if point.unknown == Unknown::Stop && depth > OVERRUN * self.body_size {
                 return Err(Error::Failed(format!(
                     "the step to t = {:.6e} s (length {:.3e} s) failed: the obstacle that a force moves is {depth:.3e} m \
                      beyond the boundary at {:?} m, where a support holds the normal, and nowhere along its direction it is outside of \
@@ -53,7 +82,7 @@ impl<const D: usize> Contact<D> {
             }
             let [worn, worn_before] = point.worn;
             let along = point.normal_component(Body, displacement);
-            let moved = along + point.blend_offset + self.advance(point, Body, velocity);
+            let moved = along + point.blend_offset + point.advance(Body, velocity);
             let [before, after] = match &self.obstacle {
                 None => [point.place; 2],
                 Some(obstacle) => [obstacle.seen_before(&point.place), obstacle.seen_after(&point.place)],
@@ -65,7 +94,7 @@ impl<const D: usize> Contact<D> {
                     add_scaled(&after, moved - worn, &point.normal),
                 ],
                 normal: point.normal,
-                body_size: self.size,
+                body_size: self.body_size,
                 loses_obstacle: point.penetration_before > f64::NEG_INFINITY && !point.can_touch(),
             };
             if self.gap.passes(&sweep)? {
@@ -82,26 +111,16 @@ impl<const D: usize> Contact<D> {
         Ok(())
     }
 
-    /// The longest side of the box around the body in m.
-    pub fn body_size(&self) -> f64 {
-        self.size
-    }
-
-    /// How far a point moves along its normal in the step, in m, at these velocities.
-    fn advance(&self, point: &Point<D>, vectors: Vectors, velocity: &[f64]) -> f64 {
-        point.context.step_length * point.normal_component(vectors, velocity)
-    }
-
     /// Keeps how near the obstacle has come in the step just solved, at its velocities with ghosts.
     pub fn keep_closeness(&mut self, velocity: &[f64]) {
-        if !self.law.depends_on_displacement() {
+        if !self.normal.law.depends_on_displacement() {
             return;
         }
         let mut closeness = self.closeness;
-        for point in &self.points {
-            let after = (point.context.penetration + self.advance(point, Body, velocity)) / point.stretch;
-            if point.carries(&self.law) {
-                let presses = point.pressure_at(&self.law, Body, velocity) != 0.0;
+        for point in &self.normal.points {
+            let after = (point.context.penetration + point.advance(Body, velocity)) / point.stretch;
+            if point.carries(&self.normal.law) {
+                let presses = point.pressure_at(&self.normal.law, Body, velocity) != 0.0;
                 closeness.penetration =
                     larger(closeness.penetration, if presses { larger(after, 0.0) } else { after });
             } else {
@@ -117,48 +136,19 @@ impl<const D: usize> Contact<D> {
         if !self.is_paired {
             return;
         }
-        for point in &self.points {
-            if point.pressure_at(&self.law, Body, velocity) != 0.0 {
+        for point in &self.normal.points {
+            if point.pressure_at(&self.normal.law, Body, velocity) != 0.0 {
                 self.closeness.slip = larger(self.closeness.slip, slip(point, displacement));
             }
-        }
-    }
-
-    /// The largest slip of points on this rank along another body since they began to face it, as a share of the size of the facets there,
-    /// at displacements that are relative to it.
-    pub fn slip(&self, displacement: &[f64]) -> f64 {
-        let facing = self.points.iter().filter(|point| point.distance.is_finite());
-        facing.map(|point| slip(point, displacement)).fold(0.0, larger)
-    }
-
-    /// The nodes of the points on this rank that face nothing of the other body, with the sizes in m of the facets there.
-    pub fn facing_nothing(&self) -> impl Iterator<Item = (usize, f64)> {
-        let points = self.points.iter().filter(|point| !point.distance.is_finite());
-        points.map(|point| (point.node(), point.facet_size))
-    }
-
-    /// Whether points may be inside of the body that they face, see [`Contact::allow_depths`].
-    pub fn keeps_depths(&self) -> bool {
-        self.points.iter().any(|point| point.overlap > 0.0)
-    }
-
-    /// Sets the depths that points may have in the body that they face in the next step, at whose end they will be at these displacements
-    /// relative to it if they move on as they do. What nodes face on a surface that is inclined or deformed jumps when it is found anew. A law
-    /// without a finite pressure would remove the depth within one step, however short, and thus throw the bodies apart; over the slip
-    /// until they face anew they move as the surface rises.
-    pub fn allow_depths(&mut self, displacement: &[f64]) {
-        for point in &mut self.points {
-            let left = 1.0 - slip(point, displacement) / SLIP_BETWEEN_PAIRINGS;
-            point.allowance = point.overlap * left.max(0.0);
         }
     }
 
     /// Lets the points of a contact that slides along another body face it, at displacements that are relative to it. Points that are inside
     /// of it keep their depth at first, if wanted and if no finite pressure removes it.
     pub fn face(&mut self, nodes: &[PairedNode<D>], displacement: &[f64], keeps_depth: bool) -> Result<()> {
-        let keeps_depth = keeps_depth && self.law.has_vertical_parts() && self.wear.is_none();
+        let keeps_depth = keeps_depth && self.normal.law.has_vertical_parts() && self.wear.is_none();
         for (at, node) in nodes.iter().enumerate() {
-            let point = &mut self.points[at];
+            let point = &mut self.normal.points[at];
             point.overlap = 0.0;
             if keeps_depth {
                 let own = self.gap.of_moved(0.0, &point.place, &point.normal, 0.0)?;
@@ -171,7 +161,7 @@ impl<const D: usize> Contact<D> {
             (point.distance, point.faced_at) = (node.distance + dot(&moved, &point.normal), moved);
         }
         for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
-            point.weight = self.points[point.at].weight;
+            point.weight = self.normal.points[point.at].weight;
         }
         Ok(())
     }
@@ -187,15 +177,16 @@ impl<const D: usize> Contact<D> {
         let of_point = |point: &Point<D>| {
             let gap = |along: &Vector<D>| {
                 self.gap
-                    .at(time, &add_scaled(&point.place, self.size, along), &point.normal)
+                    .at(time, &add_scaled(&point.place, self.body_size, along), &point.normal)
                     .unwrap_or(f64::NAN)
             };
             let here = gap(&[0.0; D]);
-            let squares = tangents(&point.normal).map(|tangent| ((gap(&tangent) - here) / self.size).powi(2));
+            let squares =
+                tangents(&point.normal).map(|tangent| ((gap(&tangent) - here) / self.body_size).powi(2));
             squares.sum::<f64>().sqrt().atan()
         };
         let is_plane = matches!(self.gap, Gap::Plane(_));
-        let angles = self.points.iter().filter(|point| is_plane && point.can_touch()).map(of_point);
+        let angles = self.normal.points.iter().filter(|point| is_plane && point.can_touch()).map(of_point);
         angles.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], angle| {
             [least.min(angle), most.max(angle)]
         })
@@ -205,7 +196,7 @@ impl<const D: usize> Contact<D> {
     /// it.
     pub fn gaps(&self, time: f64, displacement: &[f64]) -> Gaps {
         let mut gaps = Gaps { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, without: 0 };
-        for point in &self.points {
+        for point in &self.normal.points {
             let Ok([along, gap]) = self.position_at(time, displacement, point) else { continue };
             if gap == f64::INFINITY {
                 gaps.without += 1;

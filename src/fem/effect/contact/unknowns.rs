@@ -21,9 +21,10 @@ const SMOOTH: f64 = 0.766;
 pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
     give_nodes_to_one_contact(contacts);
     let stopping = |contact: &&mut Contact<D>| {
-        contact.law.has_vertical_parts() && contact.obstacle.as_ref().is_some_and(LoadedObstacle::moves)
+        contact.normal.law.has_vertical_parts()
+            && contact.obstacle.as_ref().is_some_and(LoadedObstacle::moves)
     };
-    for point in contacts.iter_mut().filter(stopping).flat_map(|contact| &mut contact.points) {
+    for point in contacts.iter_mut().filter(stopping).flat_map(|contact| &mut contact.normal.points) {
         if point.unknown == Unknown::Held {
             point.unknown = Unknown::Stop;
             (point.direction, point.dual) = (point.normal, point.normal);
@@ -31,15 +32,16 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
     }
     let mut around: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
     for (number, contact) in contacts.iter().enumerate() {
-        if contact.needs_ghosts {
-            if contact.law.has_vertical_parts() || contact.law.depends_on_displacement() {
+        if contact.normal.needs_ghosts {
+            if contact.normal.law.has_vertical_parts() || contact.normal.law.depends_on_displacement() {
                 return Err(Error::Refused(
                     "contact at Gauss points requires a normal law that depends on the velocity and has no jumps: use quadrature = \"nodal\"".into(),
                 ));
             }
             continue;
         }
-        for (at, point) in contact.points.iter().enumerate().filter(|(_, p)| p.unknown == Unknown::Parameter)
+        for (at, point) in
+            contact.normal.points.iter().enumerate().filter(|(_, p)| p.unknown == Unknown::Parameter)
         {
             around.entry(point.node()).or_default().push((number, at));
         }
@@ -47,7 +49,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
     keep_tangents_free_of_normals(contacts, &around);
     let with_friction = give_edges_to_one_friction(contacts);
     for (node, places) in around.into_iter().filter(|(_, places)| places.len() > 1) {
-        let direction = |&(number, at): &(usize, usize)| contacts[number].points[at].direction;
+        let direction = |&(number, at): &(usize, usize)| contacts[number].normal.points[at].direction;
         let skew = (1..places.len()).any(|i| {
             places[..i].iter().any(|other| dot(&direction(other), &direction(&places[i])).abs() > ORTHOGONAL)
         });
@@ -55,7 +57,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
             continue;
         }
         let is_sharp = places.iter().any(|&(number, _)| {
-            contacts[number].law.has_vertical_parts() || contacts[number].obstacle.is_some()
+            contacts[number].normal.law.has_vertical_parts() || contacts[number].obstacle.is_some()
         });
         if is_sharp || with_friction.contains(&node) {
             let directions: Vec<Vector<D>> = places.iter().map(direction).collect();
@@ -67,11 +69,16 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
                      the facets around by `where`"
                 )));
             };
-            places.iter().zip(dual).for_each(|(&(number, at), dual)| contacts[number].points[at].dual = dual);
+            places
+                .iter()
+                .zip(dual)
+                .for_each(|(&(number, at), dual)| contacts[number].normal.points[at].dual = dual);
             contacts[places[0].0].edges.push(places);
             continue;
         }
-        places.into_iter().for_each(|(number, at)| contacts[number].points[at].unknown = Unknown::Velocity);
+        places
+            .into_iter()
+            .for_each(|(number, at)| contacts[number].normal.points[at].unknown = Unknown::Velocity);
     }
     Ok(())
 }
@@ -84,7 +91,7 @@ pub fn set_walls<const D: usize>(contacts: &mut [Contact<D>]) {
             let (mut known, mut count) = ([[0.0; D]; D], 0);
             for place in 0..contacts[owner].edges[edge].len() {
                 let (number, at) = contacts[owner].edges[edge][place];
-                let point = &mut contacts[number].points[at];
+                let point = &mut contacts[number].normal.points[at];
                 if point.theta == 0.0
                     && let Some(wall) = outside(&point.direction, &known[..count], INDEPENDENT)
                 {
@@ -101,7 +108,8 @@ fn keep_tangents_free_of_normals<const D: usize>(
     contacts: &mut [Contact<D>],
     around: &BTreeMap<usize, Vec<(usize, usize)>>,
 ) {
-    let normal = |&(number, at): &(usize, usize)| ((number, at), contacts[number].points[at].direction);
+    let normal =
+        |&(number, at): &(usize, usize)| ((number, at), contacts[number].normal.points[at].direction);
     let normals: BTreeMap<usize, Vec<_>> =
         around.iter().map(|(&node, places)| (node, places.iter().map(normal).collect())).collect();
     for (number, contact) in contacts.iter_mut().enumerate() {
@@ -121,7 +129,7 @@ fn give_edges_to_one_friction<const D: usize>(contacts: &mut [Contact<D>]) -> BT
     let mut strongest: BTreeMap<usize, ((usize, usize), f64, Vector<D>)> = BTreeMap::new();
     for (number, contact) in contacts.iter().enumerate() {
         for point in contact.friction.iter().flat_map(|friction| &friction.points) {
-            let this = ((number, point.at), point.weight, contact.points[point.at].normal);
+            let this = ((number, point.at), point.weight, contact.normal.points[point.at].normal);
             let best = strongest.entry(point.node()).or_insert(this);
             let comes_first = is_larger(point.weight, best.1)
                 || (!is_larger(best.1, point.weight) && is_before(&this.2, &best.2));
@@ -143,20 +151,21 @@ fn give_nodes_to_one_contact<const D: usize>(contacts: &mut [Contact<D>]) {
     let mut kept: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
     let mut given = vec![BTreeSet::new(); contacts.len()];
     for number in 0..contacts.len() {
-        let nodal = if contacts[number].needs_ghosts { 0 } else { contacts[number].points.len() };
+        let nodal =
+            if contacts[number].normal.needs_ghosts { 0 } else { contacts[number].normal.points.len() };
         for at in 0..nodal {
-            let point = &contacts[number].points[at];
+            let point = &contacts[number].normal.points[at];
             let (normal, weight) = (point.normal, point.weight);
             let here = kept.entry(point.node()).or_default();
             let meets = |&(other, at): &(usize, usize)| {
-                other != number && dot(&contacts[other].points[at].normal, &normal) > SMOOTH
+                other != number && dot(&contacts[other].normal.points[at].normal, &normal) > SMOOTH
             };
             let Some(place) = here.iter().position(meets) else {
                 here.push((number, at));
                 continue;
             };
             let (other, other_at) = here[place];
-            let other_weight = contacts[other].points[other_at].weight;
+            let other_weight = contacts[other].normal.points[other_at].weight;
             if is_larger(weight, other_weight) {
                 here[place] = (number, at);
                 contacts[number].add_weight(at, other_weight);

@@ -216,7 +216,7 @@ impl StepSolver {
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
     ) -> Result<()> {
-        if problem.body.contacts.iter().all(|contact| !contact.law.depends_on_displacement()) {
+        if problem.body.contacts.iter().all(|contact| !contact.normal.law.depends_on_displacement()) {
             trial.fill(0.0)?;
         } else {
             let forces = loads(problem, trial)?;
@@ -372,7 +372,11 @@ impl StepSolver {
         let StepProblem { session, body, scale, rounding, .. } = problem;
         if norm == 0.0 && !body.contacts.is_empty() {
             // Nothing but gaps that close sets the body in motion.
-            let square = body.contacts.iter().map(Contact::square_of_closing_forces).sum();
+            let square = body
+                .contacts
+                .iter()
+                .map(|contact| contact.normal.square_of_closing_forces(contact.reference.resistance[0]))
+                .sum();
             norm = session.sum([square])[0].sqrt();
             *scale = norm;
         }
@@ -485,7 +489,7 @@ fn loads<const D: usize, const S: usize>(
 /// The norm of the velocities in m/s above which a body that only contact holds flies away.
 fn farthest<const D: usize, const S: usize>(problem: &StepProblem<'_, D, S>) -> f64 {
     let Some(contact) = problem.body.contacts.first() else { return f64::INFINITY };
-    FAR * contact.body_size() / problem.step.length * (problem.body.mesh.total_nodes as f64).sqrt()
+    FAR * contact.body_size / problem.step.length * (problem.body.mesh.total_nodes as f64).sqrt()
 }
 
 /// Solves a step without contact and flow. Collective.
