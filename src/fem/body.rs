@@ -12,9 +12,9 @@ use crate::{
         coupling::{Coupling, Seen, add_between, seen_by_contacts},
         effect::{
             Contact, Curvature, ELASTIC, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form,
-            Heat, History, HistoryStore, KINETIC, Load, Moment, NUMERICAL, Outcome, PeakSquares, Peaks,
-            Phases, Quantity, RedistributedMass, STORED_IN_CONTACT, Step, StressError, SupportMotion,
-            SurfaceEffect, SurfaceForce, Tangents, Term, VISCOUS,
+            Heat, History, HistoryStore, KINETIC, Load, LoadedMotion, Moment, NUMERICAL, Outcome,
+            PeakSquares, Peaks, Phases, Quantity, RedistributedMass, STORED_IN_CONTACT, Step, StressError,
+            SupportMotion, SurfaceEffect, SurfaceForce, Tangents, Term, VISCOUS,
         },
         pairs::{Pair, shares},
         space::{
@@ -964,10 +964,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
         result
     }
 
+    /// The motions of obstacles that forces drive.
+    pub fn obstacle_motions(&self) -> impl Iterator<Item = &LoadedMotion> {
+        self.contacts.iter().flat_map(|contact| contact.obstacle.motions()).flatten()
+    }
+
     /// Makes all trial histories the converged ones.
     pub fn commit(&mut self) {
         self.visit_histories(&mut |history| history.commit());
-        self.contacts.iter_mut().for_each(Contact::commit);
+        self.contacts.iter_mut().for_each(|contact| contact.obstacle.commit());
     }
 
     /// Extrapolates the histories of cells from the midpoint of a step, which was committed, to its end.

@@ -10,8 +10,8 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Heat, Load, LoadedObstacle,
-            Moment, Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
+            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Heat, Load, Moment,
+            Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
             surface_effects,
         },
         pairs::{Pair, PairedNode, nodes_of},
@@ -130,7 +130,7 @@ fn contacts<const D: usize>(
             };
             session.agree(refuse_moving_contact(contact, mesh, &points, (held, motion)))?;
         }
-        laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
+        contact.obstacle_load.iter().for_each(|load| laws.obstacle.set_load(load));
         laws.wear = contact.wear;
         laws.shares_of_heat = contact.shares_of_heat();
         if pairs.iter().any(|pair| pair.contact == number && pair.exchange.is_some()) {

@@ -74,13 +74,14 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             ));
         }
         let all = body.mesh.nodes.iter();
-        let [_, most] = depths(session, &contact.gap, all);
+        let [_, most] = depths(session, &contact.obstacle.gap, all);
         if deepest > ROUNDING * size || most <= TOO_DEEP * size {
             continue;
         }
         // Other bodies may be anywhere.
         let own = nodes_of_bodies(session, body, contact)?;
-        let [least, most] = depths(session, &contact.gap, own.iter().map(|node| &body.mesh.nodes[*node]));
+        let [least, most] =
+            depths(session, &contact.obstacle.gap, own.iter().map(|node| &body.mesh.nodes[*node]));
         if most <= TOO_DEEP * size {
             continue;
         }
@@ -91,7 +92,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             ));
             continue;
         }
-        let remedy = match contact.gap {
+        let remedy = match contact.obstacle.gap {
             Gap::Sphere(_) => "check `hollow`, which states whether the body is inside the sphere",
             Gap::Shape(_) => {
                 "the distance must be positive outside of the obstacle: reverse the sign of `distance`, or the orientation of \
@@ -141,7 +142,7 @@ fn warning_of_straight_edges<const D: usize>(
     (number, contact): (usize, &Contact<D>),
     on: &str,
 ) -> Result<Option<String>, Agreed> {
-    let is_round = matches!(contact.gap, Gap::Sphere(_) | Gap::Shape(_));
+    let is_round = matches!(contact.obstacle.gap, Gap::Sphere(_) | Gap::Shape(_));
     if mesh.order() == 1 || !is_round || session.total(usize::from(mesh.is_curved)) > 0 {
         return Ok(None);
     }
@@ -264,7 +265,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                  have to carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
             ));
         }
-        let [translation, _] = contact.driven();
+        let [translation, _] = contact.obstacle.motions();
         if let Some(leap) = translation.map(LoadedMotion::longest_way).filter(|leap| *leap > size) {
             out.push(format!(
                 "contact.{number}: the obstacle that a force moves leapt by {leap:.3e} m in one step, more than the size of the body, \

@@ -172,8 +172,7 @@ fn totals_at_start<const D: usize, const S: usize>(
     let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
     let (mine, _) = session.agree(body.energy(state, rest))?;
     let mut energy = mine.map_values(|values| session.sum(values));
-    let motions = body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
-    for motion in motions.flat_map(|obstacle| obstacle.motions()).flatten() {
+    for motion in body.obstacle_motions() {
         energy[OBSTACLE_KINETIC] += motion.kinetic_energy();
     }
     Ok(Totals::at_start(energy))

@@ -4,8 +4,8 @@ use super::run_on;
 use super::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     fem::effect::{
-        Blend, Contact, ContactConditions, Effect, Freedom, Inertia, LoadedObstacle, Quadrature, Step,
-        ViscousStress, choose_unknowns,
+        Blend, Contact, ContactConditions, Effect, Freedom, Inertia, Quadrature, Step, ViscousStress,
+        choose_unknowns,
     },
     job::{Expression, Fix, FixedDirections, Scalar},
     laws::{
@@ -256,18 +256,18 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
     let mut direction = vec![0.1; D];
     direction[0] = 1.0;
     let load = ObstacleLoad { direction, moment: Some(number(0.0)), ..ObstacleLoad::default() };
-    contact.obstacle = Some(LoadedObstacle::new(&load, contact.gap.axis()));
+    contact.obstacle.set_load(&load);
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
     for freedom in Freedom::ALL {
-        contact.driven_mut(freedom).expect("a motion").start(Blend::euler(0.1), 0.1, None);
+        contact.obstacle.motion_mut(freedom).expect("a motion").start(Blend::euler(0.1), 0.1, None);
     }
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
     contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");
     contact.follow_obstacle(true);
     let start = [0.7, -3.0];
     let mut velocities_at = |[along, about]: [f64; 2]| {
-        contact.driven_mut(Freedom::Translation).expect("a motion").set_velocity(along);
-        contact.driven_mut(Freedom::Rotation).expect("a motion").set_velocity(about);
+        contact.obstacle.motion_mut(Freedom::Translation).expect("a motion").set_velocity(along);
+        contact.obstacle.motion_mut(Freedom::Rotation).expect("a motion").set_velocity(about);
         contact.place_obstacle().expect("placed");
         let mut apart = vec![0.0; state.velocity.owned().expect("owned").len()];
         contact.subtract_obstacle(&mut apart);

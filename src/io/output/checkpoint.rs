@@ -104,8 +104,7 @@ impl Header {
         totals: &Totals,
     ) -> Self {
         let motions = |number: usize| {
-            let obstacles = body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
-            obstacles.filter_map(move |obstacle| obstacle.motions()[number])
+            body.contacts.iter().filter_map(move |contact| contact.obstacle.motions()[number])
         };
         Self {
             format: FORMAT,
@@ -401,8 +400,8 @@ fn loaded_motions<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     number: usize,
 ) -> impl Iterator<Item = &mut LoadedMotion> {
-    let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
-    obstacles.filter_map(move |obstacle| obstacle.motions_mut().into_iter().nth(number)?)
+    let motions = body.contacts.iter_mut().map(|contact| contact.obstacle.motions_mut());
+    motions.filter_map(move |motions| motions.into_iter().nth(number)?)
 }
 
 /// What a body keeps in its cells and at its nodes, with the numbers of values of a cell or node.

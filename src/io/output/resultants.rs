@@ -80,11 +80,10 @@ impl<const D: usize> ResultantTable<D> {
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
             let rows = resultants.sources().iter().zip(resultants.rows());
             for (name, (source, (resultant, areas))) in names.iter().zip(rows) {
-                let obstacle = match source {
-                    Source::Contact(at) => body.contacts[*at].obstacle.as_ref(),
-                    _ => None,
+                let motions = match source {
+                    Source::Contact(at) => body.contacts[*at].obstacle.motions(),
+                    _ => [None; 2],
                 };
-                let motions = obstacle.map_or([None; 2], |obstacle| obstacle.motions());
                 let [path, turn] = [0, 1].map(|number| motions[number].map(|motion| motion.balanced()));
                 let moment = &resultant.moment_about(about)[if D == 2 { 2 } else { 0 }..];
                 let [_, of_contacts, of_friction, of_path, of_turn] = *with;

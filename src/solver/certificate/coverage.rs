@@ -11,7 +11,7 @@ use crate::{
 pub(super) fn covers_steps<const D: usize, const S: usize>(body: &Body<D, S>, step_length: f64) -> bool {
     let is_uncovered = |contact: &Contact<D>| {
         contact.friction.as_ref().is_some_and(|friction| friction.law.follows_pressure())
-            || contact.obstacle.is_some()
+            || contact.obstacle.is_driven()
             || contact.laws().decrease_per_pressure(step_length).is_some()
     };
     !body.contacts.iter().any(is_uncovered)
@@ -34,7 +34,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
                 .into(),
         );
     }
-    if contacts.iter().any(|c| c.obstacle.is_some()) {
+    if contacts.iter().any(|c| c.obstacle.is_driven()) {
         words.push(
             "a force or moment moves an obstacle: theta takes the motion of the obstacle as given".into(),
         );

@@ -87,7 +87,7 @@ impl Bounded {
 
 /// Refuses contacts on this rank that are not velocity bounds, and obstacles that forces move.
 pub(super) fn refuse_other_contacts<const D: usize, const S: usize>(body: &Body<D, S>) -> Result<()> {
-    if body.contacts.iter().any(|contact| contact.obstacle.is_some()) {
+    if body.contacts.iter().any(|contact| contact.obstacle.is_driven()) {
         return Err(Error::Refused(
             "[solver] method = \"vinewtonrsls\" does not support obstacles that forces move; use method = \"newton\", or delete \
              [contact.obstacle_load]"

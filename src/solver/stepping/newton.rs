@@ -295,7 +295,9 @@ impl Newton {
             has_user_search: self.has_user_search,
             // Motions of obstacles are not in equilibrium with those of the contact points alone.
             interior_is_linear: !flows
-                && !contacts.iter().any(|contact| contact.normal.needs_ghosts || contact.obstacle.is_some()),
+                && !contacts
+                    .iter()
+                    .any(|contact| contact.normal.needs_ghosts || contact.obstacle.is_driven()),
             flows,
             rubs,
             rubs_obstacles: rubs && !self.obstacles.is_empty(),

@@ -104,7 +104,7 @@ impl ObstacleMotions {
         multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
     ) -> Result<()> {
         (self.tolerance, self.may_part) = (tolerance, true);
-        if contacts.iter().any(|contact| contact.obstacle.is_some()) {
+        if contacts.iter().any(|contact| contact.obstacle.is_driven()) {
             find_contacts(session, contacts, start)?;
         }
         self.set_columns(session, contacts, start, multiply)?;
@@ -128,7 +128,7 @@ impl ObstacleMotions {
             self.may_part = false;
             contacts[contact].follow_obstacle(false);
             for freedom in Freedom::ALL {
-                let Some(motion) = contacts[contact].driven_mut(freedom) else { continue };
+                let Some(motion) = contacts[contact].obstacle.motion_mut(freedom) else { continue };
                 let free = motion.velocity() + motion.change_to_free();
                 if free.is_finite() {
                     motion.set_velocity(free);
@@ -154,7 +154,7 @@ impl ObstacleMotions {
     ) -> Result<()> {
         (self.touched, self.parted) = (None, None);
         let driven = contacts.iter().enumerate().flat_map(|(contact, laws)| {
-            Freedom::ALL.into_iter().zip(laws.driven()).filter_map(move |(freedom, motion)| {
+            Freedom::ALL.into_iter().zip(laws.obstacle.motions()).filter_map(move |(freedom, motion)| {
                 motion.map(|motion| ((contact, freedom), motion.inertia()))
             })
         });
@@ -236,8 +236,7 @@ impl ObstacleMotions {
         }
         for Motion { place: (contact, _), .. } in &self.motions {
             let laws = &mut contacts[*contact];
-            let is_new =
-                laws.follow_along_new_tangents() || (!laws.follows_obstacle() && laws.has_tractions());
+            let is_new = laws.follow_along_new_tangents() || (!laws.obstacle.follows && laws.has_tractions());
             self.work.push(f64::from(u8::from(is_new)));
         }
         for Motion { place: (contact, freedom), .. } in &self.motions {
@@ -257,7 +256,7 @@ impl ObstacleMotions {
         self.values.clear();
         self.unbalanced.clear();
         for (at, Motion { place: (contact, freedom), .. }) in self.motions.iter().enumerate() {
-            let Some(motion) = contacts[*contact].driven_mut(*freedom) else { continue };
+            let Some(motion) = contacts[*contact].obstacle.motion_mut(*freedom) else { continue };
             let [open, terms] = motion.unbalanced(sums[at] - sums[4 * count + at]);
             self.values.push(open + sums[count + at]);
             self.unbalanced.push([open, terms]);
@@ -289,7 +288,7 @@ impl ObstacleMotions {
         }
         let mut placed = Ok(());
         for (Motion { place: (contact, freedom), .. }, change) in self.motions.iter().zip(&self.values) {
-            if let Some(motion) = contacts[*contact].driven_mut(*freedom) {
+            if let Some(motion) = contacts[*contact].obstacle.motion_mut(*freedom) {
                 motion.set_velocity(motion.velocity() - change);
             }
         }
@@ -348,7 +347,7 @@ impl ObstacleMotions {
             let reaction = if area > 0.0 && sign * open < 0.0 { open } else { 0.0 };
             laws.stop(sign, if reaction == 0.0 { 0.0 } else { reaction / area }, velocity);
             if area > 0.0
-                && let Some(driven) = laws.driven_mut(freedom)
+                && let Some(driven) = laws.obstacle.motion_mut(freedom)
             {
                 let others = self.sums[at] - self.sums[4 * count + at];
                 self.unbalanced[at] = driven.unbalanced(others + reaction);
@@ -396,7 +395,7 @@ impl ObstacleMotions {
             if grip > 0.0 || motion.stop.is_some() {
                 continue;
             }
-            let driving = laws.driven()[freedom as usize].map_or(0.0, |motion| motion.driving());
+            let driving = laws.obstacle.motions()[freedom as usize].map_or(0.0, |motion| motion.driving());
             let [open, _] = self.unbalanced.get(at).copied().unwrap_or([-driving, 0.0]);
             if open == 0.0 {
                 motion.approach = Some(0.0);
@@ -404,8 +403,7 @@ impl ObstacleMotions {
             }
             let press = change_to_press(session, contacts, motion, (open, velocity));
             // Relative to a distant obstacle, velocities of the body would be rounding errors.
-            if press.is_none() && freedom == Freedom::Translation && self.may_part && laws.follows_obstacle()
-            {
+            if press.is_none() && freedom == Freedom::Translation && self.may_part && laws.obstacle.follows {
                 self.parted = Some(contact);
                 return Err(Error::Failed(NO_CONTACT.into()));
             }
@@ -450,7 +448,7 @@ impl ObstacleMotions {
     /// Keeps the velocities of all motions.
     pub(super) fn keep<const D: usize>(&mut self, contacts: &[Contact<D>]) {
         let velocity = |(contact, freedom): (usize, Freedom)| {
-            contacts[contact].driven()[freedom as usize].map_or(0.0, LoadedMotion::velocity)
+            contacts[contact].obstacle.motions()[freedom as usize].map_or(0.0, LoadedMotion::velocity)
         };
         self.kept.clear();
         self.kept.extend(self.motions.iter().map(|motion| velocity(motion.place)));
@@ -459,7 +457,7 @@ impl ObstacleMotions {
     /// Sets the velocities that were kept last.
     pub(super) fn restore<const D: usize>(&self, contacts: &mut [Contact<D>]) -> Result<()> {
         for (Motion { place: (contact, freedom), .. }, velocity) in self.motions.iter().zip(&self.kept) {
-            let motion = contacts[*contact].driven_mut(*freedom);
+            let motion = contacts[*contact].obstacle.motion_mut(*freedom);
             motion.into_iter().for_each(|motion| motion.set_velocity(*velocity));
         }
         contacts.iter_mut().try_for_each(Contact::place_obstacle)
@@ -469,7 +467,7 @@ impl ObstacleMotions {
     /// from which gaps are evaluated: velocities are rounded as differences from them.
     pub(super) fn speed<const D: usize>(&self, contacts: &[Contact<D>]) -> f64 {
         let change = |(contact, freedom): (usize, Freedom)| {
-            contacts[contact].driven()[freedom as usize].map_or(0.0, |m| m.change())
+            contacts[contact].obstacle.motions()[freedom as usize].map_or(0.0, |m| m.change())
         };
         let speed = |motion: &Motion| motion.size * (change(motion.place).abs() + motion.places);
         self.motions.iter().map(speed).sum()
@@ -533,9 +531,9 @@ fn find_contacts<const D: usize>(
     start: &DistributedVector,
 ) -> Result<()> {
     let velocity = start.owned()?;
-    for contact in contacts.iter_mut().filter(|contact| contact.obstacle.is_some()) {
+    for contact in contacts.iter_mut().filter(|contact| contact.obstacle.is_driven()) {
         let mut touches = contact.has_tractions() || contact.normal.would_touch(&velocity);
-        let [along, _] = contact.driven();
+        let [along, _] = contact.obstacle.motions();
         if let Some(change) = along.map(LoadedMotion::change_to_free) {
             touches |= contact.change_to_touch(&velocity, change.signum()) <= change.abs();
         }

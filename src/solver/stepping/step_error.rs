@@ -103,8 +103,7 @@ impl ErrorWorkspace {
         let [error, size] = [surface.error, surface.size];
         let mut squares = session.sum([velocity, stresses[0], all_velocity, stresses[1], error, size]);
         // Obstacles that forces move, alike on all ranks.
-        let motions = body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
-        for motion in motions.flat_map(|obstacle| obstacle.motions()).flatten() {
+        for motion in body.obstacle_motions() {
             let unit = if form == Some(Form::Mass) { 1.0 } else { step.length };
             let [error, size] = motion.velocity_error(curvature);
             squares[0] += error / unit;

@@ -21,8 +21,8 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{
-            CONTACT, Energy, Form, Freedom, Heat, LoadedMotion, NUMERICAL, Role, SLIP_BETWEEN_PAIRINGS, Step,
-            THERMAL_WORK, VISCOUS, WORK,
+            CONTACT, Energy, Form, Freedom, Heat, NUMERICAL, Role, SLIP_BETWEEN_PAIRINGS, Step, THERMAL_WORK,
+            VISCOUS, WORK,
         },
         resultants::BalancedMotion,
         state::State,
@@ -508,7 +508,7 @@ impl Stepper {
             work = supports.work(session, body, step, &self.trial, start)?;
         }
         let mut of_obstacles = Energy::default();
-        for motion in driven(body) {
+        for motion in body.obstacle_motions() {
             of_obstacles += motion.energy_of_step(state.time);
         }
         self.find_temperature(session, body, state, step)?;
@@ -660,7 +660,7 @@ impl Stepper {
         let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);
         for (number, contact) in body.contacts.iter_mut().enumerate() {
             for (cause, freedom) in [("force", Freedom::Translation), ("moment", Freedom::Rotation)] {
-                let Some(motion) = contact.driven_mut(freedom) else { continue };
+                let Some(motion) = contact.obstacle.motion_mut(freedom) else { continue };
                 motion.start(blend, time, ratio);
                 let value = motion.driving();
                 if !value.is_finite() {
@@ -696,11 +696,6 @@ impl Stepper {
         }
         Ok(())
     }
-}
-
-/// The motions of obstacles that forces drive.
-fn driven<const D: usize, const S: usize>(body: &Body<D, S>) -> impl Iterator<Item = &LoadedMotion> {
-    body.contacts.iter().flat_map(|contact| contact.driven()).flatten()
 }
 
 /// Whether two velocities are available for extrapolation.

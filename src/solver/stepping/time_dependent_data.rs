@@ -62,10 +62,15 @@ impl<const D: usize> TimeDependentData<D> {
             add("heat at a boundary", std::slice::from_ref(value), true);
         }
         for contact in &body.contacts {
-            let motions = contact.obstacle.iter().flat_map(|obstacle| obstacle.motions()).flatten();
+            let motions = contact.obstacle.motions().into_iter().flatten();
             let forces = motions.map(|motion| motion.force());
             forces.for_each(|force| add("the force on an obstacle", std::slice::from_ref(force), true));
-            contact.gap.expressions().into_iter().for_each(|values| add("an obstacle", values, false));
+            contact
+                .obstacle
+                .gap
+                .expressions()
+                .into_iter()
+                .for_each(|values| add("an obstacle", values, false));
         }
         Self { expressions }
     }

@@ -33,7 +33,7 @@ impl<const D: usize> Contact<D> {
         held: &Held<D>,
         end: f64,
     ) -> Result<(), Agreed> {
-        let has_obstacle = !self.is_paired && !matches!(self.gap, Gap::Distance(_));
+        let has_obstacle = !self.is_paired && !matches!(self.obstacle.gap, Gap::Distance(_));
         if self.normal.needs_ghosts || !has_obstacle || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
@@ -50,7 +50,7 @@ impl<const D: usize> Contact<D> {
             let others = others.filter(|normal| own.iter().all(|own| dot(own, normal) < SAME_FACE));
             let cone: Vec<Vector<D>> = own.iter().copied().chain(others).collect();
             let touching = (cone.len() > 1)
-                .then(|| self.gap.direction_of_nearest(&place, &times(&self.gap, end)))
+                .then(|| self.obstacle.gap.direction_of_nearest(&place, &times(&self.obstacle.gap, end)))
                 .flatten()
                 .and_then(|direction| nearest_in_cone(&direction, &cone));
             match touching {

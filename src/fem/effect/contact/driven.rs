@@ -17,12 +17,11 @@ use super::{
 };
 use crate::{
     error::Result,
-    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
+    linear_algebra::tensor::{add_scaled, dot, larger, norm},
     parallel::session::Session,
 };
 
-/// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken; and the accuracy of
-/// velocities at which pressures begin.
+/// The accuracy of velocities at which pressures begin.
 const NEAR: f64 = 1e-6;
 
 /// Distance from a point that stops the obstacle at which they touch, as a share of the body's size.
@@ -31,11 +30,6 @@ const TOUCH: f64 = 1e-12;
 /// Whether a point and the obstacle touch at the end of the step, at these velocities of Newton's method; the size is that of the body in m.
 fn is_touched<const D: usize>(point: &Point<D>, velocity: &[f64], size: f64) -> bool {
     point.depth(velocity) >= -TOUCH * size
-}
-
-/// The place at which the ray of a point meets the obstacle relative to its centre.
-fn arm<const D: usize>(point: &Point<D>, seen: &Vector<D>, reach: f64, centre: &Vector<D>) -> Vector<D> {
-    add_scaled(&add_scaled(seen, reach, &point.normal), -1.0, centre)
 }
 
 impl<const D: usize> NormalContact<D> {
@@ -65,48 +59,35 @@ impl<const D: usize> NormalContact<D> {
 }
 
 impl<const D: usize> Contact<D> {
-    /// The motions of its obstacle that forces drive: along its direction, and about its axis.
-    pub fn driven(&self) -> [Option<&LoadedMotion>; 2] {
-        self.obstacle.as_ref().map_or([None; 2], |obstacle| obstacle.motions())
-    }
-
-    /// The motion of this degree of freedom, to be changed.
-    pub fn driven_mut(&mut self, freedom: Freedom) -> Option<&mut LoadedMotion> {
-        let [translation, rotation] = self.obstacle.as_mut()?.motions_mut();
-        match freedom {
-            Freedom::Translation => translation,
-            Freedom::Rotation => rotation,
-        }
-    }
-
     /// Sets the velocities of the obstacle to those from which the step starts.
     pub fn restart_obstacle(&mut self) -> Result<()> {
-        Freedom::ALL
-            .into_iter()
-            .for_each(|freedom| self.driven_mut(freedom).into_iter().for_each(LoadedMotion::restart));
+        self.obstacle.motions_mut().into_iter().flatten().for_each(LoadedMotion::restart);
         self.place_obstacle()
     }
 
     /// Evaluates gaps and velocities of the obstacle after its velocities have been set.
     pub fn place_obstacle(&mut self) -> Result<()> {
-        let Some(obstacle) = &self.obstacle else { return Ok(()) };
-        if !self.normal.law.depends_on_displacement() {
+        let obstacle = &self.obstacle;
+        if !obstacle.is_driven() || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
         let [change, _] = obstacle.changes();
         for point in self.normal.points.iter_mut().filter(|_| obstacle.moves()) {
             let seen = obstacle.seen_after(&point.place);
-            point.set_gap(self.gap.of_moved(self.rate.time, &seen, &point.normal, point.moved)?);
+            point.set_gap(obstacle.gap.of_moved(obstacle.rate.time, &seen, &point.normal, point.moved)?);
             point.carried = point.follows * change;
         }
-        self.set_obstacle_velocities(self.rate)
+        self.set_obstacle_velocities(self.obstacle.rate)
     }
 
     /// Sets whether the unknowns are relative to the motion of the obstacle: not if they are apart in the whole step.
     pub fn follow_obstacle(&mut self, follows: bool) {
-        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.moves()) else { return };
+        let obstacle = &mut self.obstacle;
+        if !obstacle.moves() {
+            return;
+        }
         let ([direction, _], [change, _]) = (obstacle.velocities_at(&[0.0; D]), obstacle.changes());
-        self.follows = follows;
+        obstacle.follows = follows;
         for point in &mut self.normal.points {
             let along = direction.map_or(0.0, |direction| dot(&point.normal, &direction));
             point.follows = if follows && point.can_touch() { along } else { 0.0 };
@@ -144,11 +125,6 @@ impl<const D: usize> Contact<D> {
         is_new
     }
 
-    /// Whether the unknowns are relative to the motion of the obstacle.
-    pub fn follows_obstacle(&self) -> bool {
-        self.follows
-    }
-
     /// Whether points on this rank have tractions.
     pub fn has_tractions(&self) -> bool {
         let friction = self.friction.iter().flat_map(|friction| &friction.points);
@@ -156,64 +132,24 @@ impl<const D: usize> Contact<D> {
             .any(|point| point.traction != [0.0; D])
     }
 
-    /// Sets the places at which the rays along the normals meet an obstacle that a moment turns, relative to its centre; zero where they
-    /// do not meet it. Where laws take means over the step, those in its middle.
-    pub(super) fn set_arms(&mut self) {
-        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.turns()) else { return };
-        let [[start, _], _] = self.rate.before;
-        let [centre, before] = [self.rate.time, start].map(|time| self.gap.centre(time));
-        let arms = self.normal.points.iter().map(|point| {
-            if point.reach == f64::INFINITY {
-                return [0.0; D];
-            }
-            let after = arm(point, &obstacle.seen_after(&point.place), point.reach, &centre);
-            if point.context.mean_from.is_none() {
-                return after;
-            }
-            let start = arm(point, &obstacle.seen_before(&point.place), point.reach - point.growth, &before);
-            std::array::from_fn(|i| 0.5 * (start[i] + after[i]))
-        });
-        self.arms.clear();
-        self.arms.extend(arms);
-    }
-
-    /// The change of the velocity of the obstacle's material at a point with the velocity of its translation, in a step in which it also
-    /// turns: the ray along the normal meets it at another place.
-    fn sweep(&self, at: usize) -> Result<Vector<D>> {
-        let point = &self.normal.points[at];
-        let Some(obstacle) = &self.obstacle else { return Ok([0.0; D]) };
-        let (Some((direction, way)), true) = (obstacle.translation(), point.reach < f64::INFINITY) else {
-            return Ok([0.0; D]);
-        };
-        let seen = obstacle.seen_after(&point.place);
-        let distance = NEAR * norm(&self.arms[at]);
-        let reach = self.gap.of_moved(
-            self.rate.time,
-            &add_scaled(&seen, -distance, direction),
-            &point.normal,
-            point.moved,
-        )?;
-        let slope = (reach - point.reach) / distance;
-        let rate = add_scaled(&direction.map(|x| -x), slope, &point.normal);
-        let share = if point.context.mean_from.is_none() { way } else { 0.5 * way };
-        let velocity = obstacle.turning_velocity(&rate);
-        Ok(if slope.is_finite() { velocity.map(|v| share * v) } else { [0.0; D] })
-    }
-
     /// Adds to [`add_motion`](Self::add_motion) of a translation the change of the velocities at points with friction where the obstacle
     /// also turns.
     pub fn add_sweep(&self, nodal: &mut [f64]) -> Result<()> {
         let friction = self.friction.iter().flat_map(|friction| &friction.points);
-        for point in friction.filter(|point| self.follows && point.follows) {
-            point.add(Newton, 1.0, &point.free_part(&self.sweep(point.at)?), nodal);
+        for point in friction.filter(|point| self.obstacle.follows && point.follows) {
+            point.add(
+                Newton,
+                1.0,
+                &point.free_part(&self.obstacle.sweep(point.at, &self.normal.points[point.at])?),
+                nodal,
+            );
         }
         Ok(())
     }
 
     /// Whether its obstacle moves along a direction and turns.
     pub fn rolls(&self) -> bool {
-        self.friction.is_some()
-            && self.obstacle.as_ref().is_some_and(|obstacle| obstacle.moves() && obstacle.turns())
+        self.friction.is_some() && self.obstacle.moves() && self.obstacle.turns()
     }
 
     /// Subtracts from nodal velocities those of the obstacle that they follow.
@@ -224,21 +160,13 @@ impl<const D: usize> Contact<D> {
         self.friction.iter().for_each(|friction| friction.add_obstacle_velocities(-1.0, values));
     }
 
-    /// The velocity of the obstacle's material at a point for a motion at 1 m/s (1 rad/s).
-    fn carrying(&self, freedom: Freedom, at: usize) -> Vector<D> {
-        let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
-        let velocities =
-            self.obstacle.as_ref().map(|obstacle| obstacle.velocities_at(&arm)[freedom as usize]);
-        velocities.flatten().unwrap_or([0.0; D])
-    }
-
     /// The largest velocity in m/s that moves in the step by a distance from which the gap of a point on this rank is evaluated: that of its
     /// place from the origin, and from the centre of the obstacle.
     pub fn speed_of_places(&self) -> f64 {
         if !self.normal.law.depends_on_displacement() {
             return 0.0;
         }
-        let centre = self.gap.centre(self.rate.time);
+        let centre = self.obstacle.gap.centre(self.obstacle.rate.time);
         let speed = |point: &Point<D>| {
             let distance = norm(&point.place) + norm(&add_scaled(&point.place, -1.0, &centre));
             if point.context.step_length > 0.0 { distance / point.context.step_length } else { 0.0 }
@@ -248,7 +176,7 @@ impl<const D: usize> Contact<D> {
 
     /// Adds the change of nodal velocities, a vector of Newton's method, with the velocity of a motion at fixed unknowns.
     pub fn add_motion(&self, freedom: Freedom, nodal: &mut [f64]) {
-        if !self.follows {
+        if !self.obstacle.follows {
             return;
         }
         let parameters = self.normal.points.iter().filter(|point| point.unknown == Unknown::Parameter);
@@ -257,7 +185,7 @@ impl<const D: usize> Contact<D> {
         }
         let tangential = self.friction.iter().flat_map(|friction| &friction.points);
         for point in tangential.filter(|point| point.follows) {
-            point.add(Newton, 1.0, &point.free_part(&self.carrying(freedom, point.at)), nodal);
+            point.add(Newton, 1.0, &point.free_part(&self.obstacle.carrying(freedom, point.at)), nodal);
         }
     }
 
@@ -266,11 +194,12 @@ impl<const D: usize> Contact<D> {
     pub fn resultant(&self, freedom: Freedom, velocity: &[f64]) -> f64 {
         let normal = self.normal.points.iter().enumerate().map(|(at, point)| {
             let pressure = point.pressure_at(&self.normal.law, Newton, velocity);
-            point.weight * pressure * dot(&point.normal, &self.carrying(freedom, at))
+            point.weight * pressure * dot(&point.normal, &self.obstacle.carrying(freedom, at))
         });
         let friction = self.friction.iter().flat_map(|friction| &friction.points);
-        let tangential = friction
-            .map(|point| point.weight * dot(&point.whole_traction(), &self.carrying(freedom, point.at)));
+        let tangential = friction.map(|point| {
+            point.weight * dot(&point.whole_traction(), &self.obstacle.carrying(freedom, point.at))
+        });
         normal.chain(tangential).sum()
     }
 
@@ -280,14 +209,14 @@ impl<const D: usize> Contact<D> {
         let normal =
             self.normal.points.iter().enumerate().filter(|(_, point)| point.unknown == Unknown::Parameter);
         let normal = normal.map(|(at, point)| {
-            let along = dot(&point.normal, &self.carrying(freedom, at));
+            let along = dot(&point.normal, &self.obstacle.carrying(freedom, at));
             point.weight
                 * (1.0 - point.theta).abs()
                 * if freedom == Freedom::Translation { square(along) } else { 0.0 }
         });
         let sliding = self.friction.iter().flat_map(|friction| &friction.points).map(|point| {
             let share = point.tangent.theta.iter().map(|theta| (1.0 - theta).abs()).sum::<f64>();
-            point.weight * share * square(norm(&point.free_part(&self.carrying(freedom, point.at))))
+            point.weight * share * square(norm(&point.free_part(&self.obstacle.carrying(freedom, point.at))))
         });
         normal.sum::<f64>() + sliding.sum::<f64>()
     }
@@ -295,7 +224,7 @@ impl<const D: usize> Contact<D> {
     /// The decrease of the force on the obstacle with the velocity of a motion in kg/s, by the pressures at points on this rank whose
     /// normal velocity supports hold: only the obstacle changes them.
     pub fn held_stiffness(&self, freedom: Freedom, velocity: &[f64]) -> f64 {
-        let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
+        let translation = self.obstacle.translation();
         let Some((direction, way)) = translation.filter(|_| freedom == Freedom::Translation) else {
             return 0.0;
         };
@@ -314,7 +243,7 @@ impl<const D: usize> Contact<D> {
 
     /// The points on this rank that may stop the obstacle, each with the component of its normal along the direction of the obstacle.
     fn stops(&self) -> impl Iterator<Item = (&Point<D>, f64)> {
-        let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
+        let translation = self.obstacle.translation();
         let points = self.normal.points.iter().filter(|point| point.unknown == Unknown::Stop);
         points
             .filter_map(move |point| translation.map(|(direction, _)| (point, dot(&point.normal, direction))))
@@ -354,7 +283,7 @@ impl<const D: usize> Contact<D> {
     /// Sets the pressures at points that stop a motion of this sign to `share` in Pa times the components of their normals, at other
     /// points to 0. Of all pressures with the same resultant these have the smallest sum of squares over the area.
     pub fn stop(&mut self, sign: f64, share: f64, velocity: &[f64]) {
-        let translation = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
+        let translation = self.obstacle.translation();
         for point in self.normal.points.iter_mut().filter(|point| point.unknown == Unknown::Stop) {
             let along = translation.map_or(0.0, |(direction, _)| dot(&point.normal, direction));
             let stops = is_touched(point, velocity, self.body_size) && sign * along < 0.0;
@@ -365,7 +294,7 @@ impl<const D: usize> Contact<D> {
     /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it presses on a point on this rank in the step, at these
     /// velocities of Newton's method; infinite if it does not come nearer.
     pub fn change_to_touch(&self, velocity: &[f64], sign: f64) -> f64 {
-        let direction = self.obstacle.as_ref().and_then(|obstacle| obstacle.translation());
+        let direction = self.obstacle.translation();
         let change = |point: &Point<D>| {
             let along = match direction {
                 Some((direction, _)) if point.unknown != Unknown::Parameter => dot(&point.normal, direction),

@@ -112,7 +112,7 @@ impl<const D: usize> Contact<D> {
             return Ok(0.0);
         }
         let energy = |point: &Point<D>| {
-            let [along, gap] = self.position_at(time, displacement, point)?;
+            let [along, gap] = self.obstacle.position_at(time, displacement, point)?;
             let stored = self.normal.law.energy(along - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };

@@ -13,9 +13,14 @@
 //! `d(1/2 m w^2) = F~ dx + R~ dx + numerical`, `numerical = d(1/2 m w^2) - I dx + (F - F~) dx + (R - R~) dx`, where `F~` and `R~` are the
 //! forces of the step or, for a formula of second order, their means over it. `R~ dx` is minus the work of the obstacle on the body.
 
+use super::point::{Point, Vectors::Body};
 use crate::{
+    error::Result,
     fem::effect::{Blend, Curvature, Energy, EnergyKind, Role, WORK},
-    laws::{contact::ObstacleLoad, expression::Scalar},
+    laws::{
+        contact::{Gap, ObstacleLoad, Rate},
+        expression::Scalar,
+    },
     linear_algebra::tensor::{Vector, add_scaled, cross, larger, norm},
 };
 
@@ -27,7 +32,10 @@ pub const OBSTACLE_WORK: EnergyKind = EnergyKind::new(12, Role::Work, "obstacle_
 pub const OBSTACLE_NUMERICAL: EnergyKind =
     EnergyKind::new(13, Role::Numerical, "obstacle_numerical_dissipation");
 
-/// A degree of freedom of an obstacle, in the order of lists of its [motions](LoadedObstacle::motions).
+/// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
+const NEAR: f64 = 1e-6;
+
+/// A degree of freedom of an obstacle, in the order of lists of its [motions](Obstacle::motions).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Freedom {
     /// Along its direction.
@@ -63,26 +71,50 @@ pub struct LoadedMotion {
     first: f64,
 }
 
-/// An obstacle with the force and the moment that move it.
+/// The obstacle of a contact, with the force and the moment that move it, if there are any.
 #[derive(Debug)]
-pub struct LoadedObstacle<const D: usize> {
+pub struct Obstacle<const D: usize> {
+    /// Distance to the obstacle along the normal.
+    pub gap: Gap,
+    /// Whether the unknowns of the points are relative to its motion.
+    pub follows: bool,
     translation: Option<(Vector<D>, LoadedMotion)>,
     rotation: Option<(Vector<3>, LoadedMotion)>,
+    /// The formula of its velocity in the current step.
+    pub(super) rate: Rate,
+    /// If a moment turns it: for each point, the place that touches it relative to the centre, where the equations of the step hold.
+    arms: Vec<Vector<D>>,
 }
 
-impl<const D: usize> LoadedObstacle<D> {
-    /// The obstacle at time 0; `axis` is the direction of its axis of rotation.
-    pub fn new(load: &ObstacleLoad, axis: Vector<3>) -> Self {
+impl<const D: usize> Obstacle<D> {
+    /// The obstacle at time 0, which no force moves.
+    pub(super) fn new(gap: Gap) -> Self {
+        let (translation, rotation) = (None, None);
+        Self { gap, follows: true, translation, rotation, rate: Rate::euler(0.0, 1.0), arms: Vec::new() }
+    }
+
+    /// Lets a force and a moment move it.
+    pub fn set_load(&mut self, load: &ObstacleLoad) {
         let direction: Vector<D> = std::array::from_fn(|i| load.direction.get(i).copied().unwrap_or(0.0));
-        let translation = (!load.direction.is_empty()).then(|| {
+        self.translation = (!load.direction.is_empty()).then(|| {
             let motion = LoadedMotion::new(load.force.clone(), load.mass, load.velocity);
             (direction.map(|x| x / norm(&direction)), motion)
         });
-        let rotation = load.moment.as_ref().map(|moment| {
+        let axis = self.gap.axis();
+        self.rotation = load.moment.as_ref().map(|moment| {
             let motion = LoadedMotion::new(moment.clone(), load.moment_of_inertia, load.angular_velocity);
             (axis.map(|x| x / norm(&axis)), motion)
         });
-        Self { translation, rotation }
+    }
+
+    /// Whether forces or moments move it.
+    pub fn is_driven(&self) -> bool {
+        self.moves() || self.turns()
+    }
+
+    /// Whether its surface may move.
+    pub(super) fn surface_may_move(&self) -> bool {
+        self.is_driven() || self.gap.surface_may_move()
     }
 
     /// The motions: along the direction, and about the axis.
@@ -99,6 +131,15 @@ impl<const D: usize> LoadedObstacle<D> {
             self.translation.as_mut().map(|(_, motion)| motion),
             self.rotation.as_mut().map(|(_, motion)| motion),
         ]
+    }
+
+    /// The motion of this degree of freedom, to be changed.
+    pub fn motion_mut(&mut self, freedom: Freedom) -> Option<&mut LoadedMotion> {
+        let [translation, rotation] = self.motions_mut();
+        match freedom {
+            Freedom::Translation => translation,
+            Freedom::Rotation => rotation,
+        }
     }
 
     /// The velocity in m/s of the material at this place relative to the centre for each motion at 1 m/s (1 rad/s). The component of a
@@ -120,7 +161,7 @@ impl<const D: usize> LoadedObstacle<D> {
     }
 
     /// Commits the motion of the step.
-    pub(super) fn commit(&mut self) {
+    pub fn commit(&mut self) {
         self.motions_mut().into_iter().flatten().for_each(LoadedMotion::commit);
     }
 
@@ -175,6 +216,75 @@ impl<const D: usize> LoadedObstacle<D> {
     fn seen(&self, place: &Vector<D>, displacement: impl Fn(&LoadedMotion) -> f64) -> Vector<D> {
         let Some((direction, motion)) = &self.translation else { return *place };
         add_scaled(place, -displacement(motion), direction)
+    }
+
+    /// The displacement in m of a point along the normal at `time`, and its gap there, where the obstacle is after the last step, and
+    /// with the wear until then; from nodal displacements of the body.
+    pub(super) fn position_at(&self, time: f64, displacement: &[f64], point: &Point<D>) -> Result<[f64; 2]> {
+        let (place, worn) = (&point.place, point.worn[0]);
+        let along = point.normal_component(Body, displacement);
+        let seen = self.seen_before(place);
+        Ok([along, self.gap_of(point, time, &seen, along - worn)? + worn])
+    }
+
+    /// The gap in m of a point whose surface has `moved` along the normal and that an obstacle which forces move sees at `seen`.
+    pub(super) fn gap_of(&self, point: &Point<D>, time: f64, seen: &Vector<D>, moved: f64) -> Result<f64> {
+        Ok(point.stretch * self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
+    }
+
+    /// Sets the places at which the rays along the normals of the points meet it if a moment turns it, relative to its centre; zero where
+    /// they do not meet it. Where laws take means over the step, those in its middle.
+    pub(super) fn set_arms(&mut self, points: &[Point<D>]) {
+        if !self.turns() {
+            return;
+        }
+        let [[start, _], _] = self.rate.before;
+        let [centre, before] = [self.rate.time, start].map(|time| self.gap.centre(time));
+        let mut arms = std::mem::take(&mut self.arms);
+        arms.clear();
+        arms.extend(points.iter().map(|point| {
+            if point.reach == f64::INFINITY {
+                return [0.0; D];
+            }
+            let after = arm(point, &self.seen_after(&point.place), point.reach, &centre);
+            if point.context.mean_from.is_none() {
+                return after;
+            }
+            let start = arm(point, &self.seen_before(&point.place), point.reach - point.growth, &before);
+            std::array::from_fn(|i| 0.5 * (start[i] + after[i]))
+        }));
+        self.arms = arms;
+    }
+
+    /// The velocity of its material at a point, by the number of the point, for a motion at 1 m/s (1 rad/s).
+    pub(super) fn carrying(&self, freedom: Freedom, at: usize) -> Vector<D> {
+        self.velocities_at(&self.arm(at))[freedom as usize].unwrap_or([0.0; D])
+    }
+
+    /// The place that touches it relative to the centre, by the number of the point; zero if no moment turns it.
+    pub(super) fn arm(&self, at: usize) -> Vector<D> {
+        self.arms.get(at).copied().unwrap_or([0.0; D])
+    }
+
+    /// The change of the velocity of the obstacle's material at a point with the velocity of its translation, in a step in which it also
+    /// turns: the ray along the normal meets it at another place.
+    pub(super) fn sweep(&self, at: usize, point: &Point<D>) -> Result<Vector<D>> {
+        let (Some((direction, way)), true) = (self.translation(), point.reach < f64::INFINITY) else {
+            return Ok([0.0; D]);
+        };
+        let seen = self.seen_after(&point.place);
+        let distance = NEAR * norm(&self.arms[at]);
+        let reach = self.gap.of_moved(
+            self.rate.time,
+            &add_scaled(&seen, -distance, direction),
+            &point.normal,
+            point.moved,
+        )?;
+        let slope = (reach - point.reach) / distance;
+        let rate = add_scaled(&direction.map(|x| -x), slope, &point.normal);
+        let share = if point.context.mean_from.is_none() { way } else { 0.5 * way };
+        let velocity = self.turning_velocity(&rate);
+        Ok(if slope.is_finite() { velocity.map(|v| share * v) } else { [0.0; D] })
     }
 }
 
@@ -358,6 +468,11 @@ impl LoadedMotion {
     }
 }
 
+/// The place at which the ray of a point meets the obstacle relative to its centre.
+fn arm<const D: usize>(point: &Point<D>, seen: &Vector<D>, reach: f64, centre: &Vector<D>) -> Vector<D> {
+    add_scaled(&add_scaled(seen, reach, &point.normal), -1.0, centre)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -376,7 +491,8 @@ mod tests {
             angular_velocity: -3.0,
             ..ObstacleLoad::default()
         };
-        let mut disc = LoadedObstacle::<2>::new(&load, [0.0, 0.0, 5.0]);
+        let mut disc = Obstacle::<2>::new(Gap::Distance(Scalar::Number(0.0)));
+        disc.set_load(&load);
         // At its lowest point, half a metre below its centre.
         let velocities = disc.velocities_at(&[0.0, -0.5]).map(|velocity| velocity.expect("both"));
         assert_eq!(velocities, [[0.0, -1.0], [0.5, 0.0]]);
@@ -390,8 +506,8 @@ mod tests {
         assert_eq!(disc.seen_before(&[1.0, 0.0]), [1.0, 0.0]);
         disc.commit();
         assert_eq!(disc.motions().map(|motion| motion.expect("both").motion()), [[1.0, 2.0]; 2]);
-        let fixed = LoadedObstacle::<2>::new(&ObstacleLoad { direction: vec![], ..load }, [0.0, 0.0, 1.0]);
-        assert_eq!((fixed.seen_after(&[1.0, 0.0]), fixed.moves()), ([1.0, 0.0], false));
+        disc.set_load(&ObstacleLoad { direction: vec![], ..load });
+        assert_eq!((disc.seen_after(&[1.0, 0.0]), disc.moves()), ([1.0, 0.0], false));
     }
 
     #[test]

@@ -52,11 +52,11 @@ use crate::{
         pairs::PairedNode,
         space::{Held, facet_sizes, longest_side, surface_points},
     },
-    laws::contact::{Gap, NormalResponse, Rate, Wear},
-    linear_algebra::tensor::Vector,
+    laws::contact::{Gap, NormalResponse, Wear},
     mesh::Mesh,
     parallel::session::Session,
 };
+use loaded_obstacle::Obstacle;
 use normal::NormalContact;
 use point::{Point, Vectors::Body, gauss_points};
 use std::collections::BTreeSet;
@@ -67,9 +67,7 @@ pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, ContactEnergy, STORED_IN_CONTACT};
 pub use friction::Friction;
-pub use loaded_obstacle::{
-    Freedom, LoadedMotion, LoadedObstacle, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK,
-};
+pub use loaded_obstacle::{Freedom, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK};
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use sweep::{OVERRUN, SLIP_BETWEEN_PAIRINGS};
@@ -94,23 +92,14 @@ pub struct ContactConditions<const D: usize> {
 pub struct Contact<const D: usize> {
     /// The law along the normal, with the points.
     pub normal: NormalContact<D>,
-    /// Distance to the obstacle along the normal.
-    pub gap: Gap,
-    /// The motion of the obstacle, if a force moves it.
-    pub obstacle: Option<LoadedObstacle<D>>,
-    /// Whether the unknowns are relative to this motion.
-    follows: bool,
-    /// For an obstacle that a moment turns: for each point, the place that touches it relative to the centre, where the equations of the
-    /// step hold.
-    arms: Vec<Vector<D>>,
+    /// The obstacle.
+    pub obstacle: Obstacle<D>,
     /// Wear of the surface.
     pub wear: Option<Wear>,
     /// The shares of the heat of friction that enter the body at its nodes and, if there is one, the other body.
     pub shares_of_heat: [f64; 2],
     /// How near body and obstacle have come in the steps so far, on this rank.
     pub closeness: Closeness,
-    /// The formula of the obstacle's velocity in the current step.
-    rate: Rate,
     /// The blend of earlier states from which the current step starts.
     blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
@@ -172,14 +161,10 @@ impl<const D: usize> Contact<D> {
         let reference = ReferenceValues::default();
         Ok(Self {
             normal: NormalContact { law, scale, softening: 1.0, needs_ghosts, points },
-            gap,
-            obstacle: None,
-            follows: true,
-            arms: Vec::new(),
+            obstacle: Obstacle::new(gap),
             wear: None,
             shares_of_heat: [1.0, 0.0],
             closeness: Closeness::default(),
-            rate: Rate::euler(0.0, 1.0),
             blend: Blend::euler(0.0),
             reference,
             body_size: longest_side(session, &mesh.nodes),
@@ -213,30 +198,6 @@ impl<const D: usize> Contact<D> {
         }
         let mut number = 0..;
         self.normal.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));
-    }
-
-    /// Commits the motion of the obstacle in a step.
-    pub fn commit(&mut self) {
-        self.obstacle.iter_mut().for_each(LoadedObstacle::commit);
-    }
-
-    /// The displacement in m of a point along the normal at `time`, and its gap there, where the obstacle is after the last step, and
-    /// with the wear until then; from nodal displacements of the body.
-    fn position_at(&self, time: f64, displacement: &[f64], point: &Point<D>) -> Result<[f64; 2]> {
-        let (place, worn) = (&point.place, point.worn[0]);
-        let along = point.normal_component(Body, displacement);
-        let seen = self.obstacle.as_ref().map_or(*place, |obstacle| obstacle.seen_before(place));
-        Ok([along, self.gap_of(point, time, &seen, along - worn)? + worn])
-    }
-
-    /// The gap in m of a point whose surface has `moved` along the normal and that an obstacle which forces move sees at `seen`.
-    fn gap_of(&self, point: &Point<D>, time: f64, seen: &Vector<D>, moved: f64) -> Result<f64> {
-        Ok(point.stretch * self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
-    }
-
-    /// Whether the surface of the obstacle may move.
-    fn surface_may_move(&self) -> bool {
-        self.obstacle.is_some() || self.gap.surface_may_move()
     }
 
     /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`

@@ -24,15 +24,13 @@ impl<const D: usize> Contact<D> {
         let step_length = blend.way();
         for at in 0..self.normal.points.len() {
             let point = &self.normal.points[at];
-            let [after, before] = match &self.obstacle {
-                None => [point.place; 2],
-                Some(obstacle) => [obstacle.seen_after(&point.place), obstacle.seen_before(&point.place)],
-            };
+            let [after, before] =
+                [self.obstacle.seen_after(&point.place), self.obstacle.seen_before(&point.place)];
             let along = point.normal_component(Body, converged);
             let [worn, worn_before] = point.worn;
             let allowance = point.allowance;
-            let gap = self.gap_of(point, time, &after, along - worn)? + allowance;
-            let before = self.gap_of(point, time_before, &before, along - worn)? + allowance;
+            let gap = self.obstacle.gap_of(point, time, &after, along - worn)? + allowance;
+            let before = self.obstacle.gap_of(point, time_before, &before, along - worn)? + allowance;
             let point = &mut self.normal.points[at];
             point.reach = gap;
             point.moved = along - worn;
@@ -74,12 +72,9 @@ impl<const D: usize> Contact<D> {
             let depth = if blend.earlier == 0.0 {
                 recent
             } else {
-                let seen = self
-                    .obstacle
-                    .as_ref()
-                    .map_or(point.place, |obstacle| obstacle.seen_earlier(&point.place));
+                let seen = self.obstacle.seen_earlier(&point.place);
                 let moved = point.moved + point.worn[0] + point.blend_offset / blend.earlier - point.worn[1];
-                let gap = self.gap_of(point, earlier, &seen, moved)?;
+                let gap = self.obstacle.gap_of(point, earlier, &seen, moved)?;
                 blend.of(recent, (moved - gap).max(0.0)).max(0.0)
             };
             self.normal.points[at].context.depth_before = depth;
@@ -100,7 +95,7 @@ impl<const D: usize> Contact<D> {
 
     /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
     pub fn has_moving_obstacle(&self) -> bool {
-        self.friction.is_some() && self.surface_may_move()
+        self.friction.is_some() && self.obstacle.surface_may_move()
     }
 
     /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
@@ -112,20 +107,19 @@ impl<const D: usize> Contact<D> {
     /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that hold a part of the normal
     /// of a point where the obstacle moves across a free tangent: friction along this motion would also act on the free part of the normal.
     pub(super) fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {
-        self.rate = rate;
-        self.set_arms();
-        let may_move = self.surface_may_move();
+        self.obstacle.rate = rate;
+        self.obstacle.set_arms(&self.normal.points);
+        let may_move = self.obstacle.surface_may_move();
         let Some(friction) = self.friction.as_mut().filter(|_| may_move) else {
             return Ok(());
         };
-        let obstacle = self.obstacle.as_ref();
-        let (points, motion) = (&self.normal.points, self.gap.motion::<D>(rate)?);
+        let obstacle = &self.obstacle;
+        let (points, motion) = (&self.normal.points, obstacle.gap.motion::<D>(rate)?);
         let velocity = |at: usize| {
             let point = &points[at];
-            let seen = obstacle.map_or(point.place, |obstacle| obstacle.seen_after(&point.place));
+            let seen = obstacle.seen_after(&point.place);
             let prescribed = motion.velocity_along(&seen, &point.normal, point.reach);
-            let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
-            add_scaled(&prescribed, 1.0, &obstacle.map_or([0.0; D], |obstacle| obstacle.velocity_at(&arm)))
+            add_scaled(&prescribed, 1.0, &obstacle.velocity_at(&obstacle.arm(at)))
         };
         for point in &mut friction.points {
             point.set_obstacle(&velocity(point.at));

@@ -33,7 +33,8 @@ impl<const D: usize> Contact<D> {
                 "friction is not available at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
-        self.friction = Some(Friction::new(law, &self.normal.points, self.surface_may_move(), mesh, held)?);
+        self.friction =
+            Some(Friction::new(law, &self.normal.points, self.obstacle.surface_may_move(), mesh, held)?);
         Ok(())
     }
 
@@ -42,7 +43,7 @@ impl<const D: usize> Contact<D> {
     pub fn fix_bounds(&mut self) {
         let Some(friction) = &mut self.friction else { return };
         friction.update_pressures(&self.normal.points);
-        if self.obstacle.is_some() && friction.law.follows_pressure() {
+        if self.obstacle.is_driven() && friction.law.follows_pressure() {
             friction.points.iter_mut().for_each(|point| point.follows = point.pressure != 0.0);
         }
     }
@@ -103,14 +104,12 @@ impl<const D: usize> Contact<D> {
         (displacement, velocity): (&[f64], &[f64]),
     ) -> [Deviation; CONTACT_QUANTITIES] {
         let mut out = [Deviation::default(); CONTACT_QUANTITIES];
-        if let Some(obstacle) = &self.obstacle {
-            for (number, motion) in obstacle.motions().into_iter().enumerate() {
-                let Some(motion) = motion else { continue };
-                for (kind, [now, before, earlier, start]) in motion.last_values().into_iter().enumerate() {
-                    let error = curvature.error([now, before, earlier]);
-                    out[FIRST_OF_OBSTACLES + 2 * number + kind]
-                        .add(1.0, [error, now - start, ROUNDING_SHARE * now]);
-                }
+        for (number, motion) in self.obstacle.motions().into_iter().enumerate() {
+            let Some(motion) = motion else { continue };
+            for (kind, [now, before, earlier, start]) in motion.last_values().into_iter().enumerate() {
+                let error = curvature.error([now, before, earlier]);
+                out[FIRST_OF_OBSTACLES + 2 * number + kind]
+                    .add(1.0, [error, now - start, ROUNDING_SHARE * now]);
             }
         }
         let Some(friction) = &self.friction else { return out };

@@ -3,7 +3,6 @@
 use super::{
     Contact,
     closeness::{Closeness, Gaps},
-    loaded_obstacle::LoadedObstacle,
     normal::NormalContact,
     point::{Point, Unknown, Vectors::Body},
     tangential_point::tangents,
@@ -64,11 +63,11 @@ impl<const D: usize> Contact<D> {
     /// Fails where the obstacle has passed a point in the step just solved, from displacements at its start and velocities at its end
     /// (with ghosts), and where it is beyond points that should have stopped it.
     pub fn refuse_passage(&self, step: Step, displacement: &[f64], velocity: &[f64]) -> Result<()> {
-        if !self.normal.law.depends_on_displacement() || matches!(self.gap, Gap::Distance(_)) {
+        if !self.normal.law.depends_on_displacement() || matches!(self.obstacle.gap, Gap::Distance(_)) {
             return Ok(());
         }
         let times = [step.start(), step.time];
-        let is_loaded = self.obstacle.as_ref().is_some_and(LoadedObstacle::moves);
+        let is_loaded = self.obstacle.moves();
         for point in &self.normal.points {
             let depth = point.context.penetration + point.advance(Body, velocity);
             if point.unknown == Unknown::Stop && depth > OVERRUN * self.body_size {
@@ -83,10 +82,8 @@ impl<const D: usize> Contact<D> {
             let [worn, worn_before] = point.worn;
             let along = point.normal_component(Body, displacement);
             let moved = along + point.blend_offset + point.advance(Body, velocity);
-            let [before, after] = match &self.obstacle {
-                None => [point.place; 2],
-                Some(obstacle) => [obstacle.seen_before(&point.place), obstacle.seen_after(&point.place)],
-            };
+            let [before, after] =
+                [self.obstacle.seen_before(&point.place), self.obstacle.seen_after(&point.place)];
             let sweep = Sweep {
                 times,
                 places: [
@@ -97,7 +94,7 @@ impl<const D: usize> Contact<D> {
                 body_size: self.body_size,
                 loses_obstacle: point.penetration_before > f64::NEG_INFINITY && !point.can_touch(),
             };
-            if self.gap.passes(&sweep)? {
+            if self.obstacle.gap.passes(&sweep)? {
                 let speed = if is_loaded { "its force or its mass" } else { "its motion" };
                 return Err(Error::Failed(format!(
                     "the step to t = {:.6e} s (length {:.3e} s) failed: its obstacle passes through the boundary at {:?} m, in front of \
@@ -151,7 +148,7 @@ impl<const D: usize> Contact<D> {
             let point = &mut self.normal.points[at];
             point.overlap = 0.0;
             if keeps_depth {
-                let own = self.gap.of_moved(0.0, &point.place, &point.normal, 0.0)?;
+                let own = self.obstacle.gap.of_moved(0.0, &point.place, &point.normal, 0.0)?;
                 point.overlap = (-(node.distance + node.stretch * own)).max(0.0);
             }
             point.allowance = point.overlap;
@@ -176,7 +173,8 @@ impl<const D: usize> Contact<D> {
     pub fn tilts(&self, time: f64) -> [f64; 2] {
         let of_point = |point: &Point<D>| {
             let gap = |along: &Vector<D>| {
-                self.gap
+                self.obstacle
+                    .gap
                     .at(time, &add_scaled(&point.place, self.body_size, along), &point.normal)
                     .unwrap_or(f64::NAN)
             };
@@ -185,7 +183,7 @@ impl<const D: usize> Contact<D> {
                 tangents(&point.normal).map(|tangent| ((gap(&tangent) - here) / self.body_size).powi(2));
             squares.sum::<f64>().sqrt().atan()
         };
-        let is_plane = matches!(self.gap, Gap::Plane(_));
+        let is_plane = matches!(self.obstacle.gap, Gap::Plane(_));
         let angles = self.normal.points.iter().filter(|point| is_plane && point.can_touch()).map(of_point);
         angles.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], angle| {
             [least.min(angle), most.max(angle)]
@@ -197,7 +195,7 @@ impl<const D: usize> Contact<D> {
     pub fn gaps(&self, time: f64, displacement: &[f64]) -> Gaps {
         let mut gaps = Gaps { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, without: 0 };
         for point in &self.normal.points {
-            let Ok([along, gap]) = self.position_at(time, displacement, point) else { continue };
+            let Ok([along, gap]) = self.obstacle.position_at(time, displacement, point) else { continue };
             if gap == f64::INFINITY {
                 gaps.without += 1;
             } else {

@@ -1,6 +1,6 @@
 //! Choice of the unknown at the points: the parameter of the law's graph or the velocity.
 
-use super::{Contact, LoadedObstacle, point::Unknown};
+use super::{Contact, point::Unknown};
 use crate::{
     error::{Error, Result},
     linear_algebra::tensor::{Vector, dot, dual_basis, outside},
@@ -20,10 +20,8 @@ const SMOOTH: f64 = 0.766;
 /// velocity as the unknown. Refuses laws with vertical parts at Gauss points.
 pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
     give_nodes_to_one_contact(contacts);
-    let stopping = |contact: &&mut Contact<D>| {
-        contact.normal.law.has_vertical_parts()
-            && contact.obstacle.as_ref().is_some_and(LoadedObstacle::moves)
-    };
+    let stopping =
+        |contact: &&mut Contact<D>| contact.normal.law.has_vertical_parts() && contact.obstacle.moves();
     for point in contacts.iter_mut().filter(stopping).flat_map(|contact| &mut contact.normal.points) {
         if point.unknown == Unknown::Held {
             point.unknown = Unknown::Stop;
@@ -57,7 +55,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
             continue;
         }
         let is_sharp = places.iter().any(|&(number, _)| {
-            contacts[number].normal.law.has_vertical_parts() || contacts[number].obstacle.is_some()
+            contacts[number].normal.law.has_vertical_parts() || contacts[number].obstacle.is_driven()
         });
         if is_sharp || with_friction.contains(&node) {
             let directions: Vec<Vector<D>> = places.iter().map(direction).collect();
