@@ -664,7 +664,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let (velocity, before) = (state.velocity.local()?, state.previous_velocity.local()?);
         let velocities = [self.seen_by_contacts(&velocity), self.seen_by_contacts(&before)];
         let [velocity, before] = &velocities;
-        let falls = self.contacts.iter().filter_map(|contact| contact.fall_of_friction([velocity, before]));
+        let frictions = self.contacts.iter().flat_map(|contact| &contact.friction);
+        let falls = frictions.filter_map(|friction| friction.fall([velocity, before]));
         Ok(falls.reduce(larger))
     }
 

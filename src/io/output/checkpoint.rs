@@ -123,7 +123,7 @@ impl Header {
             closeness: body
                 .contacts
                 .iter()
-                .map(|contact| contact.closeness_of_all(session).saved())
+                .map(|contact| contact.closeness.of_all(session).saved())
                 .collect(),
             exchanged: exchanged(body),
             mesh: digest(body),

@@ -58,7 +58,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Contact, Form},
+        effect::{Contact, Form, Friction},
         state::State,
     },
     linear_algebra::tensor::Vector,
@@ -113,7 +113,8 @@ impl Certificates {
         if body.contacts.iter().any(|contact| contact.laws().decrease_per_pressure(length).is_some()) {
             let bound = if known.steps_are_unique() {
                 let slips = |contact: &&Contact<D>| contact.laws().decrease_per_pressure(length).is_some();
-                let tangents = body.contacts.iter().filter(slips).flat_map(Contact::tangential_directions);
+                let rubbing = body.contacts.iter().filter(slips).flat_map(|contact| &contact.friction);
+                let tangents = rubbing.flat_map(Friction::directions);
                 if moves_rigidly(session, body, tangents, true)? {
                     0.0
                 } else {

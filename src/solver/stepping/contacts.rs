@@ -4,7 +4,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Blend, CONTACT, Contact, Energy, NUMERICAL, Step, WORK},
+        effect::{Blend, CONTACT, Energy, NUMERICAL, Step, WORK},
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
@@ -170,7 +170,10 @@ pub(super) fn restore_pressures<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     state: &State,
 ) -> Result<()> {
-    body.contacts.iter_mut().try_for_each(Contact::restart_obstacle)?;
+    for contact in &mut body.contacts {
+        contact.obstacle.restart();
+        contact.place_obstacle()?;
+    }
     if let Some(traction) = &state.contact_traction {
         let traction = traction.owned()?;
         body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));

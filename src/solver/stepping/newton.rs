@@ -525,7 +525,7 @@ fn write_velocities<const D: usize>(
 
 /// Whether pressure or friction of a contact decrease with the motion.
 fn decreases<const D: usize>(contact: &Contact<D>) -> bool {
-    contact.monotonicity_constant() > 0.0 || contact.has_decreasing_friction()
+    contact.monotonicity_constant() > 0.0 || contact.friction.as_ref().is_some_and(Friction::decreases)
 }
 
 /// The friction of all contacts that have any.
@@ -547,9 +547,7 @@ fn explain(reason: &str, counts: &SolveCounts) -> String {
 /// Writes the steepest descent of each contact's friction at the pressures in its bounds, over all ranks. Collective.
 fn write_steepest_decreases<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
     let steepest_decrease = |contact: &Contact<D>| match &contact.friction {
-        Some(friction) if contact.has_decreasing_friction() => {
-            session.largest([friction.steepest_decrease()])[0]
-        }
+        Some(friction) if friction.decreases() => session.largest([friction.steepest_decrease()])[0],
         _ => 0.0,
     };
     out.clear();

@@ -243,7 +243,8 @@ impl ObstacleMotions {
             self.work.push(contacts[*contact].held_stiffness(*freedom, velocity));
         }
         for Motion { place: (contact, freedom), .. } in &self.motions {
-            let reaction = if *freedom == Freedom::Translation { contacts[*contact].reaction() } else { 0.0 };
+            let reaction =
+                if *freedom == Freedom::Translation { contacts[*contact].normal.reaction() } else { 0.0 };
             self.work.push(reaction);
         }
         session.sum_lists_into(&self.work, &mut self.sums);
@@ -334,7 +335,7 @@ impl ObstacleMotions {
             }
             let (contact, freedom) = motion.place;
             let (laws, [open, _]) = (&mut contacts[contact], self.unbalanced[at]);
-            let [least, greatest] = laws.room(velocity);
+            let [least, greatest] = laws.normal.room(velocity);
             let [least, greatest] = session.largest([least, -greatest]);
             motion.room = [least, -greatest];
             // Beyond a stop the obstacle is moved back, whatever its force.
@@ -343,9 +344,9 @@ impl ObstacleMotions {
                 [least, _] if least > 0.0 => -1.0,
                 _ => -self.values[at].signum(),
             };
-            let [area] = session.sum([laws.stopping_area(sign, velocity)]);
+            let [area] = session.sum([laws.normal.stopping_area(sign, velocity)]);
             let reaction = if area > 0.0 && sign * open < 0.0 { open } else { 0.0 };
-            laws.stop(sign, if reaction == 0.0 { 0.0 } else { reaction / area }, velocity);
+            laws.normal.stop(sign, if reaction == 0.0 { 0.0 } else { reaction / area }, velocity);
             if area > 0.0
                 && let Some(driven) = laws.obstacle.motion_mut(freedom)
             {
@@ -514,7 +515,7 @@ fn change_to_press<const D: usize>(
     let (contact, freedom) = motion.place;
     let (laws, sign) = (&contacts[contact], -open.signum());
     let nearest = match freedom {
-        Freedom::Translation => laws.change_to_touch(velocity, sign),
+        Freedom::Translation => laws.normal.change_to_touch(velocity, sign),
         Freedom::Rotation => f64::INFINITY,
     };
     let nearest = -session.largest([-nearest])[0];
@@ -535,7 +536,7 @@ fn find_contacts<const D: usize>(
         let mut touches = contact.has_tractions() || contact.normal.would_touch(&velocity);
         let [along, _] = contact.obstacle.motions();
         if let Some(change) = along.map(LoadedMotion::change_to_free) {
-            touches |= contact.change_to_touch(&velocity, change.signum()) <= change.abs();
+            touches |= contact.normal.change_to_touch(&velocity, change.signum()) <= change.abs();
         }
         contact.follow_obstacle(session.total(usize::from(touches)) > 0);
         contact.follow_along_tangents(session, &velocity);

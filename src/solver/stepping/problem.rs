@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Contact, Form, Friction, Step},
+        effect::{Form, Friction, Step},
         state::State,
     },
     laws::digits::Digits,
@@ -85,7 +85,7 @@ impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
             return self.failed(why, REMEDY);
         }
         let falls = body.contacts.iter().any(|contact| contact.monotonicity_constant() > 0.0);
-        let weakens = body.contacts.iter().any(Contact::has_decreasing_friction);
+        let weakens = body.contacts.iter().flat_map(|contact| &contact.friction).any(Friction::decreases);
         let own = [falls.then_some("contact"), weakens.then_some("friction")];
         let names: Vec<&str> = body.softening().chain(own.into_iter().flatten()).collect();
         let why = format!("{why}; forces of {} fall here as the body moves", names.join(", "));

@@ -1,5 +1,7 @@
 //! Distances of a body from an obstacle.
 
+use crate::parallel::session::Session;
+
 /// How near a body and its obstacle have come in any step so far; minus infinity where they never could touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Closeness {
@@ -25,12 +27,17 @@ impl Closeness {
     }
 
     /// All of them.
-    pub(super) fn numbers(self) -> [f64; 3] {
+    fn numbers(self) -> [f64; 3] {
         [self.penetration, self.held, self.slip]
     }
 
+    /// The one over all ranks. Collective.
+    pub fn of_all(self, session: &Session) -> Self {
+        Self::of(session.largest(self.numbers()))
+    }
+
     /// The one with these numbers.
-    pub(super) fn of([penetration, held, slip]: [f64; 3]) -> Self {
+    fn of([penetration, held, slip]: [f64; 3]) -> Self {
         Self { penetration, held, slip }
     }
 

@@ -1,7 +1,7 @@
 //! The motions of nodes on which contact laws act.
 
 use super::{
-    Contact,
+    Contact, Friction,
     point::{Unknown, Vectors::Body},
     tangential_point::span_without,
 };
@@ -67,15 +67,7 @@ impl<const D: usize> Contact<D> {
         let presses = !self.normal.law.is_zero();
         let rubs = self.friction.as_ref().is_some_and(|friction| presses || !friction.law.follows_pressure());
         let normals = presses.then(|| self.normal.directions()).into_iter().flatten();
-        normals.chain(rubs.then(|| self.tangential_directions()).into_iter().flatten()).collect()
-    }
-
-    /// The nodes of this rank with friction, each with the free tangents of its points.
-    pub fn tangential_directions(&self) -> impl Iterator<Item = (usize, Vector<D>)> {
-        self.friction
-            .iter()
-            .flat_map(|friction| &friction.points)
-            .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)))
+        normals.chain(self.friction.iter().filter(|_| rubs).flat_map(Friction::directions)).collect()
     }
 
     /// Adds the derivative of half of `sum of w (normal x_nu^2 + tangential |x_tau|^2)` to `forces`: over the quadrature points

@@ -11,7 +11,7 @@
 
 use super::{
     Contact,
-    loaded_obstacle::{Freedom, LoadedMotion},
+    loaded_obstacle::Freedom,
     normal::NormalContact,
     point::{Point, Unknown, Vectors::Newton},
 };
@@ -56,15 +56,79 @@ impl<const D: usize> NormalContact<D> {
         }
         bracket[1]
     }
+
+    /// The points on this rank that may stop the obstacle.
+    fn stops(&self) -> impl Iterator<Item = &Point<D>> {
+        self.points.iter().filter(|point| point.unknown == Unknown::Stop)
+    }
+
+    /// The least and the greatest change in m/s of the obstacle's velocity at which it is beyond no point on this rank that stops it, at
+    /// these velocities of Newton's method.
+    pub fn room(&self, velocity: &[f64]) -> [f64; 2] {
+        let [mut least, mut greatest] = [f64::NEG_INFINITY, f64::INFINITY];
+        for point in self.stops() {
+            let along = point.along_obstacle;
+            let depth = point.depth(velocity);
+            let depth = if depth.abs() <= TOUCH * self.body_size { 0.0 } else { depth };
+            let change = depth / (along * point.context.step_length);
+            if along > 0.0 {
+                least = f64::max(least, change);
+            } else if along < 0.0 {
+                greatest = f64::min(greatest, change);
+            }
+        }
+        [least, greatest]
+    }
+
+    /// The sum over points on this rank that stop a motion of this sign where the obstacle is of their weights in m^(D-1) times the squares
+    /// of the components of their normals along the direction; 0 if nothing stops it.
+    pub fn stopping_area(&self, sign: f64, velocity: &[f64]) -> f64 {
+        let stopping = |point: &&Point<D>| {
+            is_touched(point, velocity, self.body_size) && sign * point.along_obstacle < 0.0
+        };
+        self.stops()
+            .filter(stopping)
+            .map(|point| point.weight * point.along_obstacle * point.along_obstacle)
+            .sum()
+    }
+
+    /// The resultant in N along the direction of the pressures at points on this rank that stop the obstacle.
+    pub fn reaction(&self) -> f64 {
+        self.stops().map(|point| point.weight * point.pressure * point.along_obstacle).sum()
+    }
+
+    /// Sets the pressures at points that stop a motion of this sign to `share` in Pa times the components of their normals, at other
+    /// points to 0. Of all pressures with the same resultant these have the smallest sum of squares over the area.
+    pub fn stop(&mut self, sign: f64, share: f64, velocity: &[f64]) {
+        for point in self.points.iter_mut().filter(|point| point.unknown == Unknown::Stop) {
+            let along = point.along_obstacle;
+            let stops = is_touched(point, velocity, self.body_size) && sign * along < 0.0;
+            point.pressure = if stops { share * along } else { 0.0 };
+        }
+    }
+
+    /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it presses on a point on this rank in the step, at these
+    /// velocities of Newton's method; infinite if it does not come nearer.
+    pub fn change_to_touch(&self, velocity: &[f64], sign: f64) -> f64 {
+        let change = |point: &Point<D>| {
+            let along =
+                if point.unknown == Unknown::Parameter { point.follows } else { point.along_obstacle };
+            let approach = -sign * along;
+            let depth = point.depth(velocity);
+            if approach <= 0.0 || !depth.is_finite() {
+                f64::INFINITY
+            } else if depth < 0.0 {
+                -depth / (approach * point.context.step_length)
+            } else {
+                self.change_to_press(point, velocity) / approach
+            }
+        };
+        let pressed = self.points.iter().filter(|point| self.is_pressed(point));
+        pressed.map(change).fold(f64::INFINITY, f64::min)
+    }
 }
 
 impl<const D: usize> Contact<D> {
-    /// Sets the velocities of the obstacle to those from which the step starts.
-    pub fn restart_obstacle(&mut self) -> Result<()> {
-        self.obstacle.motions_mut().into_iter().flatten().for_each(LoadedMotion::restart);
-        self.place_obstacle()
-    }
-
     /// Evaluates gaps and velocities of the obstacle after its velocities have been set.
     pub fn place_obstacle(&mut self) -> Result<()> {
         let obstacle = &self.obstacle;
@@ -86,11 +150,10 @@ impl<const D: usize> Contact<D> {
         if !obstacle.moves() {
             return;
         }
-        let ([direction, _], [change, _]) = (obstacle.velocities_at(&[0.0; D]), obstacle.changes());
+        let [change, _] = obstacle.changes();
         obstacle.follows = follows;
         for point in &mut self.normal.points {
-            let along = direction.map_or(0.0, |direction| dot(&point.normal, &direction));
-            point.follows = if follows && point.can_touch() { along } else { 0.0 };
+            point.follows = if follows && point.can_touch() { point.along_obstacle } else { 0.0 };
             point.carried = point.follows * change;
         }
     }
@@ -224,97 +287,16 @@ impl<const D: usize> Contact<D> {
     /// The decrease of the force on the obstacle with the velocity of a motion in kg/s, by the pressures at points on this rank whose
     /// normal velocity supports hold: only the obstacle changes them.
     pub fn held_stiffness(&self, freedom: Freedom, velocity: &[f64]) -> f64 {
-        let translation = self.obstacle.translation();
-        let Some((direction, way)) = translation.filter(|_| freedom == Freedom::Translation) else {
+        let Some((_, way)) = self.obstacle.translation().filter(|_| freedom == Freedom::Translation) else {
             return 0.0;
         };
-        let held = self
-            .normal
-            .points
-            .iter()
-            .filter(|point| point.unknown == Unknown::Held && self.normal.is_pressed(point));
+        let is_held = |point: &&Point<D>| point.unknown == Unknown::Held && self.normal.is_pressed(point);
+        let held = self.normal.points.iter().filter(is_held);
         held.map(|point| {
             let slope = self.normal.law.slope(point.normal_component(Newton, velocity), point.context);
-            let along = dot(&point.normal, direction);
+            let along = point.along_obstacle;
             point.weight * slope / point.context.step_length * way * along * along
         })
         .sum()
-    }
-
-    /// The points on this rank that may stop the obstacle, each with the component of its normal along the direction of the obstacle.
-    fn stops(&self) -> impl Iterator<Item = (&Point<D>, f64)> {
-        let translation = self.obstacle.translation();
-        let points = self.normal.points.iter().filter(|point| point.unknown == Unknown::Stop);
-        points
-            .filter_map(move |point| translation.map(|(direction, _)| (point, dot(&point.normal, direction))))
-    }
-
-    /// The least and the greatest change in m/s of the obstacle's velocity at which it is beyond no point on this rank that stops it, at
-    /// these velocities of Newton's method.
-    pub fn room(&self, velocity: &[f64]) -> [f64; 2] {
-        let [mut least, mut greatest] = [f64::NEG_INFINITY, f64::INFINITY];
-        for (point, along) in self.stops() {
-            let depth = point.depth(velocity);
-            let depth = if depth.abs() <= TOUCH * self.body_size { 0.0 } else { depth };
-            let change = depth / (along * point.context.step_length);
-            if along > 0.0 {
-                least = f64::max(least, change);
-            } else if along < 0.0 {
-                greatest = f64::min(greatest, change);
-            }
-        }
-        [least, greatest]
-    }
-
-    /// The sum over points on this rank that stop a motion of this sign where the obstacle is of their weights in m^(D-1) times the squares
-    /// of the components of their normals along the direction; 0 if nothing stops it.
-    pub fn stopping_area(&self, sign: f64, velocity: &[f64]) -> f64 {
-        let touched = self
-            .stops()
-            .filter(|(point, along)| is_touched(point, velocity, self.body_size) && sign * along < 0.0);
-        touched.map(|(point, along)| point.weight * along * along).sum()
-    }
-
-    /// The resultant in N along the direction of the pressures at points on this rank that stop the obstacle.
-    pub fn reaction(&self) -> f64 {
-        self.stops().map(|(point, along)| point.weight * point.pressure * along).sum()
-    }
-
-    /// Sets the pressures at points that stop a motion of this sign to `share` in Pa times the components of their normals, at other
-    /// points to 0. Of all pressures with the same resultant these have the smallest sum of squares over the area.
-    pub fn stop(&mut self, sign: f64, share: f64, velocity: &[f64]) {
-        let translation = self.obstacle.translation();
-        for point in self.normal.points.iter_mut().filter(|point| point.unknown == Unknown::Stop) {
-            let along = translation.map_or(0.0, |(direction, _)| dot(&point.normal, direction));
-            let stops = is_touched(point, velocity, self.body_size) && sign * along < 0.0;
-            point.pressure = if stops { share * along } else { 0.0 };
-        }
-    }
-
-    /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it presses on a point on this rank in the step, at these
-    /// velocities of Newton's method; infinite if it does not come nearer.
-    pub fn change_to_touch(&self, velocity: &[f64], sign: f64) -> f64 {
-        let direction = self.obstacle.translation();
-        let change = |point: &Point<D>| {
-            let along = match direction {
-                Some((direction, _)) if point.unknown != Unknown::Parameter => dot(&point.normal, direction),
-                _ => point.follows,
-            };
-            let approach = -sign * along;
-            let depth = point.depth(velocity);
-            if approach <= 0.0 || !depth.is_finite() {
-                f64::INFINITY
-            } else if depth < 0.0 {
-                -depth / (approach * point.context.step_length)
-            } else {
-                self.normal.change_to_press(point, velocity) / approach
-            }
-        };
-        self.normal
-            .points
-            .iter()
-            .filter(|point| self.normal.is_pressed(point))
-            .map(change)
-            .fold(f64::INFINITY, f64::min)
     }
 }

@@ -40,6 +40,7 @@ impl<const D: usize> Contact<D> {
     /// friction there.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> ContactEnergy {
         let mut sum = ContactEnergy::default();
+        let is_of_two_steps = self.blend.earlier != 0.0;
         for point in &self.normal.points {
             let v = point.normal_component(Body, velocity);
             let pressure = point.pressure_at(&self.normal.law, Body, velocity);
@@ -49,7 +50,7 @@ impl<const D: usize> Contact<D> {
                 sum.driving_power += of_supports;
                 continue;
             }
-            let mean = if self.blend.earlier != 0.0 {
+            let mean = if is_of_two_steps {
                 0.5 * (pressure + self.normal.pressure_before(point))
             } else {
                 pressure
@@ -81,7 +82,7 @@ impl<const D: usize> Contact<D> {
             let given = times(mean, point.growth);
             sum.dissipated += point.weight * dissipated;
             sum.work += length * of_supports - point.weight * given;
-            let damped = self.damping_power(point, after, (after - before) / length);
+            let damped = self.normal.damping_power(point, after, (after - before) / length, is_of_two_steps);
             sum.dissipated_power += point.weight * damped;
             sum.numerical += point.weight * (stored + dissipated + given + length * (damped - pressure * v));
         }
@@ -90,20 +91,6 @@ impl<const D: usize> Contact<D> {
             sum.driving_power += friction.driving_power(velocity);
         }
         sum
-    }
-
-    /// Power in W/m^(D-1) that the dashpot at a point dissipates at the end of the step, at this penetration in m, which has grown by
-    /// this mean rate in m/s.
-    fn damping_power(&self, point: &Point<D>, after: f64, growth: f64) -> f64 {
-        if self.normal.law.damping() == 0.0 || !growth.is_finite() {
-            return 0.0;
-        }
-        let rate = if self.blend.earlier == 0.0 {
-            growth
-        } else {
-            (after.max(0.0) - point.context.depth_before) / point.context.step_length
-        };
-        self.normal.law.damping_pressure(after, point.context) * rate
     }
 
     /// Energy in J stored at `time`, from displacements with ghosts.

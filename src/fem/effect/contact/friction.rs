@@ -133,6 +133,40 @@ impl<const D: usize> Friction<D> {
         })
     }
 
+    /// The nodes of this rank, each with the free tangents of its points.
+    pub fn directions(&self) -> impl Iterator<Item = (usize, Vector<D>)> {
+        let points = self.points.iter();
+        points.flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)))
+    }
+
+    /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
+    pub fn obstacle_velocity_square(&self) -> f64 {
+        self.points.iter().map(|point| dot(&point.obstacle, &point.obstacle)).sum()
+    }
+
+    /// Whether the coefficient, or a bound without pressure, may decrease with the sliding velocity in the current step.
+    pub fn decreases(&self) -> bool {
+        self.law.steepest_decrease(self.context) > 0.0
+    }
+
+    /// The largest share of its coefficient of friction that a point under pressure lost on this rank in the step just committed, from the
+    /// velocities at its end and at its start, with ghosts; `None` where coefficients cannot fall, on all ranks alike.
+    pub fn fall(&self, [velocity, before]: [&[f64]; 2]) -> Option<f64> {
+        let may_fall = self.law.history().is_some() || self.decreases();
+        let coefficient = |point: &TangentialPoint<D>, history: f64, sliding: &Vector<D>| {
+            let at = SlidingContext { history, step_length: 0.0, ..point.context };
+            self.law.coefficient(norm(sliding), at)
+        };
+        let fall = |((point, now), (_, then)): ((&TangentialPoint<D>, _), (_, _))| {
+            let [after, before] = [(point.history[0], now), (point.history[1], then)]
+                .map(|(history, sliding)| coefficient(point, history, &sliding));
+            let is_known = point.pressure > 0.0 && before > 0.0 && after.is_finite();
+            if is_known { (before - after) / before } else { 0.0 }
+        };
+        let pairs = self.sliding(Body, velocity).zip(self.sliding(Body, before));
+        may_fall.then(|| pairs.map(fall).fold(0.0, larger))
+    }
+
     /// Removes points that have no tangent.
     pub(super) fn keep_points_with_tangents(&mut self) {
         self.points.retain(TangentialPoint::has_tangents);

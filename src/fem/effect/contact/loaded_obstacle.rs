@@ -113,7 +113,7 @@ impl<const D: usize> Obstacle<D> {
     }
 
     /// Whether its surface may move.
-    pub(super) fn surface_may_move(&self) -> bool {
+    pub fn surface_may_move(&self) -> bool {
         self.is_driven() || self.gap.surface_may_move()
     }
 
@@ -131,6 +131,11 @@ impl<const D: usize> Obstacle<D> {
             self.translation.as_mut().map(|(_, motion)| motion),
             self.rotation.as_mut().map(|(_, motion)| motion),
         ]
+    }
+
+    /// Sets the velocities to those from which the step starts.
+    pub fn restart(&mut self) {
+        self.motions_mut().into_iter().flatten().for_each(LoadedMotion::restart);
     }
 
     /// The motion of this degree of freedom, to be changed.

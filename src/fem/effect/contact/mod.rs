@@ -104,8 +104,6 @@ pub struct Contact<const D: usize> {
     blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
     pub reference: ReferenceValues,
-    /// The longest side of the box around the body in m.
-    pub body_size: f64,
     /// Facets of this rank, by local numbers.
     pub facets: Vec<u32>,
     /// Whether it is against another body.
@@ -159,15 +157,15 @@ impl<const D: usize> Contact<D> {
         let scale = 2.0 * law.monotonicity_constant(1.0) + 1.0;
         let needs_ghosts = quadrature == Quadrature::Gauss;
         let reference = ReferenceValues::default();
+        let body_size = longest_side(session, &mesh.nodes);
         Ok(Self {
-            normal: NormalContact { law, scale, softening: 1.0, needs_ghosts, points },
+            normal: NormalContact { law, scale, softening: 1.0, needs_ghosts, body_size, points },
             obstacle: Obstacle::new(gap),
             wear: None,
             shares_of_heat: [1.0, 0.0],
             closeness: Closeness::default(),
             blend: Blend::euler(0.0),
             reference,
-            body_size: longest_side(session, &mesh.nodes),
             facets: facets.to_vec(),
             is_paired,
             owned: mesh.owned,

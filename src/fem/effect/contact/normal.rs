@@ -25,6 +25,8 @@ pub struct NormalContact<const D: usize> {
     pub softening: f64,
     /// Whether velocities of ghost nodes are read and forces on them are written.
     pub needs_ghosts: bool,
+    /// The longest side of the box around the body in m.
+    pub body_size: f64,
     pub(super) points: Vec<Point<D>>,
 }
 
@@ -185,5 +187,19 @@ impl<const D: usize> NormalContact<D> {
             };
             point.add_force(Newton, change, forces);
         }
+    }
+
+    /// Power in W/m^(D-1) that the dashpot at a point dissipates at the end of the step, at this penetration in m, which has grown by
+    /// this mean rate in m/s; the formula of the step may be one of two steps.
+    pub(super) fn damping_power(&self, point: &Point<D>, after: f64, growth: f64, of_two_steps: bool) -> f64 {
+        if self.law.damping() == 0.0 || !growth.is_finite() {
+            return 0.0;
+        }
+        let rate = if of_two_steps {
+            (after.max(0.0) - point.context.depth_before) / point.context.step_length
+        } else {
+            growth
+        };
+        self.law.damping_pressure(after, point.context) * rate
     }
 }

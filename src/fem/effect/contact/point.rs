@@ -100,6 +100,8 @@ pub(super) struct Point<const D: usize> {
     /// velocity in m/s for the change of that of the obstacle since the start of the step. The unknown along the normal is relative to it.
     pub follows: f64,
     pub carried: f64,
+    /// The component of the normal along the direction in which a force moves the obstacle; 0 without such a force.
+    pub along_obstacle: f64,
     /// Penetration from the displacement at the start and the gap at the end of the step, and step length.
     pub context: NodeContext,
     /// `u_nu - gap` in m, with both values at the start of the step.
@@ -150,6 +152,7 @@ impl<const D: usize> Point<D> {
             moved: 0.0,
             follows: 0.0,
             carried: 0.0,
+            along_obstacle: 0.0,
             context: NodeContext::default(),
             penetration_before: 0.0,
             worn: [0.0; 2],

@@ -93,17 +93,6 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
-    pub fn has_moving_obstacle(&self) -> bool {
-        self.friction.is_some() && self.obstacle.surface_may_move()
-    }
-
-    /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
-    pub fn obstacle_velocity_square(&self) -> f64 {
-        let points = self.friction.iter().flat_map(|friction| &friction.points);
-        points.map(|point| dot(&point.obstacle, &point.obstacle)).sum()
-    }
-
     /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that hold a part of the normal
     /// of a point where the obstacle moves across a free tangent: friction along this motion would also act on the free part of the normal.
     pub(super) fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {

@@ -7,7 +7,6 @@ use super::{
         Point, Unknown,
         Vectors::{Body, Newton},
     },
-    tangential_point::TangentialPoint,
 };
 use crate::{
     error::{Error, Result},
@@ -18,8 +17,8 @@ use crate::{
         },
         space::Held,
     },
-    laws::contact::{FrictionLaw, LawsOfContact, NodeContext, SlidingContext, Wear},
-    linear_algebra::tensor::{Vector, larger, norm},
+    laws::contact::{FrictionLaw, LawsOfContact, NodeContext, Wear},
+    linear_algebra::tensor::norm,
     mesh::Mesh,
 };
 
@@ -143,30 +142,6 @@ impl<const D: usize> Contact<D> {
     pub fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
         self.friction.iter_mut().for_each(|friction| visit(friction));
         visit(self);
-    }
-
-    /// The largest share of its coefficient of friction that a point under pressure lost on this rank in the step just committed, from the
-    /// velocities at its end and at its start, with ghosts; `None` where coefficients cannot fall, on all ranks alike.
-    pub fn fall_of_friction(&self, [velocity, before]: [&[f64]; 2]) -> Option<f64> {
-        let friction = self.friction.as_ref()?;
-        let may_fall = friction.law.history().is_some() || self.has_decreasing_friction();
-        let coefficient = |point: &TangentialPoint<D>, history: f64, sliding: &Vector<D>| {
-            let at = SlidingContext { history, step_length: 0.0, ..point.context };
-            friction.law.coefficient(norm(sliding), at)
-        };
-        let fall = |((point, now), (_, then)): ((&TangentialPoint<D>, _), (_, _))| {
-            let [after, before] = [(point.history[0], now), (point.history[1], then)]
-                .map(|(history, sliding)| coefficient(point, history, &sliding));
-            let is_known = point.pressure > 0.0 && before > 0.0 && after.is_finite();
-            if is_known { (before - after) / before } else { 0.0 }
-        };
-        let pairs = friction.sliding(Body, velocity).zip(friction.sliding(Body, before));
-        may_fall.then(|| pairs.map(fall).fold(0.0, larger))
-    }
-
-    /// Whether the friction coefficient, or a bound without pressure, may decrease with the sliding velocity in the current step.
-    pub fn has_decreasing_friction(&self) -> bool {
-        self.friction.as_ref().is_some_and(|friction| friction.law.steepest_decrease(friction.context) > 0.0)
     }
 
     /// Both laws.

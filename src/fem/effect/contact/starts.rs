@@ -4,7 +4,7 @@ use super::{
     Contact,
     point::{Point, Vectors::Body},
 };
-use crate::{linear_algebra::tensor::dot, parallel::session::Session};
+use crate::parallel::session::Session;
 
 impl<const D: usize> Contact<D> {
     /// The largest velocity in m/s at which a law on this rank has a kink; 0 where no law has one.
@@ -19,9 +19,8 @@ impl<const D: usize> Contact<D> {
     /// of it, with pressures in proportion to the components of their normals along the force. Collective.
     pub fn add_driving_force(&self, session: &Session, nodal: &mut [f64]) {
         let [Some(motion), _] = self.obstacle.motions() else { return };
-        let Some((direction, _)) = self.obstacle.translation() else { return };
         let driving = motion.driving();
-        let against = |point: &Point<D>| (-driving.signum() * dot(&point.normal, direction)).max(0.0);
+        let against = |point: &Point<D>| (-driving.signum() * point.along_obstacle).max(0.0);
         let faced = || self.normal.points.iter().filter(|point| point.can_touch());
         let [area] = session.sum([faced().map(|point| point.weight * against(point).powi(2)).sum()]);
         if area > 0.0 {

@@ -2,7 +2,7 @@
 
 use super::{
     Contact,
-    closeness::{Closeness, Gaps},
+    closeness::Gaps,
     normal::NormalContact,
     point::{Point, Unknown, Vectors::Body},
     tangential_point::tangents,
@@ -12,7 +12,6 @@ use crate::{
     fem::{effect::Step, pairs::PairedNode},
     laws::contact::{Gap, Sweep},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
-    parallel::session::Session,
 };
 
 /// Penetration at nodes that supports hold, as a share of the body's size, from which on an obstacle counts as beyond them.
@@ -70,7 +69,7 @@ impl<const D: usize> Contact<D> {
         let is_loaded = self.obstacle.moves();
         for point in &self.normal.points {
             let depth = point.context.penetration + point.advance(Body, velocity);
-            if point.unknown == Unknown::Stop && depth > OVERRUN * self.body_size {
+            if point.unknown == Unknown::Stop && depth > OVERRUN * self.normal.body_size {
                 return Err(Error::Failed(format!(
                     "the step to t = {:.6e} s (length {:.3e} s) failed: the obstacle that a force moves is {depth:.3e} m \
                      beyond the boundary at {:?} m, where a support holds the normal, and nowhere along its direction it is outside of \
@@ -91,7 +90,7 @@ impl<const D: usize> Contact<D> {
                     add_scaled(&after, moved - worn, &point.normal),
                 ],
                 normal: point.normal,
-                body_size: self.body_size,
+                body_size: self.normal.body_size,
                 loses_obstacle: point.penetration_before > f64::NEG_INFINITY && !point.can_touch(),
             };
             if self.obstacle.gap.passes(&sweep)? {
@@ -163,11 +162,6 @@ impl<const D: usize> Contact<D> {
         Ok(())
     }
 
-    /// How near body and obstacle have come in the steps so far, on any rank. Collective.
-    pub fn closeness_of_all(&self, session: &Session) -> Closeness {
-        Closeness::of(session.largest(self.closeness.numbers()))
-    }
-
     /// The smallest and the largest angle in rad between the surface at a point on this rank and a plane in front of it at `time`;
     /// infinity and its opposite where none is.
     pub fn tilts(&self, time: f64) -> [f64; 2] {
@@ -175,12 +169,12 @@ impl<const D: usize> Contact<D> {
             let gap = |along: &Vector<D>| {
                 self.obstacle
                     .gap
-                    .at(time, &add_scaled(&point.place, self.body_size, along), &point.normal)
+                    .at(time, &add_scaled(&point.place, self.normal.body_size, along), &point.normal)
                     .unwrap_or(f64::NAN)
             };
             let here = gap(&[0.0; D]);
-            let squares =
-                tangents(&point.normal).map(|tangent| ((gap(&tangent) - here) / self.body_size).powi(2));
+            let squares = tangents(&point.normal)
+                .map(|tangent| ((gap(&tangent) - here) / self.normal.body_size).powi(2));
             squares.sum::<f64>().sqrt().atan()
         };
         let is_plane = matches!(self.obstacle.gap, Gap::Plane(_));

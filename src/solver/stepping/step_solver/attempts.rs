@@ -3,7 +3,7 @@
 use super::{StepSolver, unassembled};
 use crate::{
     error::Result,
-    fem::effect::Contact,
+    fem::effect::{Contact, Friction},
     linear_algebra::{
         petsc::{DistributedVector, Ksp, Precision},
         tensor::larger,
@@ -383,8 +383,10 @@ impl StepSolver {
         // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
         // obstacle rounds `v` as a difference from the obstacle's velocity.
         let mut motion = start.norm()?;
-        if body.contacts.iter().any(Contact::has_moving_obstacle) {
-            let mine = body.contacts.iter().map(Contact::obstacle_velocity_square).sum();
+        let rubs_moving = |c: &Contact<D>| c.friction.is_some() && c.obstacle.surface_may_move();
+        if body.contacts.iter().any(rubs_moving) {
+            let frictions = body.contacts.iter().flat_map(|contact| &contact.friction);
+            let mine = frictions.map(Friction::obstacle_velocity_square).sum();
             motion += session.sum([mine])[0].sqrt();
         }
         let product = f64::EPSILON * self.matrix_norm * motion;
@@ -489,7 +491,7 @@ fn loads<const D: usize, const S: usize>(
 /// The norm of the velocities in m/s above which a body that only contact holds flies away.
 fn farthest<const D: usize, const S: usize>(problem: &StepProblem<'_, D, S>) -> f64 {
     let Some(contact) = problem.body.contacts.first() else { return f64::INFINITY };
-    FAR * contact.body_size / problem.step.length * (problem.body.mesh.total_nodes as f64).sqrt()
+    FAR * contact.normal.body_size / problem.step.length * (problem.body.mesh.total_nodes as f64).sqrt()
 }
 
 /// Solves a step without contact and flow. Collective.
