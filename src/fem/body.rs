@@ -77,7 +77,7 @@ pub struct Body<const D: usize, const S: usize> {
     /// Forces of the interior at supports; empty unless they are requested.
     at_supports: RefCell<SupportForces>,
     /// The multiple of strains and strain rates up to which the job asks for certificates that the matrix is a bound for.
-    covered: f64,
+    pub covered: f64,
     /// The fastest relaxation of power laws in 1/s since the last [`Body::take_flow_step_bound`].
     fastest_flow: f64,
 }
@@ -698,11 +698,6 @@ impl<const D: usize, const S: usize> Body<D, S> {
         can
     }
 
-    /// The multiple of these strains and strain rates up to which certificates hold.
-    pub fn covered(&self) -> f64 {
-        self.covered
-    }
-
     /// Keeps the histories before the last step from now on, as far as [`Body::stress_error`] or laws at the end of steps need them.
     pub fn keep_earlier(&mut self) {
         let evaluation = self.evaluation;
@@ -1061,7 +1056,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 heat.strain_at(mesh, (material, cell), place(point))
             });
         }
-        if heat.is_seen_by_flow() {
+        if heat.is_seen_by_flow {
             self.geometry.set_temperatures(|_, cell, point| heat.strained_at(mesh, cell, place(point)));
         }
     }

@@ -81,7 +81,8 @@ pub struct BalancedMotion<'a> {
 /// Computes the resultants of all sources after each step.
 #[derive(Debug)]
 pub struct Resultants<const D: usize> {
-    sources: Vec<Source>,
+    /// The sources, in the order of the rows.
+    pub sources: Vec<Source>,
     /// Local components that supports hold, in order, each with the first support that holds it.
     held: Vec<(u32, u32)>,
     /// Local nodes that supports hold in directions other than axes, ascending, each with the first support that holds it.
@@ -171,11 +172,6 @@ impl<const D: usize> Resultants<D> {
             sums: [sums.clone(), sums],
             largest: vec![0.0; body.contacts.len()],
         })
-    }
-
-    /// The sources, in the order of the rows.
-    pub fn sources(&self) -> &[Source] {
-        &self.sources
     }
 
     /// The resultants of the step last updated, with the areas of contacts.

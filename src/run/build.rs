@@ -389,7 +389,7 @@ fn heat<const D: usize>(
     if job.time.scheme.states() > 1 {
         heat.keep_powers();
     }
-    if heat.strains() || heat.is_seen_by_flow() {
+    if heat.strains() || heat.is_seen_by_flow {
         heat.expand();
     }
     Ok(heat)

@@ -132,7 +132,7 @@ fn report<const D: usize, const S: usize>(
     let longest = steps::longest_step(job);
     let steps = steps::landings(job).steps_after(0.0, longest);
     let inventory = Inventory::of(session, body, scheme);
-    let (preconditioner, reason) = scheme.preconditioner();
+    let (preconditioner, reason) = scheme.solver.preconditioner();
     let problem = ProblemSize::of(session, body, steps, job.solver.factor_precision)?;
     Ok(Report {
         version: super::version(),
@@ -148,7 +148,7 @@ fn report<const D: usize, const S: usize>(
         gaps: obstacles::gaps(session, job, body, &ready.state)?,
         tractions: loads::areas(session, job, body),
         probes: job.output.probe.clone(),
-        scheme: scheme.scheme().name(),
+        scheme: scheme.scheme.name(),
         steps,
         adaptive: job.time.adaptive.is_some(),
         newton: inventory.newton,

@@ -50,17 +50,17 @@ pub(super) fn lines<const D: usize, const S: usize>(
     };
     lines.push(format!(
         "scheme     {}, steps of {} to {} s; {}, tolerance {:.0e}",
-        scheme.scheme().name(),
+        scheme.scheme.name(),
         lengths,
         job.time.end,
         match job.solver.method {
             Method::Vinewtonrsls => "PETSc's vinewtonrsls",
-            Method::Newton if scheme.is_nonlinear() => "Newton with line search",
+            Method::Newton if scheme.solver.is_nonlinear() => "Newton with line search",
             Method::Newton => "one linear solve per step",
         },
         job.solver.tolerance
     ));
-    let (preconditioner, reason) = scheme.preconditioner();
+    let (preconditioner, reason) = scheme.solver.preconditioner();
     lines.push(format!("solver     {}: {reason}", preconditioner.name()));
     let certified = if has_details { &verdict.words } else { &verdict.brief };
     lines.extend(certified.iter().map(|words| format!("certified  {words}")));

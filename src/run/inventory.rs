@@ -42,8 +42,8 @@ impl Inventory {
             history_bytes,
             contact_points: session.total(points) as u64,
             friction_points: session.total(with_friction) as u64,
-            newton: scheme.is_nonlinear(),
-            load_vector: scheme.has_load(),
+            newton: scheme.solver.is_nonlinear(),
+            load_vector: scheme.load.is_some(),
         }
     }
 }

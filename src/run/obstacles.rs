@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Closeness, Contact, Gaps, LoadedMotion, OVERRUN},
+        effect::{Closeness, Contact, Gaps, OVERRUN},
         space::{longest_side, surface_means},
         state::State,
     },
@@ -266,7 +266,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             ));
         }
         let [translation, _] = contact.obstacle.motions();
-        if let Some(leap) = translation.map(LoadedMotion::longest_way).filter(|leap| *leap > size) {
+        if let Some(leap) = translation.map(|motion| motion.longest_way).filter(|leap| *leap > size) {
             out.push(format!(
                 "contact.{number}: the obstacle that a force moves leapt by {leap:.3e} m in one step, more than the size of the body, \
                  {size:.3e} m: steps that long don't resolve its motion; take a smaller [time] step, or correct its force or its mass"

@@ -144,7 +144,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         }
         session.agree(written)?;
         let motion = scheme.balanced_motion(state);
-        self.resultants.write(session, body, state, motion, scheme.load())?;
+        self.resultants.write(session, body, state, motion, scheme.load.as_ref())?;
         if self.probes.needs_stress() {
             let stress = session.agree(body.stress(state))?;
             let at = Converged { session, body, state, stress: &stress };

@@ -80,7 +80,7 @@ pub(super) fn warnings_of_heat<const D: usize, const S: usize>(
     let mut giver = session.agree(giver)?;
     {
         let mut numbers = giver.owned_mut()?;
-        heat.held_nodes().iter().for_each(|(node, number)| numbers[*node as usize] = f64::from(number + 1));
+        heat.held.iter().for_each(|(node, number)| numbers[*node as usize] = f64::from(number + 1));
     }
     giver.update_ghosts()?;
     let giver = giver.local()?;

@@ -80,7 +80,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let steps = steps::landings(job).steps_after(0.0, longest);
     let problem = ProblemSize::of(session, &body, steps, job.solver.factor_precision)?;
     let inventory = Inventory::of(session, &body, &scheme);
-    let estimate = MemoryEstimate::new(session, &body, &inventory, scheme.preconditioner().0, problem);
+    let estimate = MemoryEstimate::new(session, &body, &inventory, scheme.solver.preconditioner().0, problem);
     require_for_run(session, &estimate)?;
     let matrix = scheme.matrix(session, &mut body, longest);
     let mut matrix = session.agree(matrix).map_err(|error| match error.exit() {

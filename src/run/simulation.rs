@@ -79,9 +79,9 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if let (Some(adaptive), Some(level)) = (&mut adaptive, totals.step_level) {
             adaptive.step_level = level;
         }
-        scheme.restore_powers(totals.powers);
+        scheme.powers = totals.powers;
         if totals.single_precision_failed {
-            scheme.use_double_precision();
+            scheme.solver.use_double_precision();
         }
         Ok(Self { body, state, scheme, totals, landings: steps::landings(job), adaptive })
     }
@@ -93,7 +93,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             return Ok(None);
         }
         let target = landings.next([state.time, state.step_length]);
-        let was_single = scheme.factor_precision() == Some(Precision::Single);
+        let was_single = scheme.solver.factor_precision() == Some(Precision::Single);
         let outcome = if let Some(adaptive) = adaptive {
             let outcome = adaptive.advance(session, scheme, body, state, target);
             totals.step_level = Some(adaptive.step_level);
@@ -113,13 +113,14 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if totals.energy_imbalance > BALANCED && !body.has_form(Form::Mass) {
             totals.allow_rounding(rounding(session, body, state, outcome.residual)?, &before);
         }
-        totals.single_precision_failed |= was_single && scheme.factor_precision() == Some(Precision::Double);
+        totals.single_precision_failed |=
+            was_single && scheme.solver.factor_precision() == Some(Precision::Double);
         // The largest contact pressure under slip weakening, which the certificate bounds.
         if let Some(mine) = session.agree(body.slip_pressure(state))? {
             let [most] = session.largest([mine]);
             totals.max_slip_pressure = Some(totals.max_slip_pressure.map_or(most, |max| larger(max, most)));
         }
-        if scheme.scheme() == Scheme::LaggedEuler
+        if scheme.scheme == Scheme::LaggedEuler
             && let Some(mine) = session.agree(body.fall_of_friction(state))?
         {
             let [most] = session.largest([mine]);

@@ -92,8 +92,8 @@ pub(super) fn run<const D: usize, const S: usize>(
     let columns = ShownColumns {
         contact: !simulation.body.contacts.is_empty(),
         friction: simulation.body.contacts.iter().any(|contact| contact.friction.is_some()),
-        newton: simulation.scheme.is_nonlinear(),
-        iterative: simulation.scheme.preconditioner().0 != Preconditioner::Cholesky,
+        newton: simulation.scheme.solver.is_nonlinear(),
+        iterative: simulation.scheme.solver.preconditioner().0 != Preconditioner::Cholesky,
     };
     let stepping = (Instant::now(), state.step);
     let deadline = Deadline::new(session, job, clock);
@@ -211,7 +211,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// job. Collective.
     fn cover_steps(&mut self) -> Result<()> {
         let Simulation { state, scheme, .. } = &self.simulation;
-        let Some(taken) = scheme.attempted().filter(|taken| !self.certificates.hold_for(*taken)) else {
+        let Some(taken) = scheme.attempted.filter(|taken| !self.certificates.hold_for(*taken)) else {
             return Ok(());
         };
         let range = self.certificates.range.map_or(taken, |range| range.or(taken));
@@ -228,7 +228,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// renews matrices and certificates; fails if the new ones require the consent of the job. Collective.
     fn cover_strains(&mut self) -> Result<()> {
         let Simulation { body, state, scheme, totals, .. } = &mut self.simulation;
-        let share = totals.max_rate_share.filter(|share| *share > body.covered() && self.may_cover);
+        let share = totals.max_rate_share.filter(|share| *share > body.covered && self.may_cover);
         let Some(multiple) = share.map(|share| share.log2().ceil().exp2()) else { return Ok(()) };
         // All ranks have the same formulas.
         self.may_cover = body.cover(multiple);
@@ -247,7 +247,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
         scheme.renew(self.session, body, state)?;
         let range = self.certificates.range.unwrap_or_else(|| steps::range(self.job));
-        let range = scheme.attempted().map_or(range, |taken| range.or(taken));
+        let range = scheme.attempted.map_or(range, |taken| range.or(taken));
         self.renew_certificates(range)
     }
 
@@ -364,7 +364,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let start = Instant::now();
         let Simulation { body, state, totals, .. } = &self.simulation;
         let path = self.outputs.checkpoint(self.session, body, state, totals)?;
-        self.simulation.scheme.forget_tangents();
+        self.simulation.scheme.solver.forget_tangents();
         self.deadline.add_save(start.elapsed());
         self.log.quiet_line(format!("saved {}", path.display()));
         Ok(())
@@ -415,7 +415,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         };
         let body = &self.simulation.body;
         let surface_has_mass = body.has_form(Form::Mass) && body.redistributed_mass.is_none();
-        let covered = body.covered();
+        let covered = body.covered;
         let summary = self.summary(status, error, restarted_from, errors);
         let written = self.session.agree(summary).and_then(|mut summary| {
             let lagging = summary
@@ -487,9 +487,9 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             nodes: mesh.total_nodes,
             unknowns: body.unknowns(session),
             effects: body.effect_names(),
-            scheme: scheme.scheme().name(),
-            preconditioner: scheme.preconditioner().0.name(),
-            factor_precision: scheme.factor_precision().map(Precision::name),
+            scheme: scheme.scheme.name(),
+            preconditioner: scheme.solver.preconditioner().0.name(),
+            factor_precision: scheme.solver.factor_precision().map(Precision::name),
             steps: state.step,
             time: without_rounding(state.time),
             rejected_steps: totals.step_level.map_or(0, |level| level.rejected),

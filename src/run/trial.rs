@@ -61,7 +61,7 @@ pub(super) fn estimate<const D: usize, const S: usize>(
     began: Instant,
 ) -> Result<Result<(TimeEstimate, Option<f64>), Agreed>, Agreed> {
     let [set_up] = session.largest([began.elapsed().as_secs_f64()]);
-    let others = match (scheme.is_nonlinear(), body.flows()) {
+    let others = match (scheme.solver.is_nonlinear(), body.flows()) {
         (false, _) => AGAIN,
         (true, false) => NONLINEAR,
         (true, true) => FLOWING,

@@ -268,7 +268,7 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
 /// What forces and moments lack to the rate of momentum, relative to the sum of their magnitudes.
 fn open_resultant<const D: usize>(resultants: &Resultants<D>) -> [f64; 2] {
     let (mut sums, mut sizes) = ([[0.0; 3]; 2], [0.0; 2]);
-    for (source, (found, _)) in resultants.sources().iter().zip(resultants.rows()) {
+    for (source, (found, _)) in resultants.sources.iter().zip(resultants.rows()) {
         let sign = if *source == Source::Momentum { -1.0 } else { 1.0 };
         let force = std::array::from_fn(|i| found.force.get(i).copied().unwrap_or(0.0));
         for (at, vector) in [force, found.moment].iter().enumerate() {
@@ -302,7 +302,7 @@ fn balanced<const D: usize, const S: usize>(
         assert!(inclusion < 1e-6, "step {steps}: inclusion residual {inclusion:e}\n{text}");
         let motion = run.scheme.balanced_motion(&run.state);
         resultants
-            .update(session, &run.body, &run.state, motion, run.scheme.load())
+            .update(session, &run.body, &run.state, motion, run.scheme.load.as_ref())
             .expect("resultants of a step");
         let [open, turn] = open_resultant(&resultants);
         assert!(open < 1e-10 && turn < 1e-10, "step {steps}: forces {open:e}, moments {turn:e}\n{text}");

@@ -50,10 +50,12 @@ fn last<const D: usize, const S: usize>(
         Resultants::new(session, &run.body, &run.state, &supports(text)).expect("resultants");
     while run.advance(session).expect("a step").is_some() {
         let motion = run.scheme.balanced_motion(&run.state);
-        resultants.update(session, &run.body, &run.state, motion, run.scheme.load()).expect("resultants");
+        resultants
+            .update(session, &run.body, &run.state, motion, run.scheme.load.as_ref())
+            .expect("resultants");
     }
     let areas = resultants.rows().find_map(|(_, areas)| areas).expect("a contact");
-    let rows = resultants.sources().iter().zip(resultants.rows());
+    let rows = resultants.sources.iter().zip(resultants.rows());
     let rows = rows.map(|(source, (found, _))| (*source, [found.force[0], found.force[D - 1]], found.moment));
     (rows.collect(), areas)
 }
@@ -177,9 +179,11 @@ fn worst_balance(session: &Session, mesh: &GlobalMesh<2>, text: &str) -> f64 {
     let mut worst: f64 = 0.0;
     while run.advance(session).expect("a step").is_some() {
         let motion = run.scheme.balanced_motion(&run.state);
-        resultants.update(session, &run.body, &run.state, motion, run.scheme.load()).expect("resultants");
+        resultants
+            .update(session, &run.body, &run.state, motion, run.scheme.load.as_ref())
+            .expect("resultants");
         let (mut sum, mut largest) = ([0.0; 2], 0.0);
-        for (source, (found, _)) in resultants.sources().iter().zip(resultants.rows()) {
+        for (source, (found, _)) in resultants.sources.iter().zip(resultants.rows()) {
             let sign = if *source == Source::Momentum { -1.0 } else { 1.0 };
             for (sum, force) in sum.iter_mut().zip(found.force) {
                 *sum += sign * force;

@@ -49,9 +49,11 @@ fn moved<const D: usize, const S: usize>(
     let mut resultants = Resultants::new(session, &run.body, &run.state, &supports(job)).expect("resultants");
     while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{job}")).is_some() {
         let motion = run.scheme.balanced_motion(&run.state);
-        resultants.update(session, &run.body, &run.state, motion, run.scheme.load()).expect("resultants");
+        resultants
+            .update(session, &run.body, &run.state, motion, run.scheme.load.as_ref())
+            .expect("resultants");
         let (mut sum, mut largest) = ([0.0; 6], 0.0);
-        for (source, (found, _)) in resultants.sources().iter().zip(resultants.rows()) {
+        for (source, (found, _)) in resultants.sources.iter().zip(resultants.rows()) {
             let sign = if *source == Source::Momentum { -1.0 } else { 1.0 };
             for (sum, value) in sum.iter_mut().zip(found.force.iter().chain(&found.moment)) {
                 *sum += sign * value;

@@ -199,7 +199,8 @@ fn compare<const D: usize, const S: usize>(
     let found = Certificates::of(session, &run.body, &run.state, &mut of_step, range).expect("certificates");
     let largest_step =
         Certificates::unique_step(session, &run.body, &run.state, &mut of_step).expect("certificate");
-    let matrix = dense(session, (&run.body, &run.state), |x, y| of_step.multiply(x, y).expect("product"));
+    let matrix =
+        dense(session, (&run.body, &run.state), |x, y| of_step.solver.multiply(x, y).expect("product"));
     let form = |form| dense_form(session, &run, |x, y| run.body.add_form(form, x, y));
     let (mass, viscosity, strain) = (form(Form::Mass), form(Form::Viscosity), form(Form::Strain));
     let mut own = std::mem::take(&mut run.body.contacts);
@@ -357,7 +358,8 @@ fn worst_step<const D: usize, const S: usize>(
     let mut of_step = run.scheme.matrix(session, &mut run.body, longest).expect("matrix");
     let found = Certificates::of(session, &run.body, &run.state, &mut of_step, range).expect("certificates");
     let whole = of_step.range.matrices[0];
-    let matrix = dense(session, (&run.body, &run.state), |x, y| of_step.multiply(x, y).expect("product"));
+    let matrix =
+        dense(session, (&run.body, &run.state), |x, y| of_step.solver.multiply(x, y).expect("product"));
     let form = |form| dense_form(session, &run, |x, y| run.body.add_form(form, x, y));
     let (mass, viscosity, elasticity) = (form(Form::Mass), form(Form::Viscosity), form(Form::Elasticity));
     let matrix_of = |k: f64| combine(1.0 / k, &mass, &combine(k, &elasticity, &viscosity));

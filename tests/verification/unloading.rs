@@ -80,7 +80,7 @@ fn to_and_fro(session: &Session, law: &str) {
 /// to the next step; returns whether a derivative was not symmetric.
 pub fn tangent(session: &Session, run: &mut Simulation<2, 4>, law: &str) -> bool {
     let step = run.state.step_length;
-    let two_steps = run.scheme.scheme().states() > 1 && run.state.step > 1;
+    let two_steps = run.scheme.scheme.states() > 1 && run.state.step > 1;
     let length = if two_steps { 2.0 / 3.0 * step } else { step };
     let mut direction = run.state.velocity.like().expect("like");
     let salt = run.state.step as usize;

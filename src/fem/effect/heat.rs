@@ -64,7 +64,7 @@ pub struct Heat<const D: usize> {
     /// Capacity in J/K of the owned nodes; 0 at nodes on edges.
     capacity: Vec<f64>,
     /// Whether the flow of some material depends on the temperature.
-    is_seen_by_flow: bool,
+    pub is_seen_by_flow: bool,
     /// The heat of each material.
     laws: Vec<Option<material::Heat>>,
     /// Conductivity in W/(m K) of the cells.
@@ -76,8 +76,8 @@ pub struct Heat<const D: usize> {
     /// What is released in the step just solved.
     released: Released,
     boundaries: Vec<Boundary>,
-    /// The owned nodes whose temperature is given, each with the boundary that gives it.
-    held: Vec<(u32, u32)>,
+    /// The owned nodes whose temperature is given, ascending, each with the number of the boundary that gives it.
+    pub held: Vec<(u32, u32)>,
     /// Local nodes on edges, each with the ends of its edge.
     middles: Vec<[u32; 3]>,
     /// Work space for the exchange between ranks.
@@ -118,7 +118,7 @@ pub struct Conditions {
     pub power: Vec<f64>,
     /// Convection in W/K at the owned nodes.
     pub film: Vec<f64>,
-    /// Temperatures in K of the nodes where they are given, in the order of [`Heat::held_nodes`].
+    /// Temperatures in K of the nodes where they are given, in the order of [`Heat::held`].
     pub held: Vec<f64>,
 }
 
@@ -255,11 +255,6 @@ impl<const D: usize> Heat<D> {
     /// The capacity in J/K of the owned nodes; 0 at nodes on edges.
     pub fn capacity(&self) -> &[f64] {
         &self.capacity
-    }
-
-    /// The owned nodes whose temperature is given, ascending, each with the number of the boundary that gives it.
-    pub fn held_nodes(&self) -> &[(u32, u32)] {
-        &self.held
     }
 
     /// Whether the convection depends on time.
@@ -428,11 +423,6 @@ impl<const D: usize> Heat<D> {
     /// Whether some material expands.
     pub fn strains(&self) -> bool {
         self.laws.iter().flatten().any(|law| law.expansion.is_some())
-    }
-
-    /// Whether the flow of some material depends on the temperature.
-    pub fn is_seen_by_flow(&self) -> bool {
-        self.is_seen_by_flow
     }
 
     /// Whether the temperature strains the body, or its flow depends on it.

@@ -46,7 +46,7 @@ impl<const D: usize> ResultantTable<D> {
     ) -> Result<Self, Agreed> {
         let resultants = Resultants::new(session, body, state, &job.support)?;
         let mut names: Vec<String> = Vec::new();
-        for source in resultants.sources() {
+        for source in &resultants.sources {
             let name = name(job, *source);
             let same = |number: usize| if number == 1 { name.clone() } else { format!("{name} ({number})") };
             names.extend((1..).map(same).find(|name| !names.contains(name)));
@@ -78,7 +78,7 @@ impl<const D: usize> ResultantTable<D> {
         self.resultants.update(session, body, state, motion, load)?;
         let Self { resultants, names, about, with, file } = self;
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
-            let rows = resultants.sources().iter().zip(resultants.rows());
+            let rows = resultants.sources.iter().zip(resultants.rows());
             for (name, (source, (resultant, areas))) in names.iter().zip(rows) {
                 let motions = match source {
                     Source::Contact(at) => body.contacts[*at].obstacle.motions(),

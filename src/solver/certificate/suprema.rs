@@ -253,7 +253,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
         let body = self.body;
         let part = self.parts()[form];
         match part {
-            Part::Matrix => self.matrix.multiply(x, y),
+            Part::Matrix => self.matrix.solver.multiply(x, y),
             Part::Interior(form) => forms::apply_in_body(body, x, y, |x, y| body.add_form(form, x, y)),
             Part::OfMatrix(form) => {
                 forms::apply_in_body(body, x, y, |x, y| body.add_form_of_matrix(form, x, y))
@@ -273,7 +273,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
     }
 
     fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        self.matrix.precondition(r, z)?;
+        self.matrix.solver.precondition(r, z)?;
         forms::clear_fixed_components(self.body, z)
     }
 

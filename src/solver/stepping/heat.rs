@@ -58,7 +58,7 @@ impl HeatStep {
                 .iter_mut()
                 .zip(heat.capacity())
                 .for_each(|(flag, c)| *flag = f64::from(u8::from(*c == 0.0)));
-            heat.held_nodes().iter().for_each(|(node, _)| flags[*node as usize] = 1.0);
+            heat.held.iter().for_each(|(node, _)| flags[*node as usize] = 1.0);
         }
         known.update_ghosts()?;
         let flags = known.local()?;
@@ -83,7 +83,7 @@ impl HeatStep {
             is_known,
             solver: None,
             length: 0.0,
-            is_held: session.total(heat.held_nodes().len()) > 0,
+            is_held: session.total(heat.held.len()) > 0,
             film_varies: heat.has_varying_film(),
             conditions: Conditions::default(),
             right_hand_side: known.like()?,
@@ -112,7 +112,7 @@ impl HeatStep {
         // The field with the given temperatures, and its conduction.
         self.field.clear();
         self.field.extend_from_slice(heat.temperature());
-        for (&(node, _), value) in heat.held_nodes().iter().zip(&self.conditions.held) {
+        for (&(node, _), value) in heat.held.iter().zip(&self.conditions.held) {
             self.field[node as usize] = *value;
         }
         if self.is_held {
@@ -151,7 +151,7 @@ impl HeatStep {
         entered.truncate(mesh.owned);
         let flows = power.iter().zip(film);
         entered.iter_mut().zip(flows).for_each(|(t, (power, film))| *t = step.length * (power - film * *t));
-        for &(node, _) in heat.held_nodes() {
+        for &(node, _) in &heat.held {
             let node = node as usize;
             let taken = heat.capacity()[node] * changes[node] - self.released[node];
             entered[node] = taken + step.length * self.conducted[node];

@@ -396,7 +396,7 @@ impl ObstacleMotions {
             if grip > 0.0 || motion.stop.is_some() {
                 continue;
             }
-            let driving = laws.obstacle.motions()[freedom as usize].map_or(0.0, |motion| motion.driving());
+            let driving = laws.obstacle.motions()[freedom as usize].map_or(0.0, |motion| motion.driving);
             let [open, _] = self.unbalanced.get(at).copied().unwrap_or([-driving, 0.0]);
             if open == 0.0 {
                 motion.approach = Some(0.0);

@@ -36,7 +36,7 @@ pub(super) struct Lengths {
 }
 
 /// The matrix for steps of one length, and its solver.
-pub(super) struct StepSolver {
+pub struct StepSolver {
     settings: SolverSettings,
     /// The reason for the choice of the preconditioner.
     reason: String,
@@ -113,27 +113,27 @@ impl StepSolver {
     }
 
     /// Whether steps are solved by Newton's method.
-    pub(super) fn is_nonlinear(&self) -> bool {
+    pub fn is_nonlinear(&self) -> bool {
         self.newton.is_some()
     }
 
     /// The preconditioner in use, and the reason for it.
-    pub(super) fn preconditioner(&self) -> (Preconditioner, &str) {
+    pub fn preconditioner(&self) -> (Preconditioner, &str) {
         (self.settings.preconditioner, &self.reason)
     }
 
     /// The precision of factors, if steps are condensed to the contact.
-    pub(super) fn factor_precision(&self) -> Option<Precision> {
+    pub fn factor_precision(&self) -> Option<Precision> {
         self.kind.precision().map(|_| self.precision)
     }
 
     /// Lets the next factors of condensed steps be in double precision.
-    pub(super) fn use_double_precision(&mut self) {
+    pub fn use_double_precision(&mut self) {
         self.precision = Precision::Double;
     }
 
     /// Forgets factors with derivatives at velocities of earlier steps, so that the next step is solved as after a restart.
-    pub(super) fn forget_tangents(&mut self) {
+    pub fn forget_tangents(&mut self) {
         self.with_tangents = None;
     }
 
@@ -263,7 +263,7 @@ impl StepSolver {
     }
 
     /// `y = K x`. Collective.
-    pub(super) fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         self.matrix()?.multiply(x, y)
     }
 
@@ -286,7 +286,7 @@ impl StepSolver {
     }
 
     /// Applies the preconditioner. Collective.
-    pub(super) fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         self.active.as_mut().ok_or_else(unassembled)?.solver.solve(r, z)
     }
 

@@ -7,7 +7,7 @@ use super::{
     force_scale::ForceScale,
     heat::HeatStep,
     integrator::{Integrator, refuse_fast_flow},
-    linear_solver::{Preconditioner, SolverSettings},
+    linear_solver::SolverSettings,
     multistart::solve_and_search,
     problem::StepProblem,
     step_clock::{Stages, StepClock, StepTraffic},
@@ -28,7 +28,7 @@ use crate::{
         state::State,
     },
     job::{Accept, Scheme},
-    linear_algebra::petsc::{DistributedVector, Precision},
+    linear_algebra::petsc::DistributedVector,
     parallel::session::Session,
 };
 use std::time::Instant;
@@ -49,14 +49,17 @@ pub struct StepperSettings<'a> {
 
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
-    scheme: Scheme,
+    /// The scheme.
+    pub scheme: Scheme,
     integrator: Integrator,
     stages: Stages,
-    solver: StepSolver,
-    load: Option<DistributedVector>,
+    /// The linear equations, and the choices for them.
+    pub solver: StepSolver,
+    /// The nodal loads of the last step, if there are loads.
+    pub load: Option<DistributedVector>,
     load_is_current: bool,
     /// Powers in W at the end of the last step, over all ranks; see [`Integrator::complete`].
-    powers: Energy,
+    pub powers: Energy,
     right_hand_side: DistributedVector,
     moving_supports: Option<MovingSupports>,
     force_scale: ForceScale,
@@ -81,8 +84,8 @@ pub struct Stepper {
     other_starts: usize,
     /// Whether steps may exceed the stability bound of explicit flow at the actual stresses.
     accepts_fast_flow: bool,
-    /// The lengths of the steps attempted so far.
-    attempted: Option<StepRange>,
+    /// The lengths of the steps attempted so far, the same on all ranks; none before the first.
+    pub attempted: Option<StepRange>,
     /// Number of preconditioners built.
     pub set_ups: u64,
     /// How often what sliding bodies face was found anew.
@@ -107,19 +110,8 @@ pub struct MatrixOfStep<'a> {
     pub length: f64,
     /// The range that contains this step only.
     pub range: StepRange,
-    solver: &'a mut StepSolver,
-}
-
-impl MatrixOfStep<'_> {
-    /// `y = K x`. Collective.
-    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        self.solver.multiply(x, y)
-    }
-
-    /// Applies the preconditioner. Collective.
-    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        self.solver.precondition(r, z)
-    }
+    /// Multiplies by it, and preconditions it.
+    pub solver: &'a mut StepSolver,
 }
 
 impl Stepper {
@@ -169,59 +161,9 @@ impl Stepper {
         std::mem::take(&mut self.work)
     }
 
-    /// The scheme.
-    pub fn scheme(&self) -> Scheme {
-        self.scheme
-    }
-
-    /// The lengths of the steps attempted so far, the same on all ranks; none before the first.
-    pub fn attempted(&self) -> Option<StepRange> {
-        self.attempted
-    }
-
-    /// Whether steps are solved by Newton's method.
-    pub fn is_nonlinear(&self) -> bool {
-        self.solver.is_nonlinear()
-    }
-
-    /// Whether a vector of nodal loads exists.
-    pub fn has_load(&self) -> bool {
-        self.load.is_some()
-    }
-
-    /// The nodal loads of the last step, if there are loads.
-    pub fn load(&self) -> Option<&DistributedVector> {
-        self.load.as_ref()
-    }
-
     /// The motion at which the forces of the step just committed to the state are balanced.
     pub fn balanced_motion<'a>(&'a self, state: &'a State) -> BalancedMotion<'a> {
         self.integrator.balanced_motion(state, &self.trial)
-    }
-
-    /// The preconditioner in use, and the reason for it.
-    pub fn preconditioner(&self) -> (Preconditioner, &str) {
-        self.solver.preconditioner()
-    }
-
-    /// The precision of factors, if steps are condensed to the contact.
-    pub fn factor_precision(&self) -> Option<Precision> {
-        self.solver.factor_precision()
-    }
-
-    /// Sets the powers that the outcome of the last step of an earlier run had.
-    pub fn restore_powers(&mut self, powers: Energy) {
-        self.powers = powers;
-    }
-
-    /// Lets the next factors of condensed steps be in double precision.
-    pub fn use_double_precision(&mut self) {
-        self.solver.use_double_precision();
-    }
-
-    /// Forgets what depends on earlier steps and is not saved, so that the next step is the first one of a restarted run, too.
-    pub fn forget_tangents(&mut self) {
-        self.solver.forget_tangents();
     }
 
     /// The matrix of a first step of this length in s. Preconditioners are built for this length and powers of two times it.
@@ -662,7 +604,7 @@ impl Stepper {
             for (cause, freedom) in [("force", Freedom::Translation), ("moment", Freedom::Rotation)] {
                 let Some(motion) = contact.obstacle.motion_mut(freedom) else { continue };
                 motion.start(blend, time, ratio);
-                let value = motion.driving();
+                let value = motion.driving;
                 if !value.is_finite() {
                     return Err(Error::Failed(format!(
                         "the {cause} on the obstacle of contact.{number} is {value} at t = {time} s; correct the expression in the job"

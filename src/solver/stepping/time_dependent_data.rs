@@ -63,7 +63,7 @@ impl<const D: usize> TimeDependentData<D> {
         }
         for contact in &body.contacts {
             let motions = contact.obstacle.motions().into_iter().flatten();
-            let forces = motions.map(|motion| motion.force());
+            let forces = motions.map(|motion| &motion.force);
             forces.for_each(|force| add("the force on an obstacle", std::slice::from_ref(force), true));
             contact
                 .obstacle

@@ -1,4 +1,4 @@
-//! An obstacle that a force moves along a direction, or that a moment turns about its centre.
+//! The obstacle of a contact, which a force may move along a direction, and a moment may turn about its centre.
 //!
 //! With the displacement `x` of the obstacle along the direction `d`, the force `F` and the contact tractions, `m x'' = F + R`, where `R`
 //! is the resultant of the tractions on the obstacle along `d`. In a step the displacement and the velocity `w` change as those of the
@@ -52,22 +52,23 @@ impl Freedom {
 /// A motion with one degree of freedom and the force, or the moment, that drives it.
 #[derive(Debug)]
 pub struct LoadedMotion {
-    force: Scalar,
+    /// The force as a function of time.
+    pub force: Scalar,
     mass: f64,
     /// Displacement in m (angle) and velocity in m/s (rad/s) after the last step, and before it.
-    converged: [f64; 2],
+    pub converged: [f64; 2],
     /// The same at the start of the run.
     start: [f64; 2],
     earlier: [f64; 2],
     /// Displacement at the end of the current step, and the velocity in its equations.
     trial: [f64; 2],
     /// The longest way in m (rad) in a step of the run.
-    longest: f64,
+    pub longest_way: f64,
     /// Resultant in N (N m) of the contact tractions in the last step and in the current one.
     resultant: [f64; 2],
     blend: Blend,
     /// The force in N where the equations of the current step hold, and the velocity in m/s from which it starts.
-    driving: f64,
+    pub driving: f64,
     first: f64,
 }
 
@@ -305,22 +306,12 @@ impl LoadedMotion {
             start,
             earlier,
             trial,
-            longest: 0.0,
+            longest_way: 0.0,
             resultant,
             blend: Blend::euler(0.0),
             driving: 0.0,
             first: velocity,
         }
-    }
-
-    /// The force as a function of time.
-    pub fn force(&self) -> &Scalar {
-        &self.force
-    }
-
-    /// Displacement in m and velocity in m/s after the last step.
-    pub fn motion(&self) -> [f64; 2] {
-        self.converged
     }
 
     /// Displacement in m and velocity in m/s where the equations of the last step held.
@@ -368,11 +359,6 @@ impl LoadedMotion {
     /// Sets the velocity from which the step starts.
     pub fn restart(&mut self) {
         self.set_velocity(self.first);
-    }
-
-    /// The force in N in the equations of the step.
-    pub fn driving(&self) -> f64 {
-        self.driving
     }
 
     /// The velocity in m/s in the equations of the step.
@@ -461,14 +447,9 @@ impl LoadedMotion {
         [error, velocity].map(|velocity| self.mass * velocity * velocity)
     }
 
-    /// The longest way in m (rad) in a step of the run.
-    pub fn longest_way(&self) -> f64 {
-        self.longest
-    }
-
     fn commit(&mut self) {
         (self.earlier, self.converged) = (self.converged, self.end());
-        self.longest = larger(self.longest, (self.converged[0] - self.earlier[0]).abs());
+        self.longest_way = larger(self.longest_way, (self.converged[0] - self.earlier[0]).abs());
         self.resultant[0] = self.resultant[1];
     }
 }
@@ -510,7 +491,7 @@ mod tests {
         assert_eq!(disc.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
         assert_eq!(disc.seen_before(&[1.0, 0.0]), [1.0, 0.0]);
         disc.commit();
-        assert_eq!(disc.motions().map(|motion| motion.expect("both").motion()), [[1.0, 2.0]; 2]);
+        assert_eq!(disc.motions().map(|motion| motion.expect("both").converged), [[1.0, 2.0]; 2]);
         disc.set_load(&ObstacleLoad { direction: vec![], ..load });
         assert_eq!((disc.seen_after(&[1.0, 0.0]), disc.moves()), ([1.0, 0.0], false));
     }
@@ -520,7 +501,7 @@ mod tests {
         let mut obstacle = falling();
         obstacle.restore([0.0, 2.0, 0.0, 1.5]);
         obstacle.start(Blend::euler(0.5), 0.5, Some(2.0));
-        assert_eq!((obstacle.velocity(), obstacle.driving()), (3.0, 6.0));
+        assert_eq!((obstacle.velocity(), obstacle.driving), (3.0, 6.0));
         // 2 m/s + 6 N / 3 kg 0.5 s = 3 m/s.
         assert_eq!(obstacle.change_to_free(), 0.0);
         obstacle.set_velocity(7.0);
@@ -540,7 +521,7 @@ mod tests {
         assert_eq!(obstacle.unbalanced(0.0), [0.0, 12.0]);
         assert_eq!(obstacle.unbalanced(-2.0)[0], 2.0);
         obstacle.commit();
-        assert_eq!(obstacle.motion(), [1.0, 2.0]);
+        assert_eq!(obstacle.converged, [1.0, 2.0]);
         // The second-order formula: x~ = 4/3 1, w~ = 4/3 2 - 1/3 1 = 7/3, k' = 1/3 s; 3 m/s are 3 (3 - 7/3) / (1/3) = 6 N.
         obstacle.start(
             Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(1.0 / 3.0) },
@@ -550,7 +531,7 @@ mod tests {
         obstacle.set_velocity(3.0);
         assert!(obstacle.unbalanced(0.0)[0].abs() < 1e-13);
         obstacle.commit();
-        assert!((obstacle.motion()[0] - 7.0 / 3.0).abs() < 1e-15);
+        assert!((obstacle.converged[0] - 7.0 / 3.0).abs() < 1e-15);
         let mut other = falling();
         other.restore(obstacle.saved());
         assert_eq!(other.saved(), obstacle.saved());
@@ -567,7 +548,7 @@ mod tests {
         let values = [OBSTACLE_KINETIC, OBSTACLE_WORK, WORK, OBSTACLE_NUMERICAL].map(|kind| energy[kind]);
         assert_eq!(values, [9.375, 5.25, 2.625, 0.0]);
         obstacle.commit();
-        assert_eq!((obstacle.motion(), obstacle.resultant()), ([0.875, 2.5], 3.0));
+        assert_eq!((obstacle.converged, obstacle.resultant()), ([0.875, 2.5], 3.0));
         assert_eq!(obstacle.balanced(), [0.4375, 1.75], "at the midpoint");
         // Implicit Euler to 4 m/s: 3 kg 1.5 m/s / 0.5 s = 9 N over 2 m; 1/2 3 kg (1.5 m/s)^2 are lost.
         obstacle.start(Blend::euler(0.5), 1.0, None);
@@ -591,7 +572,7 @@ mod tests {
         light.start(Blend::midpoint(0.5), 1.0, None);
         light.set_velocity(1.75);
         light.commit();
-        assert_eq!(light.motion(), [0.875, 1.75]);
+        assert_eq!(light.converged, [0.875, 1.75]);
     }
 
     #[test]

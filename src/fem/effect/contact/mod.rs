@@ -1,5 +1,8 @@
 //! Contact: a law at the quadrature points of a boundary.
 //!
+//! A [`Contact`] consists of the law along the normal with its points, friction with its own, and the obstacle, each of which answers what
+//! concerns it alone. `Contact` has what combines them.
+//!
 //! At nodal points the unknown `x` of a step contains the parameter of the law's graph in place of the velocity along the
 //! normal: `s = c v + p`, which is `c f (x . m)`, where `m` is the normal without prescribed components, scaled to length 1, and
 //! `f` its length before scaling. [`Contact::map`] converts unknowns into velocities: `v = x + (V(s) / f - x . m) m`. Graphs may

@@ -15,9 +15,10 @@ const INDEPENDENT: f64 = 0.02;
 /// Cosine of 40 degrees, the angle by which facets of a smooth boundary turn at most.
 const SMOOTH: f64 = 0.766;
 
-/// Tells points how their normals are directed to the motion of the obstacle. Lets held nodes stop obstacles that forces move. Gives each node of a smooth boundary to one contact, and each edge to the friction of
-/// one boundary. Where directions at a node are not orthogonal, selects their dual basis or, for smooth laws without friction, the
-/// velocity as the unknown. Refuses laws with vertical parts at Gauss points.
+/// Tells points how their normals are directed to the motion of the obstacle, and lets held nodes stop obstacles that forces move. Gives
+/// each node of a smooth boundary to one contact, and each edge to the friction of one boundary. Where directions at a node are not
+/// orthogonal, selects their dual basis or, for smooth laws without friction, the velocity as the unknown. Refuses laws with vertical parts
+/// at Gauss points.
 pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
     give_nodes_to_one_contact(contacts);
     for contact in &mut *contacts {

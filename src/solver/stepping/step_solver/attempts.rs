@@ -400,7 +400,7 @@ impl StepSolver {
         let mut driving = 0.0;
         for contact in &mut body.contacts {
             let [along, _] = contact.obstacle.motions();
-            let own = along.map_or(0.0, |motion| motion.driving().abs());
+            let own = along.map_or(0.0, |motion| motion.driving.abs());
             contact.reference.forces = total.max(own);
             driving = larger(driving, own);
         }
