@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import fields, program, tables
+from . import fields, over_time, program, tables
 from .errors import Damaged, Error, NoResults, Unfinished
 
 if TYPE_CHECKING:
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 # The first word of a quantity in [check] and the table that it names, with the column of the name behind it.
 TABLES = {"history": "", "resultant": "source", "probe": "probe", "profile": "profile"}
-# Words of a quantity that only studies compute.
-OF_STUDIES = ("mean", "amplitude", "period", "arrival")
 
 
 @dataclass(frozen=True)
@@ -164,16 +162,11 @@ class Results:
         return fields.grid(self.folder / "fields.vtkhdf", time, nearest)
 
     def quantity(self, name: str) -> float:
-        """A number by its name in `[check]`, in SI units: `max_von_mises`, `history.COLUMN`, `probe.NAME.max.COLUMN`, ..
-
-        Means over time, amplitudes, periods and arrivals are quantities of `clarke.sweep`.
-        """
+        """A number by its name in `[check]`, in SI units: `max_von_mises`, `history.COLUMN`, `probe.NAME.max.COLUMN`, .."""
         word, _, rest = name.partition(".")
         if word not in TABLES:
             return self._of_summary(name)
         of, side, column = _parts(word, rest)
-        if side in OF_STUDIES:
-            raise Error(f"{name} is a quantity of studies: clarke.sweep(.., responses=[{name!r}])")
         table = self.columns("history") if word == "history" else self.columns(f"{word}s", of)
         if column not in table:
             raise Error(f"{name}: no column {column}; there are {', '.join(table)}")
@@ -182,6 +175,11 @@ class Results:
             values = [value for value, time in zip(values, table["time"], strict=True) if time == table["time"][-1]]
         if not values:
             raise NoResults(f"{name}: the table has no rows yet")
+        if word != "profile" and side in over_time.NUMBERS:
+            number = over_time.NUMBERS[side](table["time"], values)
+            if number is None:
+                raise NoResults(f"{name}: the values have no {side}")
+            return number
         ends = {"": values[-1], "first": values[0], "max": max(values), "min": min(values)}
         if side not in ends:
             raise Error(f"{name}: {side} is no extremum; write history.COLUMN, history.max.COLUMN or history.min.COLUMN")
@@ -200,10 +198,10 @@ class Results:
         return [self._checked(name, expected) for name, expected in self.job.get("check", {}).items()]
 
     def _checked(self, name: str, expected: Mapping[str, Any]) -> Check:
-        word, _, rest = name.partition(".")
-        if word in TABLES and _parts(word, rest)[1] in OF_STUDIES:
-            return Check(name, expected["value"], math.nan, None, "a quantity of studies: clarke.sweep has it")
-        value = self.quantity(name)
+        try:
+            value = self.quantity(name)
+        except NoResults as error:
+            return Check(name, expected["value"], math.nan, False, str(error))
         if any(isinstance(number, str) for number in expected.values()):
             return Check(name, expected["value"], value, None, "a formula of parameters, which only the program evaluates")
         off = abs(value - expected["value"])
@@ -232,7 +230,7 @@ def _parts(word: str, rest: str) -> tuple[str, str, str]:
     if not TABLES[word]:
         return "", before, column
     of, dot, side = before.rpartition(".")
-    is_side = dot and side in ("max", "min", "first", *OF_STUDIES)
+    is_side = dot and side in ("max", "min", "first", *over_time.NUMBERS)
     return (of, side, column) if is_side else (before, "", column)
 
 

@@ -40,13 +40,29 @@ class Sweeps(unittest.TestCase):
 
     def test_jobs_in_memory_sweep_over_words_and_draws(self) -> None:
         vary = {"time.scheme": ["implicit_euler", "bdf2"], "initial.velocity.0": {"from": 0.5, "to": 1.0, "draws": 2, "seed": 3}}
+        changes = {"time.end": 0.01, "parameters.spare": 1.0}
         sweep = clarke.sweep(
-            sample.sliding_block(), vary, [DISPLACEMENT], folder=sample.folder() / "sweep", set={"time.end": 0.01}, quiet=True
+            sample.sliding_block(), vary, [DISPLACEMENT], folder=sample.folder() / "sweep", set=changes, quiet=True
         )
         table = sweep.columns
+        # A parameter that nothing uses is warned of.
+        self.assertEqual((list(sweep.warnings), table["warnings"]), (table["run"], [1.0] * 4))
+        self.assertIn("spare", sweep.warnings[table["run"][0]][0])
         self.assertEqual(sorted(table["time.scheme"]), ["bdf2", "bdf2", "implicit_euler", "implicit_euler"])
         self.assertTrue(all(0.5 <= speed <= 1.0 for speed in table["initial.velocity.0"]))
         self.assertFalse((sweep.folder / "study.toml").exists())
+
+    def test_numbers_over_time_are_those_that_a_run_gives_from_its_own_tables(self) -> None:
+        responses = [f"probe.centre.{side}.velocity_x" for side in ("mean", "amplitude", "period", "arrival")]
+        # Without friction the velocity is 1 m/s + (1 - cos(40 pi t))/(40 pi) m/s.
+        changes = {"body_force.0.value.0": "1e3*sin(40*pi*t)", "check": {responses[2]: {"value": 0.05, "relative": 1e-2}}}
+        sweep = clarke.sweep(
+            sample.sliding_block(), {COEFFICIENT: [0.0]}, responses, folder=sample.folder() / "sweep", set=changes, quiet=True
+        )
+        (name,) = sweep.columns["run"]
+        for response in responses:
+            self.assertAlmostEqual(sweep.columns[response][0], sweep.run(name).quantity(response), delta=1e-12)
+        self.assertAlmostEqual(sweep.columns[responses[2]][0], 0.05, delta=1e-3)
 
     def test_refused_members_are_listed_and_the_others_have_values(self) -> None:
         with contextlib.redirect_stderr(io.StringIO()) as shown:
