@@ -1,13 +1,17 @@
 //! Forces of a contact on the body, and the parts of its area by state.
 
-use super::{Contact, friction::FrictionStatus, point::Vectors::Body};
+use super::{
+    Contact,
+    friction::FrictionStatus,
+    point::{Unknown, Vectors::Body},
+};
 use crate::{
     error::Result,
     linear_algebra::tensor::{Vector, add_scaled, larger},
 };
 
-/// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points of constraints whose normal a support
-/// holds count for friction only, unless they stop an obstacle that a force moves.
+/// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points whose normal a support holds count for friction
+/// only, unless a force moves the obstacle, which they stop.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactAreas {
     /// With contact pressure.
@@ -57,7 +61,8 @@ impl<const D: usize> Contact<D> {
     /// Areas and pressures on this rank in the step just solved, at its velocities with ghosts.
     pub fn areas(&self, velocity: &[f64]) -> ContactAreas {
         let mut areas = ContactAreas { largest_pressure: f64::NEG_INFINITY, ..ContactAreas::default() };
-        for point in self.normal.points.iter().filter(|point| point.carries(&self.normal.law)) {
+        let stops = self.obstacle.moves();
+        for point in self.normal.points.iter().filter(|point| point.unknown != Unknown::Held || stops) {
             let pressure = point.pressure_at(&self.normal.law, Body, velocity);
             if pressure == 0.0 {
                 areas.open += point.area();
