@@ -110,3 +110,23 @@ fn a_boundary_without_a_name_is_named_by_its_number() {
     );
     case("group 9", "3").run_with(1, &[]).expect(2).says("no boundary \"group 9\"");
 }
+
+/// Two triangles in a Gmsh file without physical groups.
+const WITHOUT_GROUPS: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n\
+    $Elements\n2\n1 2 2 0 1 1 2 3\n2 2 2 0 1 1 3 4\n$EndElements\n";
+
+#[test]
+fn a_surface_that_the_file_does_not_name_is_a_boundary_all_the_same() {
+    let case = Case::written_as(
+        "[mesh]\nfile = 'square.msh'\n[material]\nhypothesis = 'plane_stress'\nelasticity = { youngs_modulus = 10, poisson_ratio = 0 }\n\
+         [[support]]\non = ['surface']\nwhere = 'y < 0.1'\nfix = 'all'\n\
+         [[traction]]\non = ['surface']\nwhere = 'y > 0.9'\nvalue = [0, 1]\n\
+         [time]\nend = 1\nstep = 1\nscheme = 'implicit_euler'\n[output]\nprobe = [{ name = 'top', point = [0.5, 1] }]\n",
+    );
+    std::fs::write(case.folder().join("square.msh"), WITHOUT_GROUPS).expect("written");
+    let words = "square.msh: the file names no part of the surface: all of it is the boundary `surface`";
+    case.run_with(2, &[]).expect(0).says(words);
+    let found = case.results().table("probes.csv").last("displacement_y");
+    assert!((found - 0.1).abs() < 1e-8, "{found}");
+    run_alone(&["check", &case.written().display().to_string()]).expect(0).says(words);
+}

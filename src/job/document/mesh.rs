@@ -80,8 +80,8 @@ pub enum MeshSource {
     Box(Blocks<Cuboid>),
     /// A mesh file, relative to the job file: of Gmsh (.msh of version 2 or 4), of Abaqus or CalculiX (.inp), of VTK (.vtu), or the .h5
     /// file that `solver partition` made from one. Physical groups, sets and surfaces, or numbers of cells, name its boundaries and
-    /// regions; the boundary that has only the number 3 is "3" or "group 3". Quadrilaterals are split into triangles; hexahedra, wedges
-    /// and pyramids into tetrahedra.
+    /// regions; the boundary that has only the number 3 is "3" or "group 3". If the file names no part of the surface,
+    /// all of it is the boundary "surface". Quadrilaterals are split into triangles; hexahedra, wedges and pyramids into tetrahedra.
     File(#[schemars(extend("format" = "path"), example = "../../meshes/block.msh")] PathBuf),
 }
 

@@ -78,6 +78,9 @@ pub(super) fn assemble<const D: usize>(document: &mut Document) -> Result<Global
     let corner = |tag| Ok(Some(id(tag, 0)?).filter(|&id| id != UNUSED));
     let notes = name_node_sets(&mut mesh, document, corner)?;
     document.notes.extend(notes);
+    if mesh.boundaries.is_empty() {
+        document.notes.push(name_surface(&mut mesh));
+    }
     check::nodes(&mesh, &tags)?;
     Ok(mesh)
 }
@@ -377,6 +380,22 @@ fn name_boundaries<const D: usize>(
         mesh.boundaries.push(Boundary { name, facets });
     }
     Ok(())
+}
+
+/// Makes the whole surface a boundary, which `where` divides; gives what the user should know.
+fn name_surface<const D: usize>(mesh: &mut GlobalMesh<D>) -> String {
+    let points = mesh.point_sets.iter().map(|set| &set.name);
+    let used: HashSet<&String> = points.chain(mesh.inner_groups.iter().map(|group| &group.name)).collect();
+    let mut name = "surface".to_owned();
+    while used.contains(&name) {
+        name.insert_str(0, "whole ");
+    }
+    let note = format!(
+        "the file names no part of the surface: all of it is the boundary `{name}`, of which supports, loads and contacts take parts \
+         by `where`"
+    );
+    mesh.boundaries.push(Boundary { name, facets: (0..mesh.facets.len() as u32).collect() });
+    note
 }
 
 /// The facets of a physical group.

@@ -176,8 +176,15 @@ fn a_file_without_numbers_of_cells_is_one_region_and_says_so() {
     let text = SQUARE.replace("\"region\" format", "\"pressure\" format");
     let file = super::super::parse(text.as_bytes(), &Placement::default()).expect("a mesh");
     let AnyMesh::Two(mesh) = file.mesh else { panic!("a mesh in space") };
-    assert_eq!((mesh.regions, mesh.boundaries.len()), (vec!["body".to_owned()], 0));
-    assert!(file.notes[0].contains("all cells are the region body") && file.notes[0].contains("`where`"));
+    assert_eq!(mesh.regions, ["body"]);
+    assert!(file.notes[0].contains("all cells are the region body"), "{:?}", file.notes);
+    assert_eq!(mesh.boundaries.iter().map(|b| &*b.name).collect::<Vec<_>>(), ["surface"]);
+    assert_eq!(mesh.boundaries[0].facets.len(), mesh.facets.len());
+    assert!(
+        file.notes.iter().any(|note| note.contains("all of it is the boundary `surface`")),
+        "{:?}",
+        file.notes
+    );
 }
 
 #[test]

@@ -46,8 +46,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Document> {
     cells::add(&mut document, &cells::Cells { types, ends, nodes, groups: of_cells })?;
     if !arrays.keys().any(|(parent, name)| parent == "CellData" && REGIONS.contains(&name.as_str())) {
         document.notes.push(format!(
-            "the file has no cell array that names regions and boundaries ({}): all cells are the region body, and no boundary has a \
-             name. Name parts of the surface in the job by `where`",
+            "the file has no cell array that names regions and boundaries ({}): all cells are the region body",
             REGIONS.join(", ")
         ));
     }
