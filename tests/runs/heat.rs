@@ -171,6 +171,24 @@ fn temperatures_below_zero_kelvin_are_refused_where_they_are_given_and_where_the
         .says("check the fluxes");
 }
 
+/// Long steps, whose solution is not exact anywhere; temperatures there are differences, counted from 0.
+#[test]
+fn rounding_errors_below_zero_kelvin_are_none_and_given_temperatures_are_exact() {
+    let case = square()
+        .set("material.heat", "{ conductivity = 50, capacity = 1e-3 }")
+        .set("initial.temperature", "0")
+        .set("heat", "[{ on = ['left'], temperature = '600*t' }, { on = ['right'], temperature = '0' }]")
+        .set("output.probe_also", "['temperature']")
+        .set("output.probe", "[{ name = 'held', point = [1, 0.5] }, { name = 'hot', point = [0, 0.5] }]")
+        .run_and_keep(1);
+    let probes = case.results().table("probes.csv");
+    let held = probes.only("probe", "held").numbers("temperature");
+    assert!(held.iter().all(|value| *value == 0.0), "{held:?}");
+    let (times, hot) =
+        (probes.only("probe", "hot").numbers("time"), probes.only("probe", "hot").numbers("temperature"));
+    assert!(times.iter().zip(&hot).all(|(time, value)| (600.0 * time - value).abs() < 1e-12), "{hot:?}");
+}
+
 #[test]
 fn a_step_that_fails_leaves_temperature_and_motion_as_they_were() {
     let case = |end: &str, every: &str| {

@@ -18,7 +18,7 @@ use crate::{
     laws::material::{self, Material},
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
-        tensor::{Vector, dot, norm},
+        tensor::{Vector, dot, larger, norm},
     },
     mesh::{
         Mesh,
@@ -27,6 +27,9 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
 };
 use std::collections::BTreeMap;
+
+/// What is below 0 K by less than this share of the highest temperature of the body is an error of rounding or of the solution of a step.
+const ROUNDING: f64 = 1e-10;
 
 /// Heat that the body has stored since the start of the run.
 pub const STORED_HEAT: EnergyKind = EnergyKind::new(14, Role::HeatSpent, "stored_heat");
@@ -268,26 +271,33 @@ impl<const D: usize> Heat<D> {
         self.boundaries.iter().flat_map(|boundary| boundary.given.expressions()).map(|(_, value)| value)
     }
 
-    /// Adds these changes of the owned nodes in K over the step just committed, and keeps its powers. Collective.
-    pub fn commit(&mut self, changes: &[f64]) -> Result<()> {
+    /// Adds these changes of the owned nodes in K over the step just committed, which [`Self::check`] has accepted, and keeps its powers.
+    /// Nodes whose temperature is given get it without rounding. Collective.
+    pub fn commit(&mut self, changes: &[f64], given: &[f64]) -> Result<()> {
         let Released { friction, viscosity, .. } = &self.released;
         for (field, power) in self.powers.iter_mut().zip([friction, viscosity]) {
             field.values.copy_from_slice(power);
         }
-        self.temperature.values.iter_mut().zip(changes).for_each(|(value, change)| *value += change);
+        let values = &mut self.temperature.values;
+        values.iter_mut().zip(changes).for_each(|(value, change)| *value = (*value + change).max(0.0));
+        self.held.iter().zip(given).for_each(|(&(node, _), given)| values[node as usize] = *given);
         self.refresh()
     }
 
-    /// Refuses changes in K of the owned nodes that lead to what is no temperature.
-    pub fn check(&self, mesh: &Mesh<D>, changes: &[f64]) -> Result<()> {
-        let after = self.temperature_of_owned().iter().zip(changes).map(|(value, change)| value + change);
-        match after.zip(&mesh.nodes).find(|(value, _)| !is_temperature(*value)) {
+    /// Refuses changes in K of the owned nodes that lead to what is no temperature, but for rounding errors. Collective.
+    pub fn check(&self, session: &Session, mesh: &Mesh<D>, changes: &[f64]) -> Result<(), Agreed> {
+        let before = self.temperature_of_owned();
+        let after = || before.iter().zip(changes).map(|(value, change)| value + change);
+        let [largest] = session.largest([before.iter().copied().chain(after()).fold(0.0, larger)]);
+        let is_sound = |value: &f64| is_temperature(value + ROUNDING * largest);
+        session.agree(match after().zip(&mesh.nodes).find(|(value, _)| !is_sound(value)) {
             None => Ok(()),
             Some((value, place)) => Err(Error::Failed(format!(
                 "the temperature at the end of the step is {value} K at {place:?} m; check the fluxes of [[heat]], or use shorter steps or \
-                 cells without obtuse angles"
+                 cells without obtuse angles. Temperatures are absolute: to count them from 0, add the same, such as 300 K, to all of them, \
+                 also to `reference`"
             ))),
-        }
+        })
     }
 
     /// The matrix of conduction in W/K, in which some local nodes are coupled to nothing, with empty rows of nodes on edges. Collective.

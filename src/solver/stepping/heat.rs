@@ -139,8 +139,14 @@ impl HeatStep {
         if !self.is_held {
             self.balance(session, heat.capacity(), step.length)?;
         }
-        let Conditions { power, film, .. } = &self.conditions;
-        session.agree(heat.check(mesh, &self.change.owned()?))?;
+        let Conditions { power, film, held } = &self.conditions;
+        {
+            let (mut changes, before) = (self.change.owned_mut()?, heat.temperature());
+            for (&(node, _), value) in heat.held_nodes().iter().zip(held) {
+                changes[node as usize] = value - before[node as usize];
+            }
+        }
+        heat.check(session, mesh, &self.change.owned()?)?;
         self.change.update_ghosts()?;
         self.field.clear();
         let (before, changes) = (heat.temperature(), self.change.local()?);
@@ -168,7 +174,7 @@ impl HeatStep {
     /// Makes the temperature just found that of the body. Collective.
     pub(super) fn commit<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
         let Some(heat) = &mut body.heat else { return Ok(()) };
-        heat.commit(&self.change.owned()?)
+        heat.commit(&self.change.owned()?, &self.conditions.held)
     }
 
     /// Prepares the matrix of a step of this length in s, unless it is. Collective.
