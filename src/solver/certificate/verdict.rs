@@ -20,6 +20,8 @@ pub struct Verdict {
 /// steps are short enough for any.
 const LAGGING_FALL: f64 = 2e-3;
 const LAGGING_STEP: f64 = 0.02;
+/// The share of a step below which the stability bound is a rounding error of 0.
+const NOTHING: f64 = 1e-9;
 
 impl Certificates {
     /// Evaluates the certificates for a fixed step of this length. `unique_step` is the largest step for which `theta_step` is
@@ -199,15 +201,27 @@ impl Verdict {
             self.brief.push(stable);
             return;
         }
-        let found = format!(
-            "the step of {step} s exceeds {least_bound} s, above which explicit stresses amplify errors"
-        );
+        let accepts = "or accept it with [solver] accept = [\"explicit_stability\"]";
+        let (found, remedy) = if bound < NOTHING * step {
+            (
+                "no step is stable: lagged_euler takes the forces of springs and of the elastic stress at the start of the step, and nothing \
+                 viscous and no mass resists a motion that only they hold, such as a rigid motion of a body on springs"
+                    .to_owned(),
+                format!(
+                    "give supports with `stiffness` also `damping`, the material a `density`, use [time] scheme = \"implicit_euler\" or \
+                     \"bdf2\", {accepts}"
+                ),
+            )
+        } else {
+            (
+                format!(
+                    "the step of {step} s exceeds {least_bound} s, above which explicit stresses amplify errors"
+                ),
+                format!("use a step below {least_bound} s, [time] scheme = \"implicit_euler\", {accepts}"),
+            )
+        };
         self.words.push(found.clone());
         self.brief.push(found.clone());
-        let remedy = format!(
-            "use a step below {least_bound} s, [time] scheme = \"implicit_euler\", or accept it with \
-             [solver] accept = [\"explicit_stability\"]"
-        );
         self.judge(found, remedy, accepted);
     }
 
@@ -350,6 +364,17 @@ mod tests {
         let all = [Accept::Uniqueness, Accept::ExplicitStability];
         let accepted = known.verdict(0.125, Some(0.05), &all);
         assert!(accepted.refusals.is_empty() && accepted.warnings.len() == 2);
+    }
+
+    #[test]
+    fn a_bound_that_is_a_rounding_error_is_no_remedy() {
+        let known = Certificates { explicit_step_bound: Some(1.78543e-20), ..paper() };
+        let (found, remedy) = known.verdict(0.04, None, &[]).refusals.remove(0);
+        assert!(found.contains("no step is stable") && !found.contains("e-20"), "{found}");
+        assert!(
+            remedy.contains("`damping`") && remedy.contains("bdf2") && !remedy.contains("e-20"),
+            "{remedy}"
+        );
     }
 
     #[test]
