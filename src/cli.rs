@@ -26,6 +26,7 @@ use std::{
     io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
+    sync::LazyLock,
     time::Instant,
 };
 
@@ -45,11 +46,14 @@ Exit codes: 0 done, 1 the run failed, 2 job or command line refused, 3 stopped w
 const COMMANDS: [&str; 10] =
     ["run", "check", "describe", "inspect", "partition", "study", "report", "remesh", "completion", "man"];
 
+/// What stands behind the name of the program where it states its version.
+static STATED: LazyLock<String> = LazyLock::new(|| format!("(Clarke) {}", run::version()));
+
 /// Dynamic contact of viscoplastic bodies with nonmonotone boundary laws.
 #[derive(Debug, Parser)]
 #[command(
     name = "solver",
-    version = run::version(),
+    version = STATED.as_str(),
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     arg_required_else_help = true,

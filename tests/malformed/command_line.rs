@@ -87,7 +87,7 @@ fn bad_command_lines_are_refused_once_and_leave_nothing() {
 fn alone_the_solver_shows_how_it_is_used() {
     run_alone::<&str>(&[]).expect(2).says("Usage: solver");
     run_alone(&["--help"]).expect(0).says("Exit codes: 0 done");
-    run_alone(&["--version"]).expect(0).says(env!("CARGO_PKG_VERSION"));
+    run_alone(&["--version"]).expect(0).says(concat!("solver (Clarke) ", env!("CARGO_PKG_VERSION")));
 }
 
 /// Manual pages and scripts for shells mention every command, and bash can read its script.
