@@ -244,3 +244,43 @@ fn a_stiff_body_on_soft_springs_repeats_no_iteration_in_vain() {
         assert!(found <= 30.0, "{modulus} Pa, {preconditioner}: {found} iterations");
     }
 }
+
+#[test]
+fn damage_that_never_comes_takes_no_further_iterations() {
+    let block = r#"
+        [mesh]
+        order = 2
+        [mesh.box]
+        size = [1.0, 0.5, 0.4]
+        cells = [4, 2, 2]
+        [material]
+        density = 1000.0
+        elasticity = { youngs_modulus = 1e7, poisson_ratio = 0.3 }
+        DAMAGE
+        [[support]]
+        on = ["left"]
+        fix = "normal"
+        [[traction]]
+        on = ["back"]
+        value = ["5e3*sin(8*t)", 0.0, "-2e4*min(t/0.1, 1)"]
+        [[contact]]
+        on = ["front"]
+        normal.unilateral = {}
+        friction.rate_and_state = { reference = 0.3, velocity = 1e-3, direct = 0.01, evolution = 0.008, distance = 1e-4 }
+        [time]
+        end = 0.2
+        step = 0.05
+        scheme = "bdf2"
+        [solver]
+        accept = ["uniqueness"]
+    "#;
+    let [without, with] = ["", "damage = { threshold = 1e9, viscosity = 100.0 }"]
+        .map(|damage| Case::written_as(&block.replace("DAMAGE", damage)));
+    for ranks in [1, 2] {
+        let [without, with] = [&without, &with].map(|case| case.run(ranks));
+        for key in ["newton_iterations", "linear_iterations"] {
+            let [bare, found] = [&without, &with].map(|results| results.number(key));
+            assert!(found <= 1.5 * bare, "{key} on {ranks}: {found}, without damage {bare}");
+        }
+    }
+}

@@ -54,9 +54,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.surface_acts() || !self.called(|p| p.end.is_some() && !p.is_monotone).is_empty()
     }
 
-    /// Whether steps are nonlinear without contact by cells alone, without damage and effects at the surface.
-    pub fn only_cells_flow(&self) -> bool {
-        self.flows() && !self.surface_acts() && self.called(|p| p.end.is_some() && p.weakens).is_empty()
+    /// Whether steps are nonlinear without contact by cells alone, without effects at the surface.
+    pub fn only_cells_act(&self) -> bool {
+        self.flows() && !self.surface_acts()
     }
 
     /// Whether steps are nonlinear without contact by effects at the surface alone.
@@ -80,6 +80,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let cells = self.called(|p| p.end.is_some() && p.weakens).select(&self.effects).map(|e| e.name());
         let surface = self.surface_effects.iter().filter(|e| !self.is_explicit() && e.softens());
         cells.chain(surface.map(|e| e.name()))
+    }
+
+    /// Whether there are such effects.
+    pub fn softens(&self) -> bool {
+        self.softening().next().is_some()
     }
 
     /// Whether these include effects at the surface.

@@ -14,9 +14,7 @@ pub(super) fn covers_steps<const D: usize, const S: usize>(body: &Body<D, S>, st
             || contact.obstacle.is_driven()
             || contact.laws().decrease_per_pressure(step_length).is_some()
     };
-    !body.contacts.iter().any(is_uncovered)
-        && body.softening().next().is_none()
-        && !body.flows_beside_viscosity()
+    !body.contacts.iter().any(is_uncovered) && !body.softens() && !body.flows_beside_viscosity()
 }
 
 /// Descriptions of effects that depend on the unknown contact pressures, and of effects that may soften the body at the end of a

@@ -84,9 +84,9 @@ impl ProblemSize {
             steps,
             interface: interface_nodes(session, &body.mesh)?.len() * D + motions,
             contact: !contacts.is_empty(),
-            condensed: !contacts.is_empty()
+            condensed: (!contacts.is_empty() || body.only_cells_act())
                 && !contacts.iter().any(|contact| contact.normal.needs_ghosts)
-                && (!body.flows() || body.only_cells_flow() || body.only_surface_acts())
+                && (!body.flows() || body.only_cells_act() || body.only_surface_acts())
                 && motions <= MAX_CONDENSED_MOTIONS,
             friction: contacts.iter().any(|contact| contact.friction.is_some()),
             precision: if body.flows() { FactorPrecision::Double } else { precision },

@@ -72,7 +72,8 @@ pub(super) struct FlowCorrections {
     earlier: Anderson,
     /// `b - F_i`.
     right_hand_side: DistributedVector,
-    /// The velocity from which corrections go on.
+    /// The velocities from which the step was started, and from which corrections go on.
+    first: DistributedVector,
     start: DistributedVector,
     /// The norm of the residual that the last one left, in N.
     left: f64,
@@ -99,6 +100,7 @@ impl FlowCorrections {
             change: like.like()?,
             earlier: Anderson::new(like)?,
             right_hand_side: like.like()?,
+            first: like.like()?,
             start: like.like()?,
             left: f64::INFINITY,
             whole: None,
@@ -106,9 +108,20 @@ impl FlowCorrections {
         })
     }
 
-    /// Begins a step.
-    pub(super) fn begin(&mut self) {
+    /// Begins a step from this velocity.
+    pub(super) fn begin(&mut self, velocity: &DistributedVector) -> Result<()> {
         self.left = f64::INFINITY;
+        self.first.copy_from(velocity)
+    }
+
+    /// Goes back to where the step was begun.
+    pub(super) fn go_back<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        velocity: &mut DistributedVector,
+    ) -> Result<()> {
+        velocity.copy_from(&self.first)?;
+        restore_pressures(problem.body, problem.state)
     }
 
     /// Makes corrections of the velocity in `trial` with a solver of the matrix of the step. Collective.
@@ -156,12 +169,18 @@ impl FlowCorrections {
             solver.expand(of_contact, trial)?;
             self.evaluate(problem, of_step, other, trial)?;
             let left = self.residual()?;
-            if left <= (1.0 - CONTACT_SHARE) * system.tolerance {
-                trial.update_ghosts()?;
-                return Ok(Corrected::Solved(StepOutcome { residual: sum.residual.hypot(left), ..sum }));
-            }
             let last = std::mem::replace(&mut self.left, left);
             let (is_better, is_slow) = (left <= last, left.is_nan() || left > share * last);
+            // Rounding errors do not fall from one correction to the next.
+            if left <= (1.0 - CONTACT_SHARE) * system.tolerance
+                || is_slow && system.floor.is_reached(left, trial.norm()?)
+            {
+                trial.update_ghosts()?;
+                if !has_tangents && self.softens(problem, trial)? {
+                    break;
+                }
+                return Ok(Corrected::Solved(StepOutcome { residual: sum.residual.hypot(left), ..sum }));
+            }
             if is_slow && has_tangents && number == 0 {
                 self.shorten(problem, of_step, system.matrix, trial)?;
                 break;
@@ -241,6 +260,20 @@ impl FlowCorrections {
         let start = problem.flow_start;
         let (cells, _) = problem.body.cells_and_contacts();
         Ok(self.flow.of(cells, start).tangents(velocity)?.clone())
+    }
+
+    /// Whether forces fall with the displacement, or did so before, in some cell at a velocity: only a factor with derivatives tells whether
+    /// the body is stable. Collective.
+    fn softens<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        velocity: &DistributedVector,
+    ) -> Result<bool> {
+        if !problem.body.softens() {
+            return Ok(false);
+        }
+        let is_changed = self.tangents(problem, velocity)?.iter::<S>().next().is_some();
+        Ok(problem.session.total(usize::from(is_changed)) > 0)
     }
 
     /// Solves a step by Newton's method for the whole body, preconditioned by this solver. Collective.

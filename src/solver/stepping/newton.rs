@@ -301,7 +301,7 @@ impl Newton {
             flows,
             rubs,
             rubs_obstacles: rubs && !self.obstacles.is_empty(),
-            softens: (flows && body.softening().next().is_some()) || contacts.iter().any(decreases),
+            softens: (flows && body.softens()) || contacts.iter().any(decreases),
             has_bonds: flows && body.softens_at_surface(),
         }
     }

@@ -275,8 +275,10 @@ impl StepSolver {
             // Those of the last step help no more than those without, and a rejected step leaves no trace.
             self.forget_tangents();
         }
-        self.flowing.iter_mut().for_each(|flowing| flowing.begin());
-        let (mut factors, mut earlier) = (0, StepOutcome::default());
+        if let Some(flowing) = &mut self.flowing {
+            flowing.begin(trial)?;
+        }
+        let (mut factors, mut earlier, mut is_stable) = (0, StepOutcome::default(), true);
         loop {
             self.keep_start(trial)?;
             let Parts { newton: Some(newton), flowing: Some(flowing), solver, matrix, factored, scales } =
@@ -291,11 +293,11 @@ impl StepSolver {
                 FactorOf::Step | FactorOf::AnotherLength => None,
             };
             let corrected = match factored {
-                FactorOf::AnotherLength => Corrected::Unfinished(StepOutcome::default(), false),
-                FactorOf::Step | FactorOf::Tangents(_) => {
+                FactorOf::Step | FactorOf::Tangents(_) if is_stable => {
                     let factor = StepFactor { solver: &mut *solver, other };
                     flowing.correct(newton, factor, problem, system, trial)?
                 }
+                _ => Corrected::Unfinished(StepOutcome::default(), false),
             };
             match corrected {
                 Corrected::Solved(outcome) => return Ok(earlier.followed_by(outcome)),
@@ -311,6 +313,11 @@ impl StepSolver {
             }
             if !session.agree(self.refactor_with_tangents(problem, trial))? {
                 factors = MOST_FACTORS;
+                if let Some(flowing) = self.flowing.as_mut().filter(|_| problem.body.softens()) {
+                    // Newton's method tells where a body goes that softens, from the start of the step.
+                    is_stable = false;
+                    flowing.go_back(problem, trial)?;
+                }
             }
         }
     }
