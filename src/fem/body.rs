@@ -33,6 +33,9 @@ use crate::{
 };
 use std::cell::RefCell;
 
+/// Share of the elastic stiffness in shear that flow leaves at least in the matrix of a step, where its derivatives are not symmetric.
+const LEAST_STIFFNESS: f64 = 1e-3;
+
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
     /// This rank's part of the mesh.
@@ -166,7 +169,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.in_unknowns(session, rows)
     }
 
-    /// The same matrix with the symmetric part of the derivatives of what cells add to the stress at the end of the step. Collective.
+    /// The same matrix with the symmetric part of the derivatives of what cells add to the stress at the end of the step: raised where
+    /// the part of derivatives that are not symmetric would make a body indefinite that does not soften. Collective.
     pub fn matrix_with(
         &self,
         session: &Session,
@@ -179,11 +183,19 @@ impl<const D: usize, const S: usize> Body<D, S> {
             let (cell, point, _) = self.geometry.point(number);
             of_points[cell * points + point] = Some(tangent);
         }
+        let mut elasticity = self.terms().find(|term| term.form() == Some(Form::Elasticity));
+        let is_skew = !tangents.are_symmetric() || self.terms().any(|term| term.is_skew());
+        elasticity = elasticity.filter(|_| is_skew && !self.softens());
         let rows = self.assemble_rows(session, length, |number, cell, matrix| {
+            let elasticity = elasticity.and_then(|term| term.tensor(cell.material()));
             for (point, tangent) in of_points[number * points..][..points].iter().enumerate() {
-                if let Some(tangent) = tangent {
-                    matrix.add_form_at((cell, point), 1.0, &Anisotropic::of_entries::<S>(tangent));
+                let Some(tangent) = tangent else { continue };
+                let mut tensor = Anisotropic::of_entries::<S>(tangent);
+                if let Some(elasticity) = &elasticity {
+                    let least = LEAST_STIFFNESS * length * elasticity.shear;
+                    tensor = tensor.raised::<S>((length, elasticity), least);
                 }
+                matrix.add_form_at((cell, point), 1.0, &tensor);
             }
         })?;
         self.in_unknowns(session, rows)

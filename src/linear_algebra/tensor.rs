@@ -9,7 +9,7 @@
 //! | 4 | plane strain | 11, 22, 33, √2·12 |
 //! | 6 | 3D | 11, 22, 33, √2·23, √2·13, √2·12 |
 
-use std::f64::consts::SQRT_2;
+use std::{array::from_fn, f64::consts::SQRT_2};
 
 /// A vector of `D` Cartesian components.
 pub type Vector<const D: usize> = [f64; D];
@@ -73,6 +73,39 @@ pub fn add_scaled<const N: usize>(a: &[f64; N], factor: f64, b: &[f64; N]) -> [f
         out[i] += factor * b[i];
     }
     out
+}
+
+/// Largest number of sweeps of Jacobi's method; four to eight suffice.
+const MOST_SWEEPS: usize = 30;
+
+/// The eigenvalues of a symmetric matrix, and their orthonormal eigenvectors, by Jacobi's method.
+pub fn eigenvectors<const N: usize>(mut matrix: [[f64; N]; N]) -> ([f64; N], [[f64; N]; N]) {
+    let mut vectors: [[f64; N]; N] = from_fn(|i| from_fn(|j| f64::from(u8::from(i == j))));
+    for _ in 0..MOST_SWEEPS {
+        let mut is_diagonal = true;
+        for (i, j) in (0..N).flat_map(|i| (i + 1..N).map(move |j| (i, j))) {
+            let (entry, difference) = (matrix[i][j], matrix[j][j] - matrix[i][i]);
+            if entry.abs() <= f64::EPSILON * (matrix[i][i].abs() + matrix[j][j].abs()) {
+                continue;
+            }
+            is_diagonal = false;
+            let ratio = 0.5 * difference / entry;
+            let tangent = 1.0f64.copysign(ratio) / (ratio.abs() + ratio.hypot(1.0));
+            let cosine = tangent.hypot(1.0).recip();
+            let turn = |a: f64, b: f64| [cosine * (a - tangent * b), cosine * (b + tangent * a)];
+            for row in &mut matrix {
+                [row[i], row[j]] = turn(row[i], row[j]);
+            }
+            for c in 0..N {
+                [matrix[i][c], matrix[j][c]] = turn(matrix[i][c], matrix[j][c]);
+                [vectors[i][c], vectors[j][c]] = turn(vectors[i][c], vectors[j][c]);
+            }
+        }
+        if is_diagonal {
+            break;
+        }
+    }
+    (from_fn(|i| matrix[i][i]), vectors)
 }
 
 /// The larger of two numbers, NaN if either is: what went wrong somewhere shows in a maximum, which it does not in that of
@@ -193,6 +226,29 @@ pub fn principal_values<const S: usize>(t: &Mandel<S>) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn eigenvectors_are_orthonormal_and_make_up_the_matrix() {
+        let matrices = [
+            [[2.0, -1.0, 0.5], [-1.0, 2.0, 3.0], [0.5, 3.0, -4.0]],
+            [[1.0, 1e-9, 0.0], [1e-9, 1.0, 0.0], [0.0, 0.0, 1e9]],
+            [[0.0; 3]; 3],
+        ];
+        for matrix in matrices {
+            let (values, vectors) = eigenvectors(matrix);
+            for i in 0..3 {
+                for j in 0..3 {
+                    let unit = f64::from(u8::from(i == j));
+                    assert!((dot(&vectors[i], &vectors[j]) - unit).abs() < 1e-14);
+                    let entry: f64 = (0..3).map(|k| values[k] * vectors[k][i] * vectors[k][j]).sum();
+                    assert!(
+                        (entry - matrix[i][j]).abs() <= 1e-14 * matrix[i][i].abs().max(10.0),
+                        "{matrix:?}"
+                    );
+                }
+            }
+        }
+    }
 
     #[test]
     fn principal_values_are_the_eigenvalues() {

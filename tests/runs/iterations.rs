@@ -284,3 +284,37 @@ fn damage_that_never_comes_takes_no_further_iterations() {
         }
     }
 }
+
+/// The derivatives of flow are not symmetric in plane stress, and a load that falls again takes the body back from far beyond its limit load.
+#[test]
+fn loads_near_the_limit_of_a_plastic_block_take_few_iterations_with_and_without_contact() {
+    let block = |hypothesis: &str, load: &str| {
+        Case::written_as(&format!(
+            "
+            mesh.rectangle = {{size = [1.0, 0.6], cells = [10, 6]}}
+            mesh.order = 2
+            time = {{end = 1.4, step = 0.05, scheme = 'implicit_euler'}}
+            support = [{{on = ['bottom'], fix = ['y']}}, {{on = ['left'], fix = ['x']}}]
+            [material]
+            hypothesis = '{hypothesis}'
+            elasticity = {{youngs_modulus = 1e11, poisson_ratio = 0.3}}
+            viscoplasticity.perzyna = {{relaxation = 1e6, yield_stress = 1e8}}
+            {load}"
+        ))
+    };
+    let pressed = "[[contact]]
+            on = ['top']
+            normal.unilateral = {}
+            obstacle.sphere = {centre = [0.0, 2.6], radius = 2.0}
+            obstacle_load = {direction = [0.0, -1.0], force = '3.75e7*interpolate(t, 0, 0, 0.4, 1, 0.6, 1, 1.0, 0.1, 1.4, 1.0)'}";
+    let loaded = "[[traction]]
+            on = ['top']
+            where = 'x < 0.5'
+            value = [0.0, '-1.5e8*interpolate(t, 0, 0, 0.4, 1, 0.6, 1, 1.0, -0.5, 1.4, 1.0)']";
+    for (hypothesis, load) in [("plane_stress", pressed), ("plane_strain", loaded)] {
+        let results = block(hypothesis, load).run(1);
+        let [newton, linear] = ["newton_iterations", "linear_iterations"].map(|key| results.number(key));
+        println!("{hypothesis}: {newton} and {linear}");
+        assert!(newton <= 500.0 && linear <= 1000.0, "{hypothesis}: {newton}, {linear}");
+    }
+}

@@ -6,7 +6,7 @@ use crate::{
         coupling::{Coupling, add_between, seen_by_contacts},
         effect::{
             Contact, ContactNode, Effect, Energy, Evaluation, Heat, Outcome, Step, SurfaceEffect, Tangents,
-            Term, contact_nodes,
+            contact_nodes,
         },
         space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, nodal_forces, offsets},
     },
@@ -150,8 +150,7 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
 
     /// Whether the derivative of the flow is symmetric in all cells.
     pub fn has_symmetric_tangent(&self) -> bool {
-        let is_skew = |term| matches!(term, Term::Flow(flow) if !flow.has_symmetric_tangent);
-        !self.effects.iter().any(|effect| is_skew(effect.term()))
+        !self.effects.iter().any(|effect| effect.term().is_skew())
     }
 
     /// The effects that are evaluated at the end of a step, and their needs.

@@ -94,6 +94,11 @@ impl Term<'_> {
         }
     }
 
+    /// Whether its derivative is not symmetric.
+    pub fn is_skew(&self) -> bool {
+        matches!(self, Self::Flow(flow) if !flow.has_symmetric_tangent)
+    }
+
     /// Whether it makes its form positive definite over every material of the body, up to rigid motions.
     pub fn is_everywhere(&self) -> bool {
         match self {

@@ -1,8 +1,14 @@
 //! Linear elastic tensors of any symmetry.
 
-use super::{elasticity::Hypothesis, isotropic::LinearTensor};
-use crate::linear_algebra::tensor::{Mandel, Vector, dot};
-use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use super::{
+    elasticity::Hypothesis,
+    isotropic::{Isotropic, LinearTensor},
+};
+use crate::linear_algebra::tensor::{Mandel, Vector, add_scaled, dot, eigenvectors};
+use std::{
+    array::from_fn,
+    f64::consts::{FRAC_1_SQRT_2, SQRT_2},
+};
 
 /// A square matrix over the components of tensors in space.
 pub(super) type Matrix = [[f64; 6]; 6];
@@ -48,16 +54,15 @@ fn turned(rows: &[Vector<3>; 3], mandel: &Mandel<6>) -> Mandel<6> {
 impl Anisotropic {
     /// The tensor with this matrix along these orthogonal unit axes, under a hypothesis.
     pub(super) fn along(axes: &[Vector<3>; 3], matrix: &Matrix, hypothesis: Hypothesis) -> Self {
-        let back: [Vector<3>; 3] = std::array::from_fn(|i| axes.map(|axis| axis[i]));
+        let back: [Vector<3>; 3] = from_fn(|i| axes.map(|axis| axis[i]));
         let column = |c: usize| {
-            let unit = std::array::from_fn(|i| f64::from(u8::from(i == c)));
+            let unit = from_fn(|i| f64::from(u8::from(i == c)));
             let strain = turned(axes, &unit);
             turned(&back, &matrix.map(|row| dot(&row, &strain)))
         };
-        let columns: Matrix = std::array::from_fn(column);
+        let columns: Matrix = from_fn(column);
         // Symmetric to the last bit.
-        let mut matrix: Matrix =
-            std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (columns[j][i] + columns[i][j])));
+        let mut matrix: Matrix = from_fn(|i| from_fn(|j| 0.5 * (columns[j][i] + columns[i][j])));
         if hypothesis == Hypothesis::PlaneStress {
             let across = matrix[ACROSS];
             for (i, row) in matrix.iter_mut().enumerate() {
@@ -78,6 +83,21 @@ impl Anisotropic {
             }
         }
         Self { matrix }
+    }
+
+    /// The tensor, raised so that its sum with a multiple of `base` has no eigenvalue below `least` in Pa.
+    pub fn raised<const S: usize>(mut self, (factor, base): (f64, &Isotropic), least: f64) -> Self {
+        let unit = |j: usize| -> Mandel<S> { from_fn(|i| f64::from(u8::from(i == j))) };
+        let sum = from_fn(|j| add_scaled(&self.stress(&unit(j)), factor, &base.stress(&unit(j))));
+        let (values, vectors) = eigenvectors::<S>(sum);
+        for (value, vector) in values.iter().zip(&vectors).filter(|(value, _)| **value < least) {
+            for (i, a) in vector.iter().enumerate() {
+                for (j, b) in vector.iter().enumerate() {
+                    self.matrix[in_space::<S>(i)][in_space::<S>(j)] += (least - value) * a * b;
+                }
+            }
+        }
+        self
     }
 
     /// A bound of its eigenvalues from above, in Pa.
@@ -132,6 +152,18 @@ fn product<const D: usize>(i: usize, (g, hoop): &(Vector<D>, f64)) -> Mandel<6> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sum_is_raised_to_its_least_eigenvalue_and_nowhere_else() {
+        let base = Isotropic { volumetric: 2.0, shear: 3.0 };
+        // With twice the base: -2 in shear, 14 and 6 in the others.
+        let softening = Anisotropic::of_entries::<3>(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -8.0]);
+        let raised = softening.raised::<3>((2.0, &base), 0.25);
+        for (strain, sum) in [([1.0, 1.0, 0.0], 14.0), ([1.0, -1.0, 0.0], 6.0), ([0.0, 0.0, 1.0], 0.25)] {
+            let found = add_scaled(&raised.stress(&strain), 2.0, &base.stress(&strain));
+            assert!((0..3).all(|c| (found[c] - sum * strain[c]).abs() < 1e-13), "{found:?}");
+        }
+    }
     use crate::laws::material::Elasticity;
 
     const GLASS: Elasticity = Elasticity::linear(70.0, 0.25);
@@ -139,19 +171,18 @@ mod tests {
     /// That of an isotropic material, whatever its axes.
     fn isotropic(hypothesis: Hypothesis) -> Anisotropic {
         let tensor = GLASS.tensor(Hypothesis::Space);
-        let column =
-            |c: usize| tensor.stress(&std::array::from_fn::<f64, 6, _>(|i| f64::from(u8::from(i == c))));
+        let column = |c: usize| tensor.stress(&from_fn::<f64, 6, _>(|i| f64::from(u8::from(i == c))));
         let (c, s) = (0.6, 0.8);
         let axes = if hypothesis == Hypothesis::Space {
             [[c, s, 0.0], [0.0, 0.0, 1.0], [s, -c, 0.0]]
         } else {
             [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
         };
-        Anisotropic::along(&axes, &std::array::from_fn(column), hypothesis)
+        Anisotropic::along(&axes, &from_fn(column), hypothesis)
     }
 
     fn check<const S: usize>(hypothesis: Hypothesis) {
-        let strain: Mandel<S> = std::array::from_fn(|c| if S == 4 && c == 2 { 0.0 } else { 0.1 + c as f64 });
+        let strain: Mandel<S> = from_fn(|c| if S == 4 && c == 2 { 0.0 } else { 0.1 + c as f64 });
         let (found, expected) =
             (isotropic(hypothesis).stress(&strain), GLASS.tensor(hypothesis).apply(&strain));
         for c in 0..S {

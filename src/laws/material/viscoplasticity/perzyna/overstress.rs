@@ -67,9 +67,9 @@ pub enum Metric {
     /// (E t, t), as in Wang and Cheng (2022).
     #[default]
     Elasticity,
-    /// (E^-1 t, t), the usual choice in plasticity.
+    /// (E^-1 t, t).
     Compliance,
-    /// (t, t).
+    /// (t, t). Flow is then associated in plane stress, too: as the relaxation falls to 0, the law tends to classical perfect plasticity.
     Frobenius,
 }
 
