@@ -16,9 +16,9 @@ pub struct Verdict {
     pub refusals: Vec<(String, String)>,
 }
 
-/// The share of the coefficient of friction that it may lose in a step of `lagged_euler`: just below the least at which an error passed 5 %
-/// in the problems of docs/user-guide.md, many of which bear a hundred times as much. And the share of the stability bound up to which
-/// steps are short enough for any.
+/// The share of the coefficient of friction that it may lose in a step of `lagged_euler`: half of the least at which errors were measured in
+/// the problems of docs/user-guide.md, many of which bear a hundred times as much. And the share of the stability bound up to which steps
+/// are short enough for any.
 const LAGGING_FALL: f64 = 2e-3;
 const LAGGING_STEP: f64 = 0.02;
 /// The share of a step below which the stability bound is a rounding error of 0.

@@ -142,7 +142,7 @@ impl HeatStep {
         let Conditions { power, film, held } = &self.conditions;
         {
             let (mut changes, before) = (self.change.owned_mut()?, heat.temperature());
-            for (&(node, _), value) in heat.held_nodes().iter().zip(held) {
+            for (&(node, _), value) in heat.held.iter().zip(held) {
                 changes[node as usize] = value - before[node as usize];
             }
         }
