@@ -340,7 +340,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         anew: bool,
     ) -> Result<(), Agreed> {
         if let Some(paired) = &mut self.paired_displacement {
-            session.agree(paired.copy_from(displacement))?;
+            session.agree(paired.copy_from(displacement).and_then(|()| paired.update_ghosts()))?;
         }
         let displacement = session.agree(displacement.local())?;
         let moved = self.mesh.nodes.iter().zip(displacement.chunks_exact(D));
