@@ -219,7 +219,7 @@ fn steady_creep_takes_few_steps_and_iterations() {
     let [steps, rejected, found] =
         ["steps", "rejected_steps", "newton_iterations"].map(|key| results.number(key));
     println!("{steps} steps, {rejected} rejected, {found} iterations");
-    assert!(steps < 200.0 && rejected < 10.0 && found < 4.0 * steps, "{steps}, {rejected}, {found}");
+    assert!(steps < 200.0 && rejected < 10.0 && found < 6.0 * steps, "{steps}, {rejected}, {found}");
 }
 
 #[test]
@@ -312,7 +312,8 @@ fn loads_near_the_limit_of_a_plastic_block_take_few_iterations_with_and_without_
             where = 'x < 0.5'
             value = [0.0, '-1.5e8*interpolate(t, 0, 0, 0.4, 1, 0.6, 1, 1.0, -0.5, 1.4, 1.0)']";
     for (hypothesis, load) in [("plane_stress", pressed), ("plane_strain", loaded)] {
-        let results = block(hypothesis, load).run(1);
+        let case = block(hypothesis, load);
+        let results = case.run(1);
         let [newton, linear] = ["newton_iterations", "linear_iterations"].map(|key| results.number(key));
         println!("{hypothesis}: {newton} and {linear}");
         assert!(newton <= 500.0 && linear <= 1000.0, "{hypothesis}: {newton}, {linear}");
