@@ -72,7 +72,7 @@ const MESHES: &[(&str, Job, &[&str])] = &[
     ("elements_missing", Dynamic, &["$Elements is missing"]),
     ("empty", Dynamic, &["empty.msh: the file is empty"]),
     ("end_of_nodes_misspelt", Dynamic, &["$Nodes, line 41", "`$EndNods` where $EndNodes is expected"]),
-    ("entities_missing", Dynamic, &["the mesh has no boundary \"left\"", "no boundary with a name"]),
+    ("entities_missing", Dynamic, &["no boundary \"left\"", "the mesh has surface"]),
     (
         "fewer_elements_than_announced",
         Dynamic,

@@ -316,6 +316,6 @@ fn loads_near_the_limit_of_a_plastic_block_take_few_iterations_with_and_without_
         let results = case.run(1);
         let [newton, linear] = ["newton_iterations", "linear_iterations"].map(|key| results.number(key));
         println!("{hypothesis}: {newton} and {linear}");
-        assert!(newton <= 500.0 && linear <= 1000.0, "{hypothesis}: {newton}, {linear}");
+        assert!(newton <= 500.0 && linear <= 2000.0, "{hypothesis}: {newton}, {linear}");
     }
 }

@@ -301,6 +301,7 @@ pub fn transfer<const D: usize, const S: usize>(
         let (mut paired, mut anew) = (state.displacement.like()?, false);
         if surfaces_in_contact(&header.physics) != surfaces_in_contact(physics) {
             paired.copy_from(&state.displacement)?;
+            paired.update_ghosts()?;
         } else if saved.has(PAIRED) {
             saved.fill::<D>(PAIRED, &mut paired)?;
             anew = body.is_paired_elsewhere(session, &paired)?;
