@@ -141,7 +141,10 @@ fn bodies_find_what_they_face_at_the_same_times_on_any_number_of_ranks() {
     for ranks in [2, 3] {
         for (step, (one, other)) in one.iter().zip(forces(ranks)).enumerate() {
             let difference = (one - other).abs();
-            assert!(difference < 1e-8 * largest, "{difference} N of {largest} N on {ranks} ranks, step {step}");
+            assert!(
+                difference < 1e-8 * largest,
+                "{difference} N of {largest} N on {ranks} ranks, step {step}"
+            );
         }
     }
 }
