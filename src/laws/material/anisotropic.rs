@@ -152,6 +152,7 @@ fn product<const D: usize>(i: usize, (g, hoop): &(Vector<D>, f64)) -> Mandel<6> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laws::material::Elasticity;
 
     #[test]
     fn a_sum_is_raised_to_its_least_eigenvalue_and_nowhere_else() {
@@ -164,7 +165,6 @@ mod tests {
             assert!((0..3).all(|c| (found[c] - sum * strain[c]).abs() < 1e-13), "{found:?}");
         }
     }
-    use crate::laws::material::Elasticity;
 
     const GLASS: Elasticity = Elasticity::linear(70.0, 0.25);
 

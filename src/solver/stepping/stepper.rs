@@ -58,7 +58,7 @@ pub struct Stepper {
     /// The nodal loads of the last step, if there are loads.
     pub load: Option<DistributedVector>,
     load_is_current: bool,
-    /// Powers in W at the end of the last step, over all ranks; see [`Integrator::complete`].
+    /// Powers in W at the end of the last step, over all ranks.
     pub powers: Energy,
     right_hand_side: DistributedVector,
     moving_supports: Option<MovingSupports>,

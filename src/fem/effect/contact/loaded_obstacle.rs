@@ -35,7 +35,7 @@ pub const OBSTACLE_NUMERICAL: EnergyKind =
 /// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
 const NEAR: f64 = 1e-6;
 
-/// A degree of freedom of an obstacle, in the order of lists of its [motions](Obstacle::motions).
+/// A degree of freedom of an obstacle, in the order of lists of its motions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Freedom {
     /// Along its direction.
