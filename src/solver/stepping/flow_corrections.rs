@@ -72,8 +72,7 @@ pub(super) struct FlowCorrections {
     earlier: Anderson,
     /// `b - F_i`.
     right_hand_side: DistributedVector,
-    /// The velocities from which the step was started, and from which corrections go on.
-    first: DistributedVector,
+    /// The velocity from which corrections go on.
     start: DistributedVector,
     /// The norm of the residual that the last one left, in N.
     left: f64,
@@ -100,7 +99,6 @@ impl FlowCorrections {
             change: like.like()?,
             earlier: Anderson::new(like)?,
             right_hand_side: like.like()?,
-            first: like.like()?,
             start: like.like()?,
             left: f64::INFINITY,
             whole: None,
@@ -108,20 +106,9 @@ impl FlowCorrections {
         })
     }
 
-    /// Begins a step from this velocity.
-    pub(super) fn begin(&mut self, velocity: &DistributedVector) -> Result<()> {
+    /// Begins a step.
+    pub(super) fn begin(&mut self) {
         self.left = f64::INFINITY;
-        self.first.copy_from(velocity)
-    }
-
-    /// Goes back to where the step was begun.
-    pub(super) fn go_back<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        velocity: &mut DistributedVector,
-    ) -> Result<()> {
-        velocity.copy_from(&self.first)?;
-        restore_pressures(problem.body, problem.state)
     }
 
     /// Makes corrections of the velocity in `trial` with a solver of the matrix of the step. Collective.

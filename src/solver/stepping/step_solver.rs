@@ -58,7 +58,7 @@ pub struct StepSolver {
     prepared: Option<Lengths>,
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
-    /// The velocity from which a step with a factor in single precision was started.
+    /// The velocity from which a step with a factor in single precision, or of a body that softens, was started.
     start: Option<DistributedVector>,
     /// The velocity from which the last step was first started in which contact alone holds a body.
     first_start: Option<DistributedVector>,

@@ -275,12 +275,13 @@ impl StepSolver {
             // Those of the last step help no more than those without, and a rejected step leaves no trace.
             self.forget_tangents();
         }
-        if let Some(flowing) = &mut self.flowing {
-            flowing.begin(trial)?;
+        self.flowing.iter_mut().for_each(|flowing| flowing.begin());
+        let softens = problem.body.softens();
+        if softens {
+            keep(&mut self.start, trial)?;
         }
         let (mut factors, mut earlier, mut is_stable) = (0, StepOutcome::default(), true);
         loop {
-            self.keep_start(trial)?;
             let Parts { newton: Some(newton), flowing: Some(flowing), solver, matrix, factored, scales } =
                 self.parts()?
             else {
@@ -313,10 +314,10 @@ impl StepSolver {
             }
             if !session.agree(self.refactor_with_tangents(problem, trial))? {
                 factors = MOST_FACTORS;
-                if let Some(flowing) = self.flowing.as_mut().filter(|_| problem.body.softens()) {
+                if softens {
                     // Newton's method tells where a body goes that softens, from the start of the step.
                     is_stable = false;
-                    flowing.go_back(problem, trial)?;
+                    self.go_to_start(problem, trial)?;
                 }
             }
         }
@@ -439,12 +440,21 @@ impl StepSolver {
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
     ) -> Result<()> {
+        self.go_to_start(problem, trial)?;
+        self.precision = Precision::Double;
+        self.refactor(problem)
+    }
+
+    /// Resets a step to the start that was kept. Collective.
+    fn go_to_start<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
         if let Some(start) = &self.start {
             trial.copy_from(start)?;
         }
-        restore_pressures(problem.body, problem.state)?;
-        self.precision = Precision::Double;
-        self.refactor(problem)
+        restore_pressures(problem.body, problem.state)
     }
 }
 
