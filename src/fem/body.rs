@@ -1036,16 +1036,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(())
     }
 
-    /// Lets cells expand at the start of a step to their strain at the temperature of this time; gives the work in J on their stresses, of
-    /// this rank.
+    /// Lets cells expand at the start of a step to their strain at the temperature that motion has just been made to see; gives the work in
+    /// J on their stresses, of this rank.
     pub fn expand(&mut self, state: &State) -> Result<f64> {
         if !self.heat.as_ref().is_some_and(Heat::has_changed) {
-            self.heat.iter_mut().for_each(Heat::expand);
             return Ok(0.0);
         }
         let rest = Step { time: state.time, ..Step::default() };
         let (before, _) = self.energy_beside(state, rest)?;
-        self.heat.iter_mut().for_each(Heat::expand);
         self.strain_by_temperature();
         let (after, _) = self.energy_beside(state, rest)?;
         Ok(after[ELASTIC] - before[ELASTIC])
@@ -1053,13 +1051,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Takes back the last expansion.
     pub fn contract(&mut self) {
-        self.heat.iter_mut().for_each(Heat::contract);
+        self.heat.iter_mut().for_each(Heat::see_as_before);
         self.strain_by_temperature();
     }
 
     /// Gives cells their thermal strain, and laws of flow the temperature, both where some material has such a thing.
     pub fn strain_by_temperature(&mut self) {
-        let Some(heat) = self.heat.as_ref().filter(|heat| heat.expands()) else { return };
+        let Some(heat) = self.heat.as_ref().filter(|heat| heat.is_seen()) else { return };
         let (mesh, points) = (&self.mesh, self.geometry.points());
         let centre = [1.0 / (D + 1) as f64; 4];
         let place = |point: usize| if points == 1 { &centre } else { &cell_rule::<D>()[point].0 };
@@ -1069,7 +1067,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             });
         }
         if heat.is_seen_by_flow {
-            self.geometry.set_temperatures(|_, cell, point| heat.strained_at(mesh, cell, place(point)));
+            self.geometry.set_temperatures(|_, cell, point| heat.seen_at(mesh, cell, place(point)));
         }
     }
 

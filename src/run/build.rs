@@ -389,8 +389,9 @@ fn heat<const D: usize>(
     if job.time.scheme.states() > 1 {
         heat.keep_powers();
     }
-    if heat.strains() || heat.is_seen_by_flow {
-        heat.expand();
+    let of_friction = || job.contact.iter().filter_map(|contact| contact.friction.as_ref());
+    if heat.strains() || heat.is_seen_by_flow || of_friction().any(|law| law.sees_temperature()) {
+        heat.show();
     }
     Ok(heat)
 }

@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Exit, Result},
     fem::{
         body::Body,
-        effect::{Heat, Moment, STRAINED, SUPPORT_REACTION, TEMPERATURE},
+        effect::{Heat, Moment, SEEN, SUPPORT_REACTION, TEMPERATURE},
         state::State,
     },
     io::output::{
@@ -159,8 +159,8 @@ pub(super) fn transfer<const D: usize, const S: usize>(
     let is_cold = found.at_rest.iter().any(|name| name == TEMPERATURE.name(Moment::Last))
         && initial.is_none_or(|initial| initial.temperature.is_none());
     session.agree(if is_cold { Err(without_temperature(loaded, &file)) } else { Ok(()) })?;
-    if found.at_rest.iter().any(|name| name == STRAINED.name(Moment::Last)) {
-        body.heat.iter_mut().for_each(Heat::expand);
+    if found.at_rest.iter().any(|name| name == SEEN.name(Moment::Last)) {
+        body.heat.iter_mut().filter(|heat| heat.is_seen()).for_each(Heat::show);
         body.strain_by_temperature();
     }
     found.at_rest.retain(|name| name != SUPPORT_REACTION.name(Moment::Last));

@@ -139,6 +139,30 @@ fn steps_that_are_rejected_leave_no_heat_behind() {
 }
 
 #[test]
+fn a_body_that_warms_evenly_takes_long_steps() {
+    let bar = |scheme: &str| {
+        Case::written_as(&format!(
+            "[mesh.rectangle]\nsize = [1, 0.1]\ncells = [4, 4]\n[material]\nhypothesis = \"plane_strain\"\n\
+             elasticity = {{ youngs_modulus = 2e11, poisson_ratio = 0.3 }}\n\
+             heat = {{ conductivity = 50, volumetric_capacity = 3.6e6, expansion = 1.2e-5, reference = 293 }}\n\
+             [[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n\
+             [[heat]]\non = [\"top\"]\nflux = 1e4\n[initial]\ntemperature = 293\n\
+             [time]\nscheme = \"{scheme}\"\nend = 2000\nstep = 1\nadaptive = {{ smallest_step = 0.01, largest_step = 200 }}\n"
+        ))
+    };
+    for (scheme, most) in [("implicit_euler", 200.0), ("bdf2", 160.0)] {
+        let case = bar(scheme);
+        let case = case.run_and_keep(1);
+        let results = case.results();
+        assert!(
+            results.number("steps") < most && results.number("rejected_steps") < 20.0,
+            "{}",
+            results.summary()
+        );
+    }
+}
+
+#[test]
 fn elastic_stress_that_is_a_formula_releases_no_heat() {
     let softening = "{ youngs_modulus = 1000, poisson_ratio = 0.3, expression = { shear_factor = '1/(1 + e)', reference_strain = 1 } }";
     let kept = heated()

@@ -227,19 +227,19 @@ fn warmed<const D: usize>(hypothesis: &str, order: usize, elasticity: &str, supp
         "{}[mesh]\norder = {order}\n[material]\n{hypothesis}{elasticity}\n\
          heat = {{ conductivity = 1e7, volumetric_capacity = 3, expansion = 2e-5, reference = 280 }}\n{supports}\
          [[heat]]\non = [\"right\"]\nflux = 30\n[initial]\ntemperature = 290\n\
-         [time]\nend = 1\nstep = 0.125\nscheme = \"implicit_euler\"\n",
+         [time]\nend = 1\nstep = 0.125\nland_on = [0.376]\nscheme = \"implicit_euler\"\n",
         any_mesh::<D>()
     )
 }
 
 const ISOTROPIC: &str = "elasticity = { youngs_modulus = 5000, poisson_ratio = 0.3 }";
 
-/// Steps to the end; at each step the temperature that strains the body is that of the step before.
+/// Steps to the end, and checks each state with the temperature and how fast it has risen in the step.
 fn follow<const D: usize, const S: usize>(
     session: &Session,
     job: &str,
     mesh: &GlobalMesh<D>,
-    check: impl Fn(f64, &Simulation<D, S>),
+    check: impl Fn([f64; 2], &Simulation<D, S>),
 ) {
     let mut run = simulation::<D, S>(session, job, mesh);
     let temperature = |run: &Simulation<D, S>| {
@@ -254,8 +254,9 @@ fn follow<const D: usize, const S: usize>(
     };
     let mut before = temperature(&run);
     while run.advance(session).expect("a step").is_some() {
-        check(before, &run);
-        before = temperature(&run);
+        let now = temperature(&run);
+        check([now, (now - before) / run.state.step_length], &run);
+        before = now;
     }
     assert!(
         before > 295.0 && run.totals.max_energy_imbalance < 1e-9,
@@ -273,7 +274,7 @@ fn stress_is<const D: usize, const S: usize>(run: &Simulation<D, S>, expected: [
     }
 }
 
-/// A free body expands and has no stress.
+/// A free body expands as fast as it warms, also in steps of other lengths than the one before, and has no stress.
 fn free<const D: usize, const S: usize>(session: &Session, hypothesis: &str, mesh: &GlobalMesh<D>) {
     let mut supports = String::from(
         "[[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[support]]\non = [\"bottom\"]\nfix = [\"",
@@ -284,14 +285,19 @@ fn free<const D: usize, const S: usize>(session: &Session, hypothesis: &str, mes
             session,
             &warmed::<D>(hypothesis, order, ISOTROPIC, &supports),
             mesh,
-            |temperature, run| {
+            |[temperature, rate], run| {
                 let strain = 2e-5 * (temperature - 280.0);
                 stress_is(run, [0.0; S], 5000.0 * strain);
-                let displacement = run.state.displacement.local().expect("values");
-                for (u, place) in displacement.chunks_exact(D).zip(&run.body.mesh.nodes) {
-                    (0..D).for_each(|i| {
-                        assert!((u[i] - strain * place[i]).abs() < 2e-6 * strain, "{u:?} {place:?}")
-                    });
+                let fields = [(&run.state.displacement, strain), (&run.state.velocity, 2e-5 * rate)];
+                // The first step expands from the reference.
+                let count = if run.state.step == 1 { 1 } else { 2 };
+                for (field, expected) in fields.into_iter().take(count) {
+                    let values = field.local().expect("values");
+                    for (u, place) in values.chunks_exact(D).zip(&run.body.mesh.nodes) {
+                        (0..D).for_each(|i| {
+                            assert!((u[i] - expected * place[i]).abs() < 3e-6 * expected, "{u:?} {place:?}")
+                        });
+                    }
                 }
             },
         );
@@ -315,7 +321,7 @@ fn held_body<const D: usize, const S: usize>(
             session,
             &warmed::<D>(hypothesis, order, ISOTROPIC, &supports),
             mesh,
-            |temperature, run| {
+            |[temperature, _], run| {
                 let pressure = modulus * 2e-5 * (temperature - 280.0);
                 for stress in run.body.stress(&run.state).expect("stress") {
                     let mean = clarke::linear_algebra::tensor::trace(&stress);
@@ -343,7 +349,7 @@ fn bimetal(session: &Session) {
                     [[region]]\nname = \"core\"\n[region.material]\nelasticity = { youngs_modulus = 5000, poisson_ratio = 0.3 }\n\
                     heat = { conductivity = 1e7, volumetric_capacity = 3, expansion = 1e-5, reference = 280 }\n";
     let job = unknown_mesh(&warmed::<2>("plane_stress", 2, ISOTROPIC, supports));
-    follow::<2, 3>(session, &job, &mesh, |temperature, run| {
+    follow::<2, 3>(session, &job, &mesh, |[temperature, _], run| {
         let curvature = 1.5 * 1e-5 * (temperature - 280.0) / 0.1;
         let displacement = run.state.displacement.local().expect("values");
         for (u, place) in displacement.chunks_exact(2).zip(&run.body.mesh.nodes).filter(|(_, x)| x[0] == 2.0)
@@ -399,7 +405,8 @@ fn energy_balances_where_a_temperature_strains_the_body() {
     });
 }
 
-/// A brake whose coefficient of friction fades as it warms: that of each step is the one of the temperature at its start.
+/// A brake whose coefficient of friction fades as it warms: that of each step is the one of the temperature at its end if it released as
+/// much heat as the step before.
 fn fading_brake(session: &Session, scheme: &str) {
     let mesh = rectangle([1.0, 0.5], [4, 2], Diagonal::Crossed, [1.0, 1.0]).expect("mesh");
     let job = dragged(scheme, [4.0, 0.05], "heat = { conductivity = 1e9, volumetric_capacity = 300 }")
@@ -408,20 +415,20 @@ fn fading_brake(session: &Session, scheme: &str) {
             "friction.expression.coefficient = \"0.4/(1 + max(temperature - 300, 0)/20)\"",
         );
     let mut run = simulation::<2, 4>(session, &job, &mesh);
-    let (mut rise, mut power) = (0.0, 800.0);
+    let (mut rise, mut power, mut mean) = (0.0, 0.0, 0.0);
     while run.advance(session).expect("a step").is_some() {
-        let next = 800.0 / (1.0 + rise / 20.0);
+        let next = 800.0 / (1.0 + (rise + 0.05 * mean / 150.0) / 20.0);
         // Powers are means over steps of second order, the first two of which are of first order.
-        let mean = if scheme == "bdf2" && run.state.step > 2 { 0.5 * (power + next) } else { next };
+        mean = if scheme == "bdf2" && run.state.step > 2 { 0.5 * (power + next) } else { next };
         (rise, power) = (rise + 0.05 * mean / 150.0, next);
         let off = error(session, &run, |_| 300.0 + rise);
         assert!(off < 1e-4 * rise, "{scheme}: {off} at {}", run.state.time);
     }
     let exact = 20.0 * ((1.0 + 2.0 * 800.0 * 4.0 / (150.0 * 20.0_f64)).sqrt() - 1.0);
-    assert!((rise / exact - 1.0).abs() < 0.02, "{rise} {exact}");
+    assert!((rise / exact - 1.0).abs() < 0.01, "{rise} {exact}");
 }
 
-/// A bar under a constant load creeps at the rate of the temperature at the start of each step.
+/// A bar under a constant load creeps at the rate of the temperature at the end of each step.
 fn creeping_bar(session: &Session, scheme: &str, order: usize) {
     let law = format!(
         "{ISOTROPIC}\nviscoplasticity.expression = {{ rate = \"1e-3*(q/10)*max(temperature - 280, 0)/50\", reference_stress = 20 }}"
@@ -432,14 +439,11 @@ fn creeping_bar(session: &Session, scheme: &str, order: usize) {
         .replace("expansion = 2e-5, reference = 280", "dissipation_share = 0")
         .replace("implicit_euler", scheme);
     let mesh = crossed([4, 3]);
-    let (mut creep, mut rates) = (0.0, [0.0; 2]);
+    let mut creep = 0.0;
     let mut run = simulation::<2, 3>(session, &job, &mesh);
     let warmth = |run: &Simulation<2, 3>| run.body.heat.as_ref().expect("heat").temperature()[0];
-    let mut before = warmth(&run);
     while run.advance(session).expect("a step").is_some() {
-        rates = [rates[1], 1e-3 * (before - 280.0) / 50.0];
-        before = warmth(&run);
-        creep += 0.125 * rates[1];
+        creep += run.state.step_length * 1e-3 * (warmth(&run) - 280.0) / 50.0;
         let displacement = run.state.displacement.local().expect("values");
         let expected = 10.0 / 5000.0 + creep;
         for (u, place) in displacement.chunks_exact(2).zip(&run.body.mesh.nodes) {
@@ -449,11 +453,11 @@ fn creeping_bar(session: &Session, scheme: &str, order: usize) {
             );
         }
     }
-    assert!(creep > 2e-4 && before > 295.0, "{creep} {before}");
+    assert!(creep > 2e-4 && warmth(&run) > 295.0, "{creep}");
 }
 
 #[test]
-fn creep_is_as_fast_as_the_temperature_at_the_start_of_a_step_has_it() {
+fn creep_is_as_fast_as_the_temperature_at_the_end_of_a_step_has_it() {
     run_on(&[1, 2], |world| {
         for order in [1, 2] {
             creeping_bar(&world.session, "implicit_euler", order);

@@ -46,19 +46,16 @@ pub const ENTERED_HEAT: EnergyKind = EnergyKind::new(16, Role::Heat, "entered_he
 
 /// The temperature in K at the nodes.
 pub const TEMPERATURE: Quantity = quantity!("temperature");
-/// The temperature in K by which the body is strained.
-pub const STRAINED: Quantity = quantity!("strain_temperature");
+/// The temperature in K that strains the body, and that its laws see.
+pub const SEEN: Quantity = quantity!("seen_temperature");
 
 /// The temperature of a body.
 #[derive(Debug)]
 pub struct Heat<const D: usize> {
     /// In K at the local nodes, with ghosts up to date.
     temperature: NodalField,
-    /// The temperature in K by which the body is strained, and which its flow sees, that at the start of the last step, if some material
-    /// does.
-    strained: Option<NodalField>,
-    /// The same before the last expansion.
-    strained_before: Vec<f64>,
+    /// What motion sees of the temperature, if something does.
+    seen: Option<Seen>,
     /// Powers in W of friction and of viscosity at the owned nodes at the end of the last step, where schemes average them.
     powers: Vec<NodalField>,
     owned: usize,
@@ -93,6 +90,17 @@ struct NodalField {
     quantity: Quantity,
     owned: usize,
     values: Vec<f64>,
+}
+
+/// What motion sees of the temperature.
+#[derive(Debug)]
+struct Seen {
+    /// The temperature in K that strains the body and that its laws see: in each step the one expected where its equations hold.
+    temperature: NodalField,
+    /// The same before the last step that was started.
+    before: Vec<f64>,
+    /// Mean power in W that the last step released at the owned nodes: that expected of the next one.
+    power: NodalField,
 }
 
 /// What is released in a step, at the local nodes, then at the owned ones.
@@ -168,8 +176,7 @@ impl<const D: usize> Heat<D> {
                 owned: mesh.owned,
                 values: vec![0.0; mesh.nodes.len()],
             },
-            strained: None,
-            strained_before: Vec::new(),
+            seen: None,
             powers: Vec::new(),
             owned: mesh.owned,
             has_middles: mesh.corner_nodes < mesh.total_nodes,
@@ -231,18 +238,10 @@ impl<const D: usize> Heat<D> {
 
     /// Makes temperatures on edges and of ghosts those of the owned corners. Collective.
     pub fn refresh(&mut self) -> Result<()> {
-        let Self { temperature, strained, exchange, .. } = self;
-        temperature.update_ghosts(exchange)?;
-        strained.iter_mut().try_for_each(|field| field.update_ghosts(exchange))?;
-        if !self.has_middles {
-            return Ok(());
-        }
-        for &[middle, a, b] in &self.middles {
-            let values = &mut self.temperature.values;
-            values[middle as usize] = 0.5 * (values[a as usize] + values[b as usize]);
-        }
-        // Ghosts on edges need not belong to a cell of this rank.
-        self.temperature.update_ghosts(&mut self.exchange)
+        let Self { temperature, seen, exchange, middles, has_middles, .. } = self;
+        let middles = has_middles.then_some(&middles[..]);
+        let fields = std::iter::once(temperature).chain(seen.iter_mut().map(|seen| &mut seen.temperature));
+        fields.into_iter().try_for_each(|field| field.complete(middles, exchange))
     }
 
     /// The temperature in K at the local nodes, with ghosts.
@@ -282,6 +281,17 @@ impl<const D: usize> Heat<D> {
         values.iter_mut().zip(changes).for_each(|(value, change)| *value = (*value + change).max(0.0));
         self.held.iter().zip(given).for_each(|(&(node, _), given)| values[node as usize] = *given);
         self.refresh()
+    }
+
+    /// Keeps the power in W at the owned nodes that the next step is expected to release, if motion sees what it does.
+    pub fn expect(&mut self, power: impl Iterator<Item = f64>) {
+        let Some(seen) = &mut self.seen else { return };
+        seen.power.values.iter_mut().zip(power).for_each(|(expected, power)| *expected = power);
+    }
+
+    /// The power in W at the owned nodes that a step is expected to release; none where motion sees no temperature.
+    pub fn expected(&self) -> Option<&[f64]> {
+        self.seen.as_ref().map(|seen| &seen.power.values[..])
     }
 
     /// Refuses changes in K of the owned nodes that lead to what is no temperature, but for rounding errors. Collective.
@@ -396,7 +406,7 @@ impl<const D: usize> Heat<D> {
     /// What is kept from one step to the next.
     pub fn histories(&self) -> impl Iterator<Item = &dyn HistoryStore> {
         std::iter::once(&self.temperature)
-            .chain(&self.strained)
+            .chain(self.seen.iter().flat_map(|seen| [&seen.temperature, &seen.power]))
             .chain(&self.powers)
             .map(|field| field as &dyn HistoryStore)
     }
@@ -404,29 +414,46 @@ impl<const D: usize> Heat<D> {
     /// Visits the same.
     pub fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
         visit(&mut self.temperature);
-        self.strained.iter_mut().for_each(|field| visit(field));
+        if let Some(seen) = &mut self.seen {
+            visit(&mut seen.temperature);
+            visit(&mut seen.power);
+        }
         self.powers.iter_mut().for_each(|field| visit(field));
     }
 
     /// Keeps the powers at the end of steps, for schemes that average them.
     pub fn keep_powers(&mut self) {
-        let field = |quantity| NodalField { quantity, owned: self.owned, values: vec![0.0; self.owned] };
-        self.powers = vec![field(quantity!("friction_heat_power")), field(quantity!("viscous_heat_power"))];
+        let fields = [quantity!("friction_heat_power"), quantity!("viscous_heat_power")];
+        self.powers = fields.map(|quantity| NodalField::of_owned_nodes(quantity, self.owned)).into();
     }
 
-    /// Lets the temperature strain the body: now, and from the start of each step on.
-    pub fn expand(&mut self) {
-        let Self { strained, strained_before, temperature, owned, .. } = self;
-        let field = || NodalField { quantity: STRAINED, owned: *owned, values: Vec::new() };
-        let strained = strained.get_or_insert_with(field);
-        std::mem::swap(&mut strained.values, strained_before);
-        strained.values.clone_from(&temperature.values);
+    /// Lets motion see the temperature, now that at this time.
+    pub fn show(&mut self) {
+        let values = self.temperature.values.clone();
+        self.seen = Some(Seen {
+            temperature: NodalField { quantity: SEEN, owned: self.owned, values },
+            before: Vec::new(),
+            power: NodalField::of_owned_nodes(quantity!("expected_heat_power"), self.owned),
+        });
     }
 
-    /// Takes back the last expansion.
-    pub fn contract(&mut self) {
-        if let Some(strained) = &mut self.strained {
-            std::mem::swap(&mut strained.values, &mut self.strained_before);
+    /// Lets motion see the temperature of this time, or that after this share of the changes in K of the owned nodes. Collective.
+    pub fn see(&mut self, expected: Option<(f64, &[f64])>) -> Result<()> {
+        let Self { seen: Some(seen), temperature, exchange, middles, has_middles, .. } = self else {
+            return Ok(());
+        };
+        std::mem::swap(&mut seen.temperature.values, &mut seen.before);
+        seen.temperature.values.clone_from(&temperature.values);
+        let Some((share, changes)) = expected else { return Ok(()) };
+        let values = seen.temperature.values.iter_mut();
+        values.zip(changes).for_each(|(value, change)| *value = (*value + share * change).max(0.0));
+        seen.temperature.complete(has_middles.then_some(&middles[..]), exchange)
+    }
+
+    /// Takes back what motion sees to what it saw before.
+    pub fn see_as_before(&mut self) {
+        if let Some(seen) = &mut self.seen {
+            std::mem::swap(&mut seen.temperature.values, &mut seen.before);
         }
     }
 
@@ -435,24 +462,29 @@ impl<const D: usize> Heat<D> {
         self.laws.iter().flatten().any(|law| law.expansion.is_some())
     }
 
-    /// Whether the temperature strains the body, or its flow depends on it.
-    pub fn expands(&self) -> bool {
-        self.strained.is_some()
+    /// Whether motion sees the temperature.
+    pub fn is_seen(&self) -> bool {
+        self.seen.is_some()
     }
 
-    /// Whether it does so by another temperature than that of now, on this rank.
+    /// Whether that of the last step that was started differs from the one before, on this rank.
     pub fn has_changed(&self) -> bool {
-        self.strained.as_ref().is_some_and(|strained| strained.values != self.temperature.values)
+        self.seen.as_ref().is_some_and(|seen| seen.temperature.values != seen.before)
+    }
+
+    /// The temperature in K at the local nodes that motion sees.
+    pub fn seen(&self) -> &[f64] {
+        &self.seen.as_ref().map_or(&self.temperature, |seen| &seen.temperature).values
     }
 
     /// The thermal strain of a cell of this material and number, at a place in barycentric coordinates.
     pub fn strain_at(&self, mesh: &Mesh<D>, (material, cell): (usize, usize), place: &[f64]) -> f64 {
-        self.laws[material].map_or(0.0, |law| law.strain(self.strained_at(mesh, cell, place)))
+        self.laws[material].map_or(0.0, |law| law.strain(self.seen_at(mesh, cell, place)))
     }
 
-    /// The temperature in K by which a cell of this number is strained, at a place in barycentric coordinates.
-    pub fn strained_at(&self, mesh: &Mesh<D>, cell: usize, place: &[f64]) -> f64 {
-        let values = &self.strained.as_ref().unwrap_or(&self.temperature).values;
+    /// The temperature in K that strains a cell of this number and that its laws see, at a place in barycentric coordinates.
+    pub fn seen_at(&self, mesh: &Mesh<D>, cell: usize, place: &[f64]) -> f64 {
+        let values = self.seen();
         mesh.cell(cell).iter().zip(place).map(|(node, share)| share * values[*node as usize]).sum()
     }
 
@@ -565,8 +597,24 @@ fn is_temperature(number: f64) -> bool {
 }
 
 impl NodalField {
+    /// Zeros at the owned nodes.
+    fn of_owned_nodes(quantity: Quantity, owned: usize) -> Self {
+        Self { quantity, owned, values: vec![0.0; owned] }
+    }
+
     fn of_owned(&self) -> &[f64] {
         &self.values[..self.owned]
+    }
+
+    /// Makes the values of ghosts those of their owners and, of cells with nodes on edges, those there the means of the ends. Collective.
+    fn complete(&mut self, middles: Option<&[[u32; 3]]>, exchange: &mut DistributedVector) -> Result<()> {
+        self.update_ghosts(exchange)?;
+        let Some(middles) = middles else { return Ok(()) };
+        for [middle, a, b] in middles.iter().map(|nodes| nodes.map(|node| node as usize)) {
+            self.values[middle] = 0.5 * (self.values[a] + self.values[b]);
+        }
+        // Ghosts on edges need not belong to a cell of this rank.
+        self.update_ghosts(exchange)
     }
 
     /// Makes the values of ghosts those of their owners. Collective.

@@ -63,7 +63,7 @@ pub use elastic_support::{ElasticPoint, ElasticSupport, Resistances, SUPPORT_REA
 pub use elasticity::{ELASTIC, Elasticity};
 pub use energy::{Energy, EnergyKind, NUMERICAL, Role};
 pub use heat::{
-    Conditions, ENTERED_HEAT, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT, STORED_HEAT, STRAINED, TEMPERATURE,
+    Conditions, ENTERED_HEAT, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT, SEEN, STORED_HEAT, TEMPERATURE,
     THERMAL_WORK,
 };
 pub use history::{History, HistoryStore};

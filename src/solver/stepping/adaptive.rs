@@ -157,7 +157,10 @@ impl<const D: usize> Adaptive<D> {
                 Err(error) if error.is_failure() && !self.is_shortest(step) => {
                     self.reject(step, self.level_of(step) - 1)
                 }
-                Err(error) => return Err(error),
+                Err(error) => {
+                    stepper.contract(body);
+                    return Err(error);
+                }
             }
         }
     }

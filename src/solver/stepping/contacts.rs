@@ -58,7 +58,7 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     }
     for contact in &mut body.contacts {
         if let Some((friction, heat)) = contact.friction.as_mut().zip(body.heat.as_ref()) {
-            friction.set_temperatures(heat.temperature());
+            friction.set_temperatures(heat.seen());
         }
         contact.prepare(step, blend, [&converged, &start])?;
     }

@@ -1,12 +1,18 @@
-//! The step of the temperature, with the solved motion of the same step: see [`Heat`] for its equations.
+//! The step of the temperature: with the heat that motion is expected to release before the motion of the step is solved, and with that
+//! which it has released afterwards. See [`Heat`] for its equations.
+//!
+//! [`Heat`]: crate::fem::effect::Heat
 
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Conditions, ENTERED_HEAT, Energy, FLOW_HEAT, FRICTION_HEAT, LOST_HEAT, STORED_HEAT, Step},
+        effect::{
+            Conditions, ENTERED_HEAT, Energy, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT, STORED_HEAT, Step,
+        },
     },
     linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix},
+    mesh::Mesh,
     parallel::session::Session,
 };
 
@@ -41,6 +47,8 @@ pub(super) struct HeatStep {
     conducted: Vec<f64>,
     /// Heat in J that is released at the owned nodes in the step.
     released: Vec<f64>,
+    /// The same that the step was expected to release.
+    expected: Vec<f64>,
 }
 
 impl HeatStep {
@@ -91,7 +99,29 @@ impl HeatStep {
             field: Vec::new(),
             conducted: Vec::new(),
             released: Vec::new(),
+            expected: Vec::new(),
         }))
+    }
+
+    /// Lets the motion of a step see the temperature after this share of the step, if as much power is released as in the one before.
+    /// Collective.
+    pub(super) fn expect<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        step: Step,
+        share: f64,
+    ) -> Result<()> {
+        let Body { mesh, heat: Some(heat), .. } = body else { return Ok(()) };
+        if share == 0.0 {
+            return heat.see(None);
+        }
+        let Some(power) = heat.expected() else { return Ok(()) };
+        self.released.clear();
+        self.released.extend(power.iter().map(|power| power * step.length));
+        self.find(session, mesh, heat, step)?;
+        self.expected.clone_from(&self.released);
+        heat.see(Some((share, &self.change.owned()?)))
     }
 
     /// Finds the temperature at the end of the step just solved, over which powers of heat are constant or averages; gives the energies of
@@ -104,11 +134,48 @@ impl HeatStep {
         averages: bool,
     ) -> Result<Energy> {
         let Body { mesh, heat: Some(heat), .. } = body else { return Ok(Energy::default()) };
-        session.agree(heat.write_conditions(mesh, step.time, &mut self.conditions))?;
-        self.prepare(session, heat.capacity(), step.length)?;
         self.released.clear();
         self.released.resize(mesh.owned, 0.0);
         let [friction, flow] = heat.released(step.length, averages, &mut self.released);
+        let [differs] = session.largest([f64::from(u8::from(self.released != self.expected))]);
+        if differs > 0.0 {
+            self.find(session, mesh, heat, step)?;
+        }
+        self.change.update_ghosts()?;
+        self.field.clear();
+        let (before, changes) = (heat.temperature(), self.change.local()?);
+        self.field.extend(before.iter().zip(changes.iter()).map(|(before, change)| before + change));
+        heat.conduct(mesh, &self.field, &mut self.conducted)?;
+        // What enters at each node; where the temperature is given, what balances the rest.
+        let Conditions { power, film, .. } = &self.conditions;
+        let entered = &mut self.field;
+        entered.truncate(mesh.owned);
+        let flows = power.iter().zip(film);
+        entered.iter_mut().zip(flows).for_each(|(t, (power, film))| *t = step.length * (power - film * *t));
+        for &(node, _) in &heat.held {
+            let node = node as usize;
+            let taken = heat.capacity()[node] * changes[node] - self.released[node];
+            entered[node] = taken + step.length * self.conducted[node];
+        }
+        let mut energy = Energy::default();
+        let stored = heat.capacity().iter().zip(&changes[..mesh.owned]);
+        energy[STORED_HEAT] = stored.map(|(capacity, change)| capacity * change).sum();
+        (energy[FRICTION_HEAT], energy[FLOW_HEAT]) = (friction, flow);
+        energy[ENTERED_HEAT] = entered.iter().map(|heat| heat.max(0.0)).sum();
+        energy[LOST_HEAT] = entered.iter().map(|heat| (-heat).max(0.0)).sum();
+        Ok(energy)
+    }
+
+    /// Finds the changes of the temperature in a step that releases this heat. Collective.
+    fn find<const D: usize>(
+        &mut self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        heat: &mut Heat<D>,
+        step: Step,
+    ) -> Result<()> {
+        session.agree(heat.write_conditions(mesh, step.time, &mut self.conditions))?;
+        self.prepare(session, heat.capacity(), step.length)?;
         // The field with the given temperatures, and its conduction.
         self.field.clear();
         self.field.extend_from_slice(heat.temperature());
@@ -139,41 +206,19 @@ impl HeatStep {
         if !self.is_held {
             self.balance(session, heat.capacity(), step.length)?;
         }
-        let Conditions { power, film, held } = &self.conditions;
         {
             let (mut changes, before) = (self.change.owned_mut()?, heat.temperature());
-            for (&(node, _), value) in heat.held.iter().zip(held) {
+            for (&(node, _), value) in heat.held.iter().zip(&self.conditions.held) {
                 changes[node as usize] = value - before[node as usize];
             }
         }
-        heat.check(session, mesh, &self.change.owned()?)?;
-        self.change.update_ghosts()?;
-        self.field.clear();
-        let (before, changes) = (heat.temperature(), self.change.local()?);
-        self.field.extend(before.iter().zip(changes.iter()).map(|(before, change)| before + change));
-        heat.conduct(mesh, &self.field, &mut self.conducted)?;
-        // What enters at each node; where the temperature is given, what balances the rest.
-        let entered = &mut self.field;
-        entered.truncate(mesh.owned);
-        let flows = power.iter().zip(film);
-        entered.iter_mut().zip(flows).for_each(|(t, (power, film))| *t = step.length * (power - film * *t));
-        for &(node, _) in &heat.held {
-            let node = node as usize;
-            let taken = heat.capacity()[node] * changes[node] - self.released[node];
-            entered[node] = taken + step.length * self.conducted[node];
-        }
-        let mut energy = Energy::default();
-        let stored = heat.capacity().iter().zip(&changes[..mesh.owned]);
-        energy[STORED_HEAT] = stored.map(|(capacity, change)| capacity * change).sum();
-        (energy[FRICTION_HEAT], energy[FLOW_HEAT]) = (friction, flow);
-        energy[ENTERED_HEAT] = entered.iter().map(|heat| heat.max(0.0)).sum();
-        energy[LOST_HEAT] = entered.iter().map(|heat| (-heat).max(0.0)).sum();
-        Ok(energy)
+        Ok(heat.check(session, mesh, &self.change.owned()?)?)
     }
 
     /// Makes the temperature just found that of the body. Collective.
     pub(super) fn commit<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
         let Some(heat) = &mut body.heat else { return Ok(()) };
+        heat.expect(self.released.iter().map(|heat| heat / self.length));
         heat.commit(&self.change.owned()?, &self.conditions.held)
     }
 

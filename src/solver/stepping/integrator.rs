@@ -111,6 +111,11 @@ impl Integrator {
         (self.formula)(step).balanced(step).time
     }
 
+    /// The share of a step after which stresses are taken.
+    pub(super) fn share_of_stresses(&self, step: Step) -> f64 {
+        if self.implicit.is_some() { (self.formula)(step).balance } else { 0.0 }
+    }
+
     /// Stores the start of the step, and adds its known forces `M v~ / k' - B^T s~` to `forces` (with ghosts).
     pub(super) fn start<const D: usize, const S: usize>(
         &mut self,

@@ -233,13 +233,13 @@ impl Stepper {
     }
 
     /// Takes back the expansion of a step that has failed.
-    fn contract<const D: usize, const S: usize>(&mut self, body: &mut Body<D, S>) {
+    pub fn contract<const D: usize, const S: usize>(&mut self, body: &mut Body<D, S>) {
         if self.thermal_work.take().is_some() {
             body.contract();
         }
     }
 
-    /// Solves a step of the body at its temperature at the start. Collective.
+    /// Solves a step of the body at the temperature that is expected of it. Collective.
     fn solve_expanded<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -250,10 +250,7 @@ impl Stepper {
         let range = StepRange::of(self.scheme, step);
         self.attempted = Some(self.attempted.map_or(range, |attempted| attempted.or(range)));
         self.follow_sliding(session, body, state)?;
-        if self.thermal_work.is_none() && body.heat.as_ref().is_some_and(Heat::expands) {
-            let work = session.agree(body.expand(state))?;
-            self.thermal_work = Some(session.sum([work])[0]);
-        }
+        self.expand(session, body, state, step)?;
         self.prepare_matrix(session, body, step)?;
         (self.is_finished, self.heat_of_step) = (false, None);
         let start = Instant::now();
@@ -289,6 +286,27 @@ impl Stepper {
             session.agree(refuse_passage(body, state, step, &self.trial))?;
         }
         Ok(outcome)
+    }
+
+    /// Lets the body expand to the temperature that is expected of a step, in place of that of another attempt. Collective.
+    fn expand<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        let Some(heat) = self.heat.as_mut().filter(|_| body.heat.as_ref().is_some_and(Heat::is_seen)) else {
+            return Ok(());
+        };
+        if self.thermal_work.take().is_some() {
+            body.contract();
+        }
+        heat.expect(session, body, step, self.integrator.share_of_stresses(step))?;
+        self.thermal_work = Some(0.0);
+        let work = session.agree(body.expand(state))?;
+        self.thermal_work = Some(session.sum([work])[0]);
+        Ok(())
     }
 
     /// Solves the started step. Collective.
