@@ -1036,20 +1036,27 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(())
     }
 
-    /// Lets cells expand at the start of a step to their strain at the temperature that motion has just been made to see; gives the work in
-    /// J on their stresses, of this rank.
+    /// Lets cells expand to their strain at the temperature that motion has just been made to see; gives the work in J on the stresses of
+    /// this state, of this rank.
     pub fn expand(&mut self, state: &State) -> Result<f64> {
+        self.strain_by_temperature();
+        self.work_of_expansion(state)
+    }
+
+    /// The work in J of the last expansion on the stresses of this state, of this rank.
+    pub fn work_of_expansion(&mut self, state: &State) -> Result<f64> {
         if !self.heat.as_ref().is_some_and(Heat::has_changed) {
             return Ok(0.0);
         }
         let rest = Step { time: state.time, ..Step::default() };
-        let (before, _) = self.energy_beside(state, rest)?;
-        self.strain_by_temperature();
         let (after, _) = self.energy_beside(state, rest)?;
-        Ok(after[ELASTIC] - before[ELASTIC])
+        self.contract();
+        let before = self.energy_beside(state, rest);
+        self.contract();
+        Ok(after[ELASTIC] - before?.0[ELASTIC])
     }
 
-    /// Takes back the last expansion.
+    /// Takes back the last expansion; once more, and it is made again.
     pub fn contract(&mut self) {
         self.heat.iter_mut().for_each(Heat::see_as_before);
         self.strain_by_temperature();

@@ -4,7 +4,8 @@ use super::run_on;
 use super::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::{
     fem::effect::{
-        CONTACT, ENTERED_HEAT, FLOW_HEAT, FRICTION_HEAT, STORED_HEAT, THERMAL_WORK, VISCOPLASTIC, VISCOUS,
+        CONTACT, ELASTIC, ENTERED_HEAT, FLOW_HEAT, FRICTION_HEAT, NUMERICAL, STORED_HEAT, THERMAL_WORK,
+        VISCOPLASTIC, VISCOUS,
     },
     mesh::{
         GlobalMesh,
@@ -389,12 +390,45 @@ fn bodies_expand_and_bear_the_stress_of_what_is_held() {
     });
 }
 
+/// Expansion does no work on a body without stress, and on one that is held what it stores, at the temperature at the end of each step.
+fn work_of_expansion(session: &Session, scheme: &str) {
+    let held = "[[support]]\non = [\"left\", \"right\", \"bottom\", \"top\"]\nfix = \"normal\"\n";
+    let free = "[[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n";
+    // Inertia would let a free body vibrate.
+    let density = if scheme == "midpoint" { "density = 1e-12\n" } else { "" };
+    for (supports, share) in [(held, 1.0), (free, 0.0)] {
+        if scheme == "midpoint" && share == 0.0 {
+            continue;
+        }
+        let job = warmed::<2>("plane_stress", 1, &format!("{density}{ISOTROPIC}"), supports)
+            .replace("temperature = 290", "temperature = 280")
+            .replace("land_on = [0.376]\n", if scheme == "midpoint" { "" } else { "land_on = [0.376]\n" })
+            .replace("implicit_euler", scheme);
+        let mesh = crossed([4, 3]);
+        let mut run = simulation::<2, 3>(session, &job, &mesh);
+        while run.advance(session).expect("a step").is_some() {
+            let (heat, energy) = (run.body.heat.as_ref().expect("heat"), &run.totals.energy);
+            let strain = 2e-5 * (heat.temperature()[0] - 280.0);
+            let [width, height] = [0, 1].map(|i| mesh.nodes.iter().map(|node| node[i]).fold(0.0, f64::max));
+            // Stress along two axes.
+            let stored = 5000.0 / 0.7 * strain * strain * width * height;
+            for (kind, share) in [(THERMAL_WORK, share), (ELASTIC, share), (NUMERICAL, 0.0)] {
+                let off = (energy[kind] - share * stored).abs();
+                assert!(off < 1e-5 * stored, "{scheme} {share}: {} {} {stored}", kind.column, energy[kind]);
+            }
+        }
+    }
+}
+
 #[test]
 fn energy_balances_where_a_temperature_strains_the_body() {
     run_on(&[1, 2], |world| {
         let elastic = "elasticity = { youngs_modulus = 1000, poisson_ratio = 0.3 }";
         let flow = "viscoplasticity.perzyna = { relaxation = 20, yield_stress = 1 }";
         let damage = "damage = { threshold = 1e-4, viscosity = 1, largest = 0.5 }";
+        for scheme in ["implicit_euler", "bdf2", "midpoint"] {
+            work_of_expansion(&world.session, scheme);
+        }
         for scheme in ["lagged_euler", "implicit_euler", "bdf2", "midpoint"] {
             balance(&world.session, scheme, elastic);
             balance(&world.session, scheme, &format!("{elastic}\n{flow}"));

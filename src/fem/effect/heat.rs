@@ -450,7 +450,7 @@ impl<const D: usize> Heat<D> {
         seen.temperature.complete(has_middles.then_some(&middles[..]), exchange)
     }
 
-    /// Takes back what motion sees to what it saw before.
+    /// Exchanges what motion sees with what it saw before.
     pub fn see_as_before(&mut self) {
         if let Some(seen) = &mut self.seen {
             std::mem::swap(&mut seen.temperature.values, &mut seen.before);

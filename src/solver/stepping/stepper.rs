@@ -21,8 +21,8 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{
-            CONTACT, Energy, Form, Freedom, Heat, NUMERICAL, Role, SLIP_BETWEEN_PAIRINGS, Step, THERMAL_WORK,
-            VISCOUS, WORK,
+            CONTACT, ELASTIC, Energy, Form, Freedom, Heat, NUMERICAL, Role, SLIP_BETWEEN_PAIRINGS, Step,
+            THERMAL_WORK, VISCOUS, WORK,
         },
         resultants::BalancedMotion,
         state::State,
@@ -502,10 +502,38 @@ impl Stepper {
         outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
         outcome.energy[NUMERICAL] += std::mem::take(&mut self.energy_of_pairing);
-        outcome.energy[THERMAL_WORK] += self.thermal_work.take().unwrap_or_default();
         outcome.energy += self.heat_of_step.take().unwrap_or_default();
         if let Some(heat) = &self.heat {
             heat.commit(body)?;
+        }
+        self.finish_expansion(session, body, state, &mut outcome.energy)
+    }
+
+    /// Adds the work of thermal expansion in the step just committed, on the mean of the stresses at its start and at its end: the body has
+    /// expanded at the start or, if the end is extrapolated, half at the start and half at the end. Collective.
+    fn finish_expansion<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        energy: &mut Energy,
+    ) -> Result<()> {
+        let Some(at_start) = self.thermal_work.take() else { return Ok(()) };
+        let extrapolates = self.integrator.blend().extrapolates();
+        let work = if extrapolates {
+            body.heat.iter_mut().try_for_each(|heat| heat.see(None))?;
+            body.expand(state)
+        } else {
+            body.work_of_expansion(state)
+        };
+        let [at_end] = session.sum([session.agree(work)?]);
+        if extrapolates {
+            energy[ELASTIC] += at_end;
+            energy[THERMAL_WORK] += at_start + at_end;
+        } else {
+            let mean = 0.5 * (at_start + at_end);
+            energy[THERMAL_WORK] += mean;
+            energy[NUMERICAL] -= mean - at_start;
         }
         Ok(())
     }
