@@ -137,21 +137,26 @@ impl Newton {
         while let Some(fallback) = next {
             loop {
                 self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
-                match fallback.search {
+                let has_start = match fallback.search {
                     Search::Yielding => {
-                        let started = self.solve_yielding(problem, &mut equations);
+                        let has_yielded = self.solve_yielding(problem, &mut equations);
                         frictions(&mut problem.body.contacts).for_each(|friction| friction.give = 0.0);
-                        started?;
+                        has_yielded?
                     }
                     Search::Falling => {
                         self.solve_falling(problem, &mut equations)?;
                         let contacts = &mut problem.body.contacts;
                         write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
                         self.set_graph_parameters(contacts, system.scales, fallback);
+                        true
                     }
-                    _ => {}
-                }
-                let mut reason = self.solve_with_bounds(problem, &mut equations, fallback)?;
+                    _ => true,
+                };
+                let mut reason = if has_start {
+                    self.solve_with_bounds(problem, &mut equations, fallback)?
+                } else {
+                    Some(NO_MINIMUM.to_owned())
+                };
                 if reason.is_none() && is_yielding(&fallback) {
                     reason = self.sharpen(problem, &mut equations, fallback)?;
                 }

@@ -26,12 +26,13 @@ const YIELDING_TOLERANCE: f64 = 1e5;
 
 impl Newton {
     /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
-    /// none. Points still yield afterwards. Collective.
+    /// none. Points still yield afterwards. Returns whether points that yield less and less have solutions: otherwise those that do not yield
+    /// have none either. Collective.
     pub(super) fn solve_yielding<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         equations: &mut Reduced<'_>,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let system = self.loosened(equations.system);
         let equations = &mut Reduced { system, krylov: equations.krylov, velocity: equations.velocity };
         let mut reached = None;
@@ -64,7 +65,7 @@ impl Newton {
             }
             ratio = last * factor;
         }
-        Ok(())
+        Ok(reached.is_some_and(|ratio| ratio < FIRST_RATIO))
     }
 
     /// Goes on by full steps from a solution that followed points which yield: their energies are flat near it, so that descents end within
