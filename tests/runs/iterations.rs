@@ -319,3 +319,73 @@ fn loads_near_the_limit_of_a_plastic_block_take_few_iterations_with_and_without_
         assert!(newton <= 500.0 && linear <= 2000.0, "{hypothesis}: {newton}, {linear}");
     }
 }
+
+/// What friction alone holds slides as a whole where all points slide; and what springs press together has velocities far below the
+/// pressures, as parameters of their graphs, in whose rounding they are lost.
+#[test]
+fn blocks_that_friction_holds_on_springs_take_few_iterations() {
+    let block = r#"
+        [mesh.rectangle]
+        size = [0.1, 0.05]
+        cells = [8, 3]
+        [material]
+        hypothesis = "plane_strain"
+        elasticity = { youngs_modulus = 1e8, poisson_ratio = 0.3 }
+        density = 2000.0
+        [[traction]]
+        on = ["top"]
+        value = ["34300*min(t/0.2, 1)", "-1.357e5*min(t/0.1, 1)"]
+        [[contact]]
+        on = ["bottom"]
+        normal.compliance = { stiffness = 5e9 }
+        friction.coulomb = { coefficient = 0.3 }
+        [time]
+        scheme = "implicit_euler"
+        end = 0.1
+        step = 0.02
+        [solver]
+        accept = ["uniqueness"]
+    "#;
+    let pair = r#"
+        [[mesh.rectangle]]
+        name = "a"
+        corner = [0.0053, 0.0]
+        size = [0.1, 0.05]
+        cells = [8, 3]
+        [[mesh.rectangle]]
+        name = "b"
+        corner = [-0.02, -0.04]
+        size = [0.14, 0.04]
+        cells = [9, 3]
+        [material]
+        hypothesis = "plane_stress"
+        elasticity = { youngs_modulus = 1e9, poisson_ratio = 0.2 }
+        density = 2000.0
+        viscoplasticity.maxwell = { relaxation_time = 0.3 }
+        [[support]]
+        on = ["b.bottom"]
+        fix = "all"
+        [[traction]]
+        on = ["a.top"]
+        value = ["2.74e5*min(t/0.2, 1)", "-1.17e6*min(t/0.1, 1)"]
+        [[contact]]
+        on = ["a.bottom"]
+        against = ["b.top"]
+        normal.compliance = { stiffness = 5e12, exponent = 1.5 }
+        friction.coulomb = { coefficient = 0.4 }
+        [time]
+        scheme = "bdf2"
+        end = 0.2
+        step = 0.02
+        [solver]
+        accept = ["uniqueness"]
+    "#;
+    for (text, steps) in [(block, 5.0), (pair, 10.0)] {
+        let case = Case::written_as(text);
+        for ranks in [1, 2] {
+            let results = case.run(ranks);
+            let newton = results.number("newton_iterations");
+            assert!(newton < 20.0 * steps, "{steps} steps on {ranks} ranks: {newton}");
+        }
+    }
+}

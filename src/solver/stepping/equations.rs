@@ -128,6 +128,10 @@ const STAGNATION: f64 = 0.5;
 /// node by node, as that of a beam, they take as many iterations as there are nodes.
 const PROGRESS: f64 = 0.9;
 pub(super) const PATIENCE: usize = 50;
+/// The same where some point slides with a friction bound that depends on the pressure, and residuals exceed the least one by this ratio:
+/// points stick and slide in turn.
+const LOST_PATIENCE: usize = 10;
+const LOST: f64 = 100.0;
 /// The same where rounding errors hide that nothing holds a body yet.
 const HIDDEN_PATIENCE: usize = 5;
 
@@ -173,6 +177,8 @@ pub struct ContactEquations<'a, const D: usize> {
     pub session: &'a Session,
     /// Whether to fail when a set of branches of the contact graphs recurs.
     pub stop_at_cycles: bool,
+    /// Whether steps are halved until the branches of the contact graphs stay the same.
+    pub halves: bool,
     /// The number of iterations without progress after which to give up.
     pub patience: usize,
     /// Whether the equations are those of the contact points alone, with all other velocities in equilibrium with theirs.
@@ -404,7 +410,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             let stagnates = last >= STAGNATION * self.scratch.residuals[1];
             self.scratch.residuals[0] = last;
             let speed = self.scratch.velocity.norm()? + self.obstacles.speed(self.contacts);
-            self.scratch.is_at_floor = stagnates && self.floor.is_reached(last, speed);
+            // Velocities are differences of unknowns, which are much larger than they where nothing but contact resists a body much.
+            self.scratch.is_at_floor = stagnates
+                && self.floor.is_reached(last, speed.max(x.norm()? + self.obstacles.speed(self.contacts)));
             self.scratch.is_hidden = self.hiding_floor.is_reached(last, speed);
             return Ok(());
         }
@@ -433,7 +441,12 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         // Once the branches are those of the solution, few iterations remain, or rounding errors alone.
         let has_settled = self.counts.sets.last_chunk().is_some_and(|[one, other]| one == other);
         let after = if has_settled { 0 } else { self.counts.least.1 };
-        let patience = if self.scratch.is_hidden { HIDDEN_PATIENCE } else { self.patience };
+        let is_lost = self.counts.coupled > 0 && self.scratch.residuals[0] > LOST * self.counts.least.0;
+        let patience = match (self.scratch.is_hidden, is_lost) {
+            (true, _) => HIDDEN_PATIENCE,
+            (false, true) => self.patience.min(LOST_PATIENCE),
+            (false, false) => self.patience,
+        };
         self.counts.sets.len() >= patience.saturating_add(after)
     }
 
@@ -496,7 +509,10 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         direction: &mut DistributedVector,
     ) -> Result<()> {
         match self.solve_linearised(residual, direction, (ProjectedKind::Symmetric, true))? {
-            Curvature::Positive => Ok(()),
+            Curvature::Positive => {
+                let has_settled = self.counts.sets.last_chunk().is_some_and(|[one, other]| one == other);
+                if self.halves && !has_settled { direction.scale(0.5) } else { Ok(()) }
+            }
             // Without a direction, iterations would repeat the same velocity.
             Curvature::Negative => Err(Error::Failed(NO_DIRECTION.into())),
         }

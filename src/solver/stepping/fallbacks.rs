@@ -16,6 +16,8 @@ pub(super) struct Fallback {
 pub(super) enum Search {
     /// Full steps only.
     FullSteps,
+    /// Steps of half the length until the branches of the contact graphs stay the same.
+    HalfSteps,
     /// Each step is shortened until the residual decreases enough.
     Backtracking,
     /// The same for the equations of the contact points alone: all other velocities are in equilibrium with those of the contact
@@ -25,7 +27,7 @@ pub(super) enum Search {
     Descent,
     /// The same with few directions.
     ShortDescent,
-    /// The same from a solution with friction points that yield at first, and less and less until they obey their law.
+    /// Full steps from a solution with friction points that yield at first, and less and less; descents where these find none.
     Yielding,
     /// The same from solutions with friction bounds at the sliding speeds of the last one.
     Falling,
@@ -69,19 +71,24 @@ impl Conditions {
     /// and measures their error. Fixed-point iteration avoids cycles between pressure and friction; it is used if friction depends on the
     /// pressure. Where cells flow, the residual of the whole body measures the error of flow as well, and shorter steps come second: full
     /// ones beyond the yield stress overshoot. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
-    /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge. Friction
-    /// points yield after these full steps for a light obstacle on a stiff body, which points that stick and slide in turn move to and
-    /// fro; and at last for bodies that nothing but little friction holds, or whose points all stick at once. Where friction falls faster
-    /// with the sliding speed than the body resists, bounds follow the speeds from one solution to the next.
+    /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge.
+    ///
+    /// With friction, full steps may let points stick and slide in turn, most of all where little but friction holds a body: steps of half
+    /// the length come second, and friction points that yield less and less third. For a light obstacle on a stiff body, which points that
+    /// stick and slide in turn move to and fro, they yield after more full steps, and where laws soften at last: on the way they slide, while
+    /// there may be another solution in which they stick. Where friction falls faster with the sliding speed than the body resists, bounds
+    /// follow the speeds from one solution to the next.
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         use FrictionIteration::{FixedPoint, Newton};
-        use Search::{Backtracking, Descent, Equilibrated, Falling, FullSteps, Yielding};
+        use Search::{Backtracking, Descent, Equilibrated, Falling, FullSteps, HalfSteps, Yielding};
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
         let rubs = self.rubs && !self.rubs_obstacles;
         [
             (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
+            (follows_bounds && rubs, HalfSteps, 1.0, Newton),
+            (rubs && !self.softens, Yielding, 1.0, FixedPoint),
             (follows_bounds && self.flows, Backtracking, 1.0, Newton),
             (follows_bounds, Equilibrated, 1.0, Newton),
             (follows_bounds, Equilibrated, 10.0, Newton),
@@ -97,7 +104,7 @@ impl Conditions {
             (fixes_bounds, Backtracking, 30.0, FixedPoint),
             (follows_bounds, Descent, 1.0, Newton),
             (fixes_bounds, Descent, 1.0, FixedPoint),
-            (rubs, Yielding, 1.0, FixedPoint),
+            (rubs && self.softens, Yielding, 1.0, FixedPoint),
             (self.rubs, Falling, 1.0, FixedPoint),
         ]
         .into_iter()
@@ -112,7 +119,7 @@ impl Conditions {
     /// Whether the equations can be solved by this search.
     fn allows(self, search: Search) -> bool {
         match search {
-            Search::FullSteps | Search::Yielding => !self.has_user_search,
+            Search::FullSteps | Search::HalfSteps | Search::Yielding => !self.has_user_search,
             Search::Equilibrated => self.interior_is_linear,
             Search::Backtracking => true,
             Search::Descent | Search::ShortDescent | Search::Falling => self.softens && !self.has_user_search,
@@ -158,14 +165,16 @@ mod tests {
     }
 
     #[test]
-    fn friction_points_yield_third_with_driven_obstacles_and_otherwise_last() {
+    fn friction_points_yield_third() {
         let rubs = Conditions { rubs: true, rubs_obstacles: true, interior_is_linear: false, ..FRICTIONLESS };
         let found = searches(rubs);
         assert_eq!(found[..3], [Search::FullSteps, Search::FullSteps, Search::Yielding]);
         assert_eq!(found.iter().filter(|search| **search == Search::Yielding).count(), 1);
         let coulomb = Conditions { rubs: true, follows_pressure: true, ..FRICTIONLESS };
         let tresca = Conditions { rubs: true, ..FRICTIONLESS };
-        assert!([coulomb, tresca].into_iter().all(|rubs| searches(rubs).last() == Some(&Search::Yielding)));
+        let second = [Search::HalfSteps, Search::Yielding];
+        assert!([coulomb, tresca].into_iter().all(|rubs| searches(rubs)[1..3] == second));
+        assert_eq!(searches(Conditions { softens: true, ..tresca })[1], Search::HalfSteps);
         assert!(!searches(FRICTIONLESS).contains(&Search::Yielding));
     }
 

@@ -137,29 +137,21 @@ impl Newton {
         while let Some(fallback) = next {
             loop {
                 self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
-                let has_start = match fallback.search {
+                let reason = match fallback.search {
                     Search::Yielding => {
-                        let has_yielded = self.solve_yielding(problem, &mut equations);
+                        let failure = self.solve_yielding(problem, &mut equations, fallback);
                         frictions(&mut problem.body.contacts).for_each(|friction| friction.give = 0.0);
-                        has_yielded?
+                        failure?
                     }
                     Search::Falling => {
                         self.solve_falling(problem, &mut equations)?;
                         let contacts = &mut problem.body.contacts;
                         write_steepest_decreases(problem.session, contacts, &mut self.steepest_decreases);
                         self.set_graph_parameters(contacts, system.scales, fallback);
-                        true
+                        self.solve_with_bounds(problem, &mut equations, fallback)?
                     }
-                    _ => true,
+                    _ => self.solve_with_bounds(problem, &mut equations, fallback)?,
                 };
-                let mut reason = if has_start {
-                    self.solve_with_bounds(problem, &mut equations, fallback)?
-                } else {
-                    Some(NO_MINIMUM.to_owned())
-                };
-                if reason.is_none() && is_yielding(&fallback) {
-                    reason = self.sharpen(problem, &mut equations, fallback)?;
-                }
                 match reason {
                     None if self.suits_friction(problem) => {
                         return self.finish(problem, &mut equations, fallback.search);
@@ -385,7 +377,7 @@ impl Newton {
         sharpness: f64,
     ) -> Result<Option<&'static str>> {
         if !self.has_user_search {
-            self.snes.search_along_steps(search != Search::FullSteps)?;
+            self.snes.search_along_steps(!matches!(search, Search::FullSteps | Search::HalfSteps))?;
         }
         // A tolerance relative to the first residual of the step suffices: the right-hand side is almost zero where only an obstacle
         // moves the body.
@@ -420,6 +412,7 @@ impl Newton {
             linear_solver: krylov,
             session: problem.session,
             stop_at_cycles: search == Search::FullSteps,
+            halves: search == Search::HalfSteps,
             patience,
             equilibrated: is_equilibrated,
             counts: std::mem::take(&mut self.counts),

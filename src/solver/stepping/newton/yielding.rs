@@ -1,6 +1,6 @@
 //! Starts of Newton's method from solutions with friction points that yield.
 
-use super::{Newton, frictions, write_unknowns, write_velocities};
+use super::{NO_MINIMUM, Newton, frictions, write_unknowns, write_velocities};
 use crate::{
     error::Result,
     fem::{body::Body, effect::Contact},
@@ -14,82 +14,113 @@ use crate::{
 };
 
 /// The velocities per traction by which friction points yield relative to the compliance of the body: the first, the ratio of each to the
-/// last, and the largest one that is worth trying, and the last.
+/// last, and the largest one that is worth trying, that from which full steps are tried, and the least.
 const FIRST_RATIO: f64 = 100.0;
 const RATIO_FACTOR: f64 = 0.01;
 const LARGEST_RATIO_FACTOR: f64 = 0.9;
-const LAST_RATIO: f64 = 1e-3;
+const SHARP_RATIO: f64 = 1e-3;
+const LEAST_RATIO: f64 = 1e-8;
 /// The tolerance of full steps from the last of these solutions, relative to that of the step.
 const SHARP: f64 = 1e-3;
 /// The tolerance of these solutions relative to that of the step.
 const YIELDING_TOLERANCE: f64 = 1e5;
 
 impl Newton {
-    /// Solves the equations with friction points that yield less and less, each from the last solution and in shorter steps where there is
-    /// none. Points still yield afterwards. Returns whether points that yield less and less have solutions: otherwise those that do not yield
-    /// have none either. Collective.
+    /// Solves the equations with friction points that yield less and less, each time from the last solution and in shorter steps where there
+    /// is none, until full steps from there find the solution with points that do not yield. Where they find none, descents do, by an
+    /// iteration of friction bounds. Returns the reason for failure, if it fails: points that have no solution by yielding less have none
+    /// without yielding. Collective.
     pub(super) fn solve_yielding<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-    ) -> Result<bool> {
-        let system = self.loosened(equations.system);
-        let equations = &mut Reduced { system, krylov: equations.krylov, velocity: equations.velocity };
-        let mut reached = None;
-        let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
-        set_give(problem.body, ratio);
-        self.evaluate(problem, equations)?;
-        self.fix_bounds(problem, system)?;
-        loop {
-            set_give(problem.body, ratio);
-            self.scratch.restart();
-            let failure = self.attempt(problem, equations, Search::ShortDescent, 1.0)?;
-            if failure.is_none() {
-                self.fix_bounds(problem, system)?;
-                self.keep_reached(&problem.body.contacts, equations.velocity)?;
-                reached = Some(ratio);
-                factor = f64::max(RATIO_FACTOR, factor * factor);
-            } else {
-                factor = factor.sqrt();
-            }
-            let Some(last) = reached else {
-                self.go_back(problem, equations)?;
-                break;
-            };
-            if failure.is_some() {
-                set_give(problem.body, last);
-                self.go_to_reached(problem, equations)?;
-            }
-            if last <= LAST_RATIO || factor > LARGEST_RATIO_FACTOR {
-                break;
-            }
-            ratio = last * factor;
-        }
-        Ok(reached.is_some_and(|ratio| ratio < FIRST_RATIO))
-    }
-
-    /// Goes on by full steps from a solution that followed points which yield: their energies are flat near it, so that descents end within
-    /// the tolerance but far from the accuracy of Newton's method. Goes back to that solution where full steps find none; returns the
-    /// reason for failure, if that is none any more. Collective.
-    pub(super) fn sharpen<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         equations: &mut Reduced<'_>,
         fallback: Fallback,
     ) -> Result<Option<String>> {
+        let mut reached = None;
+        let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
+        set_give(problem.body, ratio);
+        self.evaluate(problem, equations)?;
+        self.fix_bounds(problem, equations.system)?;
+        loop {
+            let has_solution = self.yield_by(problem, equations, ratio)?;
+            if has_solution {
+                reached = Some(ratio);
+                factor = f64::max(RATIO_FACTOR, factor * factor);
+                if ratio <= SHARP_RATIO && self.sharpen(problem, equations, fallback)? {
+                    return Ok(None);
+                }
+            } else {
+                factor = factor.sqrt();
+            }
+            let Some(last) = reached else { break };
+            if !has_solution {
+                set_give(problem.body, last);
+                self.go_to_reached(problem, equations)?;
+            }
+            if last <= LEAST_RATIO || factor > LARGEST_RATIO_FACTOR {
+                break;
+            }
+            ratio = last * factor;
+        }
+        set_give(problem.body, 0.0);
+        if reached.is_none_or(|ratio| ratio >= FIRST_RATIO) {
+            return Ok(Some(NO_MINIMUM.to_owned()));
+        }
+        let failure = self.solve_with_bounds(problem, equations, fallback)?;
+        if failure.is_some() || self.sharpen(problem, equations, fallback)? {
+            return Ok(failure);
+        }
+        // Bounds follow the pressures of the solution before they are fixed there.
+        self.fix_bounds(problem, equations.system)?;
+        self.attempt(problem, equations, fallback.search, 1.0)
+    }
+
+    /// Solves the equations with friction points that yield by this ratio from this velocity, with bounds at the pressures there; keeps the
+    /// solution, and returns whether there is one. Collective.
+    fn yield_by<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+        ratio: f64,
+    ) -> Result<bool> {
+        let system = self.loosened(equations.system);
+        set_give(problem.body, ratio);
+        self.scratch.restart();
+        let equations = &mut Reduced { system, krylov: equations.krylov, velocity: equations.velocity };
+        if self.attempt(problem, equations, Search::ShortDescent, 1.0)?.is_some() {
+            return Ok(false);
+        }
+        self.fix_bounds(problem, system)?;
+        self.keep_reached(&problem.body.contacts, equations.velocity)?;
+        Ok(true)
+    }
+
+    /// Takes full steps from this solution to one without points that yield; returns whether they find it, and goes back where they do not.
+    /// Collective.
+    fn sharpen<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+        fallback: Fallback,
+    ) -> Result<bool> {
         let scales = equations.system.scales;
         self.keep_reached(&problem.body.contacts, equations.velocity)?;
+        let gives: Vec<f64> = frictions(&mut problem.body.contacts)
+            .map(|friction| std::mem::take(&mut friction.give))
+            .collect();
         let newton = Fallback { iteration: FrictionIteration::Newton, ..fallback };
         self.set_graph_parameters(&mut problem.body.contacts, scales, newton);
         self.scratch.restart();
-        if self.attempt(problem, equations, Search::FullSteps, SHARP)?.is_none() {
-            return Ok(None);
+        let is_found = self.attempt(problem, equations, Search::FullSteps, SHARP)?.is_none();
+        if !is_found {
+            frictions(&mut problem.body.contacts)
+                .zip(gives)
+                .for_each(|(friction, give)| friction.give = give);
+            self.set_graph_parameters(&mut problem.body.contacts, scales, fallback);
+            self.go_to_reached(problem, equations)?;
+            self.fix_bounds(problem, equations.system)?;
         }
-        // Bounds follow the pressures of the solution before they are fixed there.
-        self.go_to_reached(problem, equations)?;
-        self.set_graph_parameters(&mut problem.body.contacts, scales, fallback);
-        self.fix_bounds(problem, equations.system)?;
-        self.attempt(problem, equations, fallback.search, 1.0)
+        Ok(is_found)
     }
 
     /// Evaluates the contacts at the velocity from which they are solved. Collective.
