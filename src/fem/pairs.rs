@@ -571,8 +571,11 @@ mod tests {
     fn bowl(count: u32, first: u32, (height, bend): (f64, f64)) -> (Vec<Facet<3>>, BTreeMap<u32, Vector<3>>) {
         let at = |[x, y]: [f64; 2]| [x, y, height + bend * (x * x + y * y)];
         let corner = |i: u32, j: u32| {
-            let shift =
-                if i % count == 0 || j % count == 0 { 0.0 } else { f64::from(7 * i + 3 * j).sin() / 5.0 };
+            let shift = if i.is_multiple_of(count) || j.is_multiple_of(count) {
+                0.0
+            } else {
+                f64::from(7 * i + 3 * j).sin() / 5.0
+            };
             [f64::from(i) + shift, f64::from(j) - shift].map(|x| 0.6 * x / f64::from(count) - 0.3)
         };
         let (mut places, mut facets) = (BTreeMap::new(), Vec::new());
