@@ -58,6 +58,11 @@ impl Error {
         Self { exit: Exit::Failed, words, rank: None }
     }
 
+    /// The run was asked to stop.
+    pub fn Stopped(words: String) -> Self {
+        Self { exit: Exit::Stopped, words, rank: None }
+    }
+
     /// A library or the machine failed without a fault of the user.
     pub fn Internal(words: String) -> Self {
         Self { exit: Exit::Internal, words, rank: None }

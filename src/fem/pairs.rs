@@ -567,6 +567,71 @@ mod tests {
         assert!(most[0] > 1e-4 && most[1] < 1e-15, "{most:?}");
     }
 
+    /// Quadratic triangles of a square of 0.6 m on a paraboloid, of uneven cells, with the places of their nodes.
+    fn bowl(count: u32, first: u32, (height, bend): (f64, f64)) -> (Vec<Facet<3>>, BTreeMap<u32, Vector<3>>) {
+        let at = |[x, y]: [f64; 2]| [x, y, height + bend * (x * x + y * y)];
+        let corner = |i: u32, j: u32| {
+            let shift = if i.is_multiple_of(count) || j.is_multiple_of(count) {
+                0.0
+            } else {
+                f64::from(7 * i + 3 * j).sin() / 5.0
+            };
+            [f64::from(i) + shift, f64::from(j) - shift].map(|x| 0.6 * x / f64::from(count) - 0.3)
+        };
+        let (mut places, mut facets) = (BTreeMap::new(), Vec::new());
+        for (i, j) in (0..count).flat_map(|i| (0..count).map(move |j| (i, j))) {
+            for mut cell in [[(i, j), (i + 1, j), (i, j + 1)], [(i + 1, j), (i + 1, j + 1), (i, j + 1)]] {
+                if bend > 0.0 {
+                    cell.reverse();
+                }
+                let mut nodes = Vec::new();
+                for [(a, b), (c, d)] in
+                    [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]].map(|ends| ends.map(|k| cell[k]))
+                {
+                    // Twice the mean of the ends is a whole number.
+                    let number = first + (a + c) * 100 + b + d;
+                    let (from, to) = (corner(a, b), corner(c, d));
+                    places.insert(number, at([0, 1].map(|k| 0.5 * (from[k] + to[k]))));
+                    nodes.push(number);
+                }
+                let corners = [0, 1, 2].map(|k| places[&nodes[k]]);
+                facets.push(Facet::new(nodes, corners));
+            }
+        }
+        (facets, places)
+    }
+
+    #[test]
+    fn the_gap_between_curved_surfaces_in_space_is_the_distance_at_the_node() {
+        let (slaves, mut places) = bowl(5, 0, (0.0, -0.5));
+        let (masters, of_masters) = bowl(4, 10_000, (0.01, 0.5));
+        places.extend(of_masters);
+        let mut of_nodes: BTreeMap<u32, (f64, f64, f64, Vector<3>)> = BTreeMap::new();
+        for one in contributions(&slaves, &masters, [0.1, f64::INFINITY]) {
+            let (weight, whole, gap, normal) = of_nodes.entry(one.node).or_default();
+            *weight += one.weight;
+            *whole += one.whole;
+            *gap += gap_between_nodes(&one, &places);
+            *normal = add_scaled(normal, one.weight, &one.normal);
+        }
+        let mut checked = 0;
+        for (node, (weight, whole, gap, normal)) in of_nodes {
+            let [x, y, z] = places[&node];
+            if weight < 0.999 * whole {
+                continue;
+            }
+            checked += 1;
+            let normal = normal.map(|n| n / norm(&normal));
+            let above = |t: f64| {
+                let [x, y, z] = add_scaled(&[x, y, z], t, &normal);
+                0.01 + 0.5 * (x * x + y * y) - z
+            };
+            let exact = (0..20).fold(0.0, |t, _| t + above(t));
+            assert!((gap / weight - exact).abs() < 1e-3, "{node}: {} m instead of {exact} m", gap / weight);
+        }
+        assert!(checked > 20, "{checked}");
+    }
+
     #[test]
     fn facets_of_which_all_or_no_nodes_carry_a_law_remain_as_they_are() {
         for lawless in [BTreeSet::new(), BTreeSet::from([0, 1]), BTreeSet::from([10])] {

@@ -181,6 +181,11 @@ impl Session {
         self.world.all_reduce_into(&seen, &mut any, SystemOperation::max());
         Signal::ALL.into_iter().find(|s| s.number() == any)
     }
+
+    /// Whether this rank was asked to stop.
+    pub(crate) fn is_asked_to_stop(&self) -> bool {
+        self.signal.load(Ordering::Relaxed) != 0
+    }
 }
 
 /// An integer that increases with the number; NaN gives the largest.

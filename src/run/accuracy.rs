@@ -208,6 +208,8 @@ pub fn error_of_steps<const D: usize, const S: usize>(
     Ok(Ok(ErrorOfSteps { relative: larger(error, loaded.job.solver.tolerance), order, norm }))
 }
 
+const INTERRUPTED: &str = "interrupted";
+
 /// The state at the end of a job; `Err` says why there is none. Collective.
 fn repeated<const D: usize, const S: usize>(
     session: &Session,
@@ -221,7 +223,8 @@ fn repeated<const D: usize, const S: usize>(
     };
     match run() {
         Ok(Some(state)) => Ok(Ok(state)),
-        Ok(None) => Ok(Err("interrupted".into())),
+        Ok(None) => Ok(Err(INTERRUPTED.into())),
+        Err(error) if error.exit() == Exit::Stopped => Ok(Err(INTERRUPTED.into())),
         Err(error) if error.exit() == Exit::Internal => Err(error),
         Err(error) => Ok(Err(format!("with steps of {} s: {error}", Digits(loaded.job.time.step)))),
     }

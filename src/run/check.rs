@@ -277,9 +277,12 @@ impl Report {
             ("program", memory.program),
             ("mesh", memory.mesh),
             ("matrix", memory.matrix),
+            ("assembly", memory.assembly),
             ("history", memory.history),
             ("vectors", memory.vectors),
             ("preconditioner", memory.preconditioner),
+            ("contact", memory.contact),
+            ("flow", memory.flow),
         ];
         let parts: Vec<String> = parts
             .iter()

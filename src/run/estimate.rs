@@ -18,12 +18,18 @@ pub(super) struct MemoryEstimate {
     pub mesh: u64,
     /// Sparse matrix.
     pub matrix: u64,
+    /// Its blocks and their order while it is assembled and factored.
+    pub assembly: u64,
     /// Histories of the cells.
     pub history: u64,
     /// Vectors of nodal values.
     pub vectors: u64,
     /// Factor or multigrid hierarchy.
     pub preconditioner: u64,
+    /// Dense matrices of the motions of contact nodes.
+    pub contact: u64,
+    /// A second matrix where cells flow, with its factors.
+    pub flow: u64,
     /// All of these.
     pub total: u64,
     /// The whole mesh on rank 0 until it is distributed; 0 where ranks generate or read their own parts.
@@ -31,7 +37,7 @@ pub(super) struct MemoryEstimate {
 }
 
 /// Bytes of a process without a mesh.
-const PROGRAM: f64 = 55e6;
+const PROGRAM: f64 = 60e6;
 /// Vectors of the state, the scheme, Newton's and the Krylov method.
 const VECTORS: f64 = 16.0;
 impl MemoryEstimate {
@@ -54,16 +60,22 @@ impl MemoryEstimate {
         let matrix = matrix_bytes(D, mesh.order(), nodes, cells, facets);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let program = PROGRAM * session.ranks() as f64;
+        let [contact, flow] = [problem.contact_bytes(preconditioner), problem.flow_bytes(preconditioner)];
         let preconditioner = problem.cost(preconditioner).memory;
+        let assembly = problem.assembly_bytes();
         let whole = nodes * 8.0 * D as f64 + cells * (20.0 * (D + 1) as f64) + facets * (4 * D + 8) as f64;
-        let total = program + mesh_bytes + matrix + history + vectors + preconditioner;
+        let of_matrices = matrix + assembly + preconditioner + contact + flow;
+        let total = program + mesh_bytes + history + vectors + of_matrices;
         Self {
             program: program as u64,
             mesh: mesh_bytes as u64,
             matrix: matrix as u64,
+            assembly: assembly as u64,
             history: history as u64,
             vectors: vectors as u64,
             preconditioner: preconditioner as u64,
+            contact: contact as u64,
+            flow: flow as u64,
             total: total as u64,
             whole_mesh_at_start: if mesh.handed_out { whole as u64 } else { 0 },
         }

@@ -26,13 +26,16 @@ pub(super) fn require_for_cells(session: &Session, dimension: usize, cells: usiz
 
 /// Refuses a run whose matrix and preconditioner cannot fit in the memory, before they are computed. Collective.
 pub(super) fn require_for_run(session: &Session, parts: &MemoryEstimate) -> Result<(), Agreed> {
-    let bytes = parts.matrix + parts.vectors + parts.preconditioner;
+    let bytes =
+        parts.matrix + parts.assembly + parts.vectors + parts.preconditioner + parts.contact + parts.flow;
     let words = format!(
-        "the run needs about {} more: matrix {}, vectors {}, preconditioner {}",
+        "the run needs about {} more: matrix {}, vectors {}, preconditioner {}, contact {}, flow {}",
         size(bytes),
-        size(parts.matrix),
+        size(parts.matrix + parts.assembly),
         size(parts.vectors),
-        size(parts.preconditioner)
+        size(parts.preconditioner),
+        size(parts.contact),
+        size(parts.flow)
     );
     require(session, bytes / UNCERTAINTY, &words)
 }

@@ -54,6 +54,7 @@ pub(super) fn find<const D: usize>(
         })?;
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         let against = facets(mesh, &contact.against);
+        refuse_joined(session, mesh, (number, contact), [&on, &against])?;
         let slides = contact.sliding == Sliding::Finite;
         let pair = Pair { slides, is_closed: contact.closed, ..Pair::of(number, [on, against]) };
         let pair = circumstances.form(session, mesh, job, pair)?;
@@ -96,6 +97,50 @@ pub(super) fn find<const D: usize>(
     refuse_chains(session, job, mesh, [&slaves, &masters])?;
     mesh.add_ghosts(session, ghosts)?;
     Ok(pairs)
+}
+
+/// Refuses a contact between these facets where bodies share a node: they are joined there. Facets of one body may meet. Collective.
+fn refuse_joined<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    (number, contact): (usize, &job::Contact),
+    sides: [&[u32]; 2],
+) -> Result<(), Agreed> {
+    let nodes_of = |facets: &[u32]| -> Result<BTreeSet<u32>, Agreed> {
+        let nodes = facets.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+        let numbers: Vec<u32> = nodes.map(|node| mesh.global_node(node)).collect();
+        Ok(gather(session.world(), &numbers)?.into_iter().collect())
+    };
+    let shared = &nodes_of(sides[0])? & &nodes_of(sides[1])?;
+    if shared.is_empty() {
+        return Ok(());
+    }
+    let bodies = mesh.bodies(session)?;
+    let records_of = |facets: &[u32]| -> Result<Vec<f64>, Agreed> {
+        let mut own = Vec::new();
+        for &facet in facets {
+            let body = bodies.of_cell[mesh.facet_cells[facet as usize] as usize];
+            for node in mesh.facet_nodes(facet).filter(|node| shared.contains(&mesh.global_node(*node))) {
+                own.extend([f64::from(mesh.global_node(node)), f64::from(body)]);
+                own.extend(mesh.nodes[node as usize]);
+            }
+        }
+        gather(session.world(), &own)
+    };
+    let [on, against] = [records_of(sides[0])?, records_of(sides[1])?];
+    let joined = on
+        .chunks_exact(2 + D)
+        .find(|one| against.chunks_exact(2 + D).any(|other| one[0] == other[0] && one[1] != other[1]));
+    session.agree(match joined {
+        None => Ok(()),
+        Some(at) => Err(Error::Refused(format!(
+            "contact.{number}: the boundaries {} and {} share the node at {:?} m: the bodies are joined there; write the mesh with separate \
+             nodes",
+            contact.on.join(", "),
+            contact.against.join(", "),
+            &at[2..]
+        ))),
+    })
 }
 
 /// Lets nodes of pairs whose law would act there, and that belong to other contacts, too, leave their part of the surface to neighbours,

@@ -167,9 +167,13 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
         let mut saved_at = Instant::now();
         self.cover_strains()?;
-        while let Some(outcome) =
-            self.simulation.advance(self.session).or_else(|error| self.explain(error))?
-        {
+        loop {
+            let outcome = match self.simulation.advance(self.session) {
+                Ok(Some(outcome)) => outcome,
+                Ok(None) => return Ok(Ended::Completed),
+                Err(error) if error.exit() == Exit::Stopped => return Ok(Ended::Stopped(self.signal(error))),
+                Err(error) => return self.explain(error),
+            };
             self.refuse_overflow()?;
             self.cover_steps()?;
             self.cover_strains()?;
@@ -192,7 +196,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
                 saved_at = Instant::now();
             }
         }
-        Ok(Ended::Completed)
+    }
+
+    /// The signal that ended a step. Collective.
+    fn signal(&self, error: Agreed) -> String {
+        self.session.stop_requested().map_or_else(|| error.to_string(), |signal| signal.to_string())
     }
 
     /// Adds to the error of a failed step that the certificates do not exclude several solutions.

@@ -10,6 +10,7 @@ use super::{
     steps,
 };
 use crate::{
+    error::Exit,
     job::Job,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -73,6 +74,7 @@ pub(super) fn estimate<const D: usize, const S: usize>(
         match simulation.advance(session) {
             Ok(Some(_)) => {}
             Ok(None) => break,
+            Err(error) if error.exit() == Exit::Stopped => return Err(error),
             Err(error) => return Ok(Err(error)),
         }
         let [now] = session.largest([start.elapsed().as_secs_f64()]);

@@ -67,6 +67,30 @@ fn a_signal_to_one_rank_stops_all_of_them() {
     stop_and_continue(1, "INT", Target::OneRank);
 }
 
+/// A beam that lies down on an obstacle node by node: its first step takes hundreds of iterations.
+#[test]
+fn a_signal_ends_a_step_of_many_iterations() {
+    let case = Case::written_as(
+        "
+        mesh.rectangle = {size = [100.0, 0.5], cells = [800, 2]}
+        material = {hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.3}}
+        support = [{on = ['left'], fix = 'all'}]
+        traction = [{on = ['top'], value = [0.0, '-1e4 * x']}]
+        contact = [{on = ['bottom'], normal.unilateral.gap = 0.5, friction.coulomb.coefficient = 0.3}]
+        time = {end = 1.0, step = 0.5, scheme = 'implicit_euler'}",
+    );
+    for ranks in [1, 2] {
+        let mut running = case.start_with(ranks, &["--force"]);
+        running.wait_for("output ");
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        running.signal("USR1", Target::OneRank);
+        running.wait().expect(3).says("stopping on SIGUSR1; continue with --restart");
+        let results = case.results();
+        assert_eq!(results.summary()["steps"], 0, "within the first step");
+        assert_eq!(results.checkpoints(), [0]);
+    }
+}
+
 #[test]
 fn a_run_that_is_killed_continues_from_its_last_checkpoint() {
     for (signal, target) in [("TERM", Target::Launcher), ("INT", Target::Launcher), ("KILL", Target::OneRank)]

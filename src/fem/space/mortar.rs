@@ -20,22 +20,15 @@
 //! On a body of revolution all integrals are those over the whole turn.
 //!
 //! The psi depend on the space of the chi only: with any other basis q = T chi of it and N = T G, diag(w)
-//! N^-1 q is the same. Here q is orthonormal on C, which keeps N regular where C is small or thin.
+//! N^-1 q is the same. Here q is orthonormal on C, which keeps N regular where C is small or thin. The space is that of the phi_m, and N^-1
+//! is known: the functions q_j at the nodes, because q_j = sum_m q_j(x_m) phi_m. Thus psi_m gives w_m f(x_m) of each function f of the
+//! space: the gap of a node is that at its place, also of curved surfaces.
 //!
-//! | facet        | nodes with a law   | multiplier space     |
-//! |--------------|--------------------|----------------------|
-//! | 2D linear    | 2 corners          | linear               |
-//! | 2D quadratic | 2 corners, middle  | quadratic            |
-//! | 3D linear    | 3 corners          | linear               |
-//! | 3D quadratic | 3 middles of sides | linear (chi_m = 1 - 2 lambda of the opposite corner) |
-//!
-//! For the first three the multiplier space has the phi_m as its basis, and N^-1 is known: the functions q_j
-//! at the nodes, because q_j = sum_m q_j(x_m) phi_m.
+//! On quadratic triangles the middles of the sides carry laws alone: w_c of a corner is 0 where C is the whole facet. Where it is a part,
+//! each of the two middles beside a corner takes over half of its psi_c, so that the sum remains 1.
 
 use crate::linear_algebra::tensor::Vector;
-use geometry::{
-    Plane, Point, Shape, clip, dot, inverse, measure_and_centroid, oriented, quadrature, sides, subtract,
-};
+use geometry::{Plane, Point, Shape, clip, dot, measure_and_centroid, oriented, quadrature, sides, subtract};
 use parry3d_f64::{
     bounding_volume::Aabb,
     math::Vector as BoxVector,
@@ -59,8 +52,6 @@ const SMALLEST_PART: f64 = 1e-12;
 const LARGEST_OVERLAP: f64 = 1e-6;
 /// The smallest covered share of a slave facet that contributes.
 const SMALLEST_SHARE: f64 = 1e-9;
-/// The smallest pivot of the scaled matrix N of a slave facet that contributes.
-const SMALLEST_PIVOT: f64 = 1e-10;
 /// The width by which the space above a slave facet is searched in excess, as a share of its diameter.
 const SEARCH_MARGIN: f64 = 1e-6;
 
@@ -82,11 +73,12 @@ pub struct Contribution<const D: usize> {
     /// surface, positive where open. With the outward unit normal n of the facet it is the sum over `masters`
     /// of the entry times n.x_b, less the weight times n.x_a, at the places x of the nodes.
     pub gap: f64,
-    /// The sum over the corners c of quadratic triangles, which carry no law, of int psi_a phi_c in m^2; otherwise 0. With `weight` it is
-    /// int psi_a: the part of the surface for which the node stands, which may be negative where the facet is covered in part.
+    /// The sum over the corners c of quadratic triangles, which carry no law, of int psi_a phi_c in m^2; otherwise 0, and 0 where the facet is
+    /// covered. With `weight` it is int psi_a: the part of the surface for which the node stands, which may be negative where the facet is
+    /// covered in part.
     pub corners: f64,
     /// For each master node b, in ascending order, int psi_a phi_b in m^(D-1), with phi_b at the place on the
-    /// master facet that is projected. The corners c of quadratic triangles, which carry no law, are included
+    /// master facet that is projected. The corners c of quadratic triangles that are covered in part, which carry no law, are included
     /// with -int psi_a phi_c. All sum to `weight`.
     pub masters: Vec<(u32, f64)>,
 }
@@ -103,9 +95,7 @@ pub struct Contribution<const D: usize> {
 /// overlap in part, because the master surface is folded or strongly curved over e, the rest of the second
 /// one is left uncovered; overlaps up to the limit count twice.
 ///
-/// Facets with a covered share below 1e-9 contribute 0 (with their `whole`), and so do quadratic triangles
-/// whose matrix N is singular: a pivot below 1e-10 after its rows and columns are scaled. Facets that are not
-/// finite cover nothing and are not covered.
+/// Facets with a covered share below 1e-9 contribute 0 (with their `whole`). Facets that are not finite cover nothing and are not covered.
 ///
 /// The integrals are exact up to rounding for straight facets: all integrands are polynomials of degree 4 at
 /// most on the clipped polygons.
@@ -277,18 +267,20 @@ struct Sample {
     /// The weight in m^(D-1).
     weight: f64,
     /// The functions of the orthonormal basis there.
-    basis: [f64; 3],
+    basis: [f64; MOST],
 }
 
-/// Polynomials that are orthonormal on the covered part of a slave facet: 1 and the linear functions, or for
-/// quadratic segments the quadratic functions.
+/// The most nodes of a facet, and functions of a basis.
+const MOST: usize = 6;
+
+/// Polynomials that are orthonormal on the covered part of a slave facet, linear or quadratic as its shape functions.
 #[derive(Debug)]
 struct Basis<const D: usize> {
     centroid: Point,
-    /// The distance in m of the farthest corner of the covered part from its centroid.
-    size: f64,
-    /// Coefficients of 1 and the two other monomials; a function that is not used is 0.
-    coefficients: [[f64; 3]; 3],
+    /// The principal directions of the covered part, divided by its extent along each in m; the second one is 0 in two dimensions.
+    axes: [Point; 2],
+    /// Coefficients of the monomials; a function that is not used is 0.
+    coefficients: [[f64; MOST]; MOST],
 }
 
 impl<const D: usize> Basis<D> {
@@ -299,17 +291,14 @@ impl<const D: usize> Basis<D> {
         let centroid: Point = std::array::from_fn(|i| {
             parts.iter().map(|part| part.measure * part.centroid[i]).sum::<f64>() / measure
         });
-        let size = parts.iter().flat_map(|part| &part.polygon).fold(0.0, |most: f64, corner| {
-            let offset = subtract(corner, &centroid);
-            most.max(dot(&offset, &offset).sqrt())
-        });
-        let mut basis = Self { centroid, size, coefficients: [[0.0; 3]; 3] };
+        let axes = axes::<D>(parts, samples, centroid);
+        let mut basis = Self { centroid, axes, coefficients: [[0.0; MOST]; MOST] };
         basis.coefficients[0][0] = 1.0 / covered.sqrt();
         for sample in samples.iter_mut() {
             sample.basis[0] = basis.coefficients[0][0];
         }
         for k in 1..count {
-            let mut function = [0.0; 3];
+            let mut function = [0.0; MOST];
             function[k] = 1.0;
             // The second pass restores the orthogonality that cancellation in the first takes.
             for _ in 0..2 {
@@ -335,19 +324,35 @@ impl<const D: usize> Basis<D> {
         basis
     }
 
-    fn monomials(&self, place: Point) -> [f64; 3] {
-        let [u, v] = subtract(&place, &self.centroid).map(|x| x / self.size);
-        [1.0, u, if D == 2 { u * u } else { v }]
+    fn monomials(&self, place: Point) -> [f64; MOST] {
+        let offset = subtract(&place, &self.centroid);
+        let [u, v] = self.axes.map(|axis| dot(&axis, &offset));
+        if D == 2 { [1.0, u, u * u, 0.0, 0.0, 0.0] } else { [1.0, u, v, u * u, u * v, v * v] }
     }
 
-    fn values(&self, place: Point) -> [f64; 3] {
+    fn values(&self, place: Point) -> [f64; MOST] {
         let monomials = self.monomials(place);
         self.coefficients.map(|function| dot(&function, &monomials))
     }
 }
 
+/// The axes of a basis, in which thin parts are as wide as long.
+fn axes<const D: usize>(parts: &[Part<D>], samples: &[Sample], centroid: Point) -> [Point; 2] {
+    let moments = samples.iter().fold([0.0; 3], |[xx, xy, yy], sample| {
+        let [x, y] = subtract(&sample.place, &centroid);
+        [xx + sample.weight * x * x, xy + sample.weight * x * y, yy + sample.weight * y * y]
+    });
+    let (sin, cos) = (0.5 * (2.0 * moments[1]).atan2(moments[0] - moments[2])).sin_cos();
+    let directions = if D == 2 { [[1.0, 0.0], [0.0; 2]] } else { [[cos, sin], [-sin, cos]] };
+    directions.map(|axis| {
+        let corners = parts.iter().flat_map(|part| &part.polygon);
+        let extent = corners.map(|corner| dot(&axis, &subtract(corner, &centroid)).abs()).fold(0.0, f64::max);
+        axis.map(|x| if extent > 0.0 { x / extent } else { x })
+    })
+}
+
 /// The integrals of the functions of the basis times the shape functions of one facet, \[basis\]\[node\].
-type Products = [[f64; 6]; 3];
+type Products = [[f64; MOST]; MOST];
 
 impl<'a, const D: usize> Slave<'a, D> {
     fn new(facet: &'a Facet<D>) -> Self {
@@ -381,21 +386,26 @@ impl<'a, const D: usize> Slave<'a, D> {
         let mut samples: Vec<Sample> = Vec::new();
         for (part, Part { polygon, .. }) in parts.iter().enumerate() {
             let points = quadrature::<D>(polygon).into_iter();
-            samples.extend(points.map(|(place, weight)| Sample { part, place, weight, basis: [0.0; 3] }));
+            samples.extend(points.map(|(place, weight)| Sample { part, place, weight, basis: [0.0; MOST] }));
         }
         if facet.turns() {
             let turn = |place: Point| Shape::new(false, &self.corners, place).linear(&facet.turns).0;
             samples.iter_mut().for_each(|sample| sample.weight *= turn(sample.place));
             covered = samples.iter().map(|sample| sample.weight).sum();
         }
-        let basis = Basis::new(parts, &mut samples, (law.len(), covered));
+        let basis = Basis::new(parts, &mut samples, (facet.nodes.len(), covered));
         let own = self.own_products(&basis, &samples, covered);
-        let Some(duals) = self.duals(&basis, &own, covered) else { return };
+        let duals = self.duals(&basis, &own, covered);
+        let part_of_corner = |c: usize| own[0][c] * covered.sqrt();
+        let is_negligible = |c: usize| part_of_corner(c).abs() <= SMALLEST_PART * self.measure;
+        let is_whole = covered > 0.5 * self.measure && (0..law.start).all(is_negligible);
         let result = &mut result[first..];
-        for (contribution, (dual, m)) in result.iter_mut().zip(duals.iter().zip(law.clone())) {
+        for (contribution, ((dual, m), &(i, j))) in
+            result.iter_mut().zip(duals.iter().zip(law.clone()).zip(sides::<D>().iter().cycle()))
+        {
             contribution.weight = own[0][m] * covered.sqrt();
-            let corners = (0..law.start).map(|c| (facet.nodes[c], -integral(dual, &own, c)));
-            contribution.masters.extend(corners);
+            let corners = [i, j].into_iter().filter(|c| !is_whole && *c < law.start);
+            contribution.masters.extend(corners.map(|c| (facet.nodes[c], -integral(dual, &own, c))));
             contribution.corners = -contribution.masters.iter().map(|(_, value)| value).sum::<f64>();
         }
         let totals = totals(parts, &samples, covered);
@@ -417,7 +427,8 @@ impl<'a, const D: usize> Slave<'a, D> {
     /// basis but the first have the mean 0, so that the values at the centroid count for the first alone.
     fn own_products(&self, basis: &Basis<D>, samples: &[Sample], covered: f64) -> Products {
         let shape = Shape::new(self.facet.is_quadratic(), &self.corners, basis.centroid);
-        let mut products = [shape.values().map(|value| value * covered.sqrt()), [0.0; 6], [0.0; 6]];
+        let mut products = [[0.0; MOST]; MOST];
+        products[0] = shape.values().map(|value| value * covered.sqrt());
         for sample in samples {
             let differences = shape.differences(subtract(&sample.place, &basis.centroid));
             add_products(&mut products, sample, &differences);
@@ -425,34 +436,32 @@ impl<'a, const D: usize> Slave<'a, D> {
         products
     }
 
-    /// The coefficients of the multipliers psi_a of the nodes that carry a law in the basis: diag(w) N^-1.
-    fn duals(&self, basis: &Basis<D>, own: &Products, covered: f64) -> Option<Vec<[f64; 3]>> {
-        let first = self.facet.first_law();
-        let weight = |m: usize| own[0][m] * covered.sqrt();
-        if first == 0 {
-            let nodes = (0..self.facet.nodes.len()).map(|m| {
-                // Only segments have a law at both their corners and their middle.
-                let place = if m < D {
-                    self.corners[m]
-                } else {
-                    std::array::from_fn(|i| 0.5 * (self.corners[0][i] + self.corners[1][i]))
-                };
-                basis.values(place).map(|value| weight(m) * value)
-            });
-            return Some(nodes.collect());
-        }
-        // The shape functions of the middles are not negative. With N of these functions scaled to the integral 1,
-        // its inverse is diag(w) N^-1.
-        let scaled: [[f64; 3]; 3] =
-            std::array::from_fn(|j| std::array::from_fn(|m| own[j][first + m] / weight(first + m)));
-        Some(inverse(scaled, SMALLEST_PIVOT)?.to_vec())
+    /// The coefficients of the multipliers psi_a of the nodes that carry a law in the basis: diag(w) N^-1, and of quadratic triangles with
+    /// half of those of the corners at the ends of its side.
+    fn duals(&self, basis: &Basis<D>, own: &Products, covered: f64) -> Vec<[f64; MOST]> {
+        let facet = self.facet;
+        let middles = sides::<D>().iter().map(|&(i, j)| {
+            let (a, b) = (self.corners[i], self.corners[j]);
+            std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+        });
+        let places = self.corners.into_iter().chain(middles).take(facet.nodes.len());
+        let of_node = |(m, place)| basis.values(place).map(|value| own[0][m] * covered.sqrt() * value);
+        let mut all: Vec<[f64; MOST]> = places.enumerate().map(of_node).collect();
+        let law = all.split_off(facet.first_law());
+        let with_corners = |(mut dual, &(i, j)): ([f64; MOST], &(usize, usize))| {
+            for corner in [i, j].iter().filter_map(|end| all.get(*end)) {
+                dual = std::array::from_fn(|k| dual[k] + 0.5 * corner[k]);
+            }
+            dual
+        };
+        if all.is_empty() { law } else { law.into_iter().zip(sides::<D>()).map(with_corners).collect() }
     }
 }
 
 impl<const D: usize> Part<'_, D> {
     /// The integrals over the part with the shape functions of the master facet, and with the gap (in m^D per
     /// unit of the functions). `totals` are the integrals of the functions of the basis alone.
-    fn products(&self, samples: &[Sample], totals: &[f64; 3]) -> (Products, [f64; 3]) {
+    fn products(&self, samples: &[Sample], totals: &[f64; MOST]) -> (Products, [f64; MOST]) {
         let values = self.shape.values();
         let mut products = totals.map(|total| values.map(|value| total * value));
         let (gap, gradient) = self.gap;
@@ -470,8 +479,8 @@ impl<const D: usize> Part<'_, D> {
 /// The integrals of the functions of the basis over each part. Those over the largest part are what the
 /// others leave of the integrals over the covered part, which are known: the multipliers are large where the
 /// covered part is small, and would multiply the rounding of the sum.
-fn totals<const D: usize>(parts: &[Part<D>], samples: &[Sample], covered: f64) -> Vec<[f64; 3]> {
-    let mut totals = vec![[0.0; 3]; parts.len()];
+fn totals<const D: usize>(parts: &[Part<D>], samples: &[Sample], covered: f64) -> Vec<[f64; MOST]> {
+    let mut totals = vec![[0.0; MOST]; parts.len()];
     for sample in samples {
         let total = &mut totals[sample.part];
         *total = std::array::from_fn(|j| total[j] + sample.weight * sample.basis[j]);
@@ -479,21 +488,22 @@ fn totals<const D: usize>(parts: &[Part<D>], samples: &[Sample], covered: f64) -
     let largest = (0..parts.len()).max_by(|&i, &j| parts[i].measure.total_cmp(&parts[j].measure));
     if let Some(largest) = largest {
         let others = totals.iter().enumerate().filter(|&(i, _)| i != largest);
-        totals[largest] = others.fold([covered.sqrt(), 0.0, 0.0], |rest, (_, total)| subtract(&rest, total));
+        let all = std::array::from_fn(|j| if j == 0 { covered.sqrt() } else { 0.0 });
+        totals[largest] = others.fold(all, |rest, (_, total)| subtract(&rest, total));
     }
     totals
 }
 
 /// Adds the integrals at one point of the quadrature, where the shape functions have these values.
-fn add_products(products: &mut Products, sample: &Sample, values: &[f64; 6]) {
+fn add_products(products: &mut Products, sample: &Sample, values: &[f64; MOST]) {
     for (row, value) in products.iter_mut().zip(&sample.basis) {
         *row = std::array::from_fn(|m| row[m] + sample.weight * value * values[m]);
     }
 }
 
 /// The integral of the multiplier with these coefficients times the shape function of a node.
-fn integral(dual: &[f64; 3], products: &Products, node: usize) -> f64 {
-    (0..3).map(|j| dual[j] * products[j][node]).sum()
+fn integral(dual: &[f64; MOST], products: &Products, node: usize) -> f64 {
+    (0..MOST).map(|j| dual[j] * products[j][node]).sum()
 }
 
 /// Sorts entries by their node and adds those of the same node.

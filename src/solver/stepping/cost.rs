@@ -49,6 +49,11 @@ const REGULAR_TRIANGLES: f64 = 1.207;
 /// Mean of the inverse quality of the tetrahedra of a cube divided into cubes.
 const REGULAR_TETRAHEDRA: f64 = 1.394;
 
+/// What the assembly of a matrix and its order of elimination need beside it, as a multiple of it.
+const ASSEMBLY: f64 = 3.0;
+/// Bytes for each entry of the dense matrix of the motions of contact nodes, which each rank has: half of it, from which it is computed, the
+/// whole, its factors on a subspace and with the forces of laws, and two copies while these are computed.
+const DENSE_ENTRY: f64 = 4.0 + 5.0 * 8.0;
 /// Number of motions of contact nodes whose dense matrix costs no more than the factorisation.
 const MAX_CONDENSED_MOTIONS: usize = 4_000;
 
@@ -83,12 +88,14 @@ impl ProblemSize {
             ranks: session.ranks(),
             steps,
             interface: interface_nodes(session, &body.mesh)?.len() * D + motions,
+            motions,
             contact: !contacts.is_empty(),
             condensed: (!contacts.is_empty() || body.only_cells_act())
                 && !contacts.iter().any(|contact| contact.normal.needs_ghosts)
                 && (!body.flows() || body.only_cells_act() || body.only_surface_acts())
                 && motions <= MAX_CONDENSED_MOTIONS,
             friction: contacts.iter().any(|contact| contact.friction.is_some()),
+            flows: body.flows(),
             precision: if body.flows() { FactorPrecision::Double } else { precision },
         })
     }
@@ -143,6 +150,26 @@ impl ProblemSize {
     /// Whether steps are condensed to the contact, if the matrix is factored.
     pub(super) fn is_condensed(self) -> bool {
         self.condensed && (self.ranks == 1 || self.is_shared())
+    }
+
+    /// Bytes over all ranks of what the assembly of a matrix and its order of elimination need beside it.
+    pub fn assembly_bytes(self) -> f64 {
+        ASSEMBLY * self.matrix_bytes()
+    }
+
+    /// Bytes over all ranks of the dense matrices of the motions of contact nodes, beside this preconditioner.
+    pub fn contact_bytes(self, preconditioner: Preconditioner) -> f64 {
+        let is_dense = preconditioner == Preconditioner::Cholesky && self.is_condensed();
+        if is_dense { self.ranks as f64 * DENSE_ENTRY * (self.motions as f64).powi(2) } else { 0.0 }
+    }
+
+    /// Bytes over all ranks of what steps in which cells flow have besides: a matrix with the derivatives of the flow, factored and condensed
+    /// as that of the step.
+    pub fn flow_bytes(self, preconditioner: Preconditioner) -> f64 {
+        let has_second = self.flows && preconditioner == Preconditioner::Cholesky && self.is_condensed();
+        let matrix = self.matrix_bytes() + self.assembly_bytes();
+        let second = matrix + self.cost(preconditioner).memory + self.contact_bytes(preconditioner);
+        if has_second { second } else { 0.0 }
     }
 
     /// The same problem on one rank.
@@ -252,6 +279,36 @@ mod tests {
     use super::*;
 
     #[test]
+    fn friction_and_flow_add_dense_matrices_and_a_second_factor() {
+        let block = ProblemSize {
+            dimension: 3,
+            order: 1,
+            unknowns: 14_553,
+            inverse_quality: 1.4,
+            ranks: 1,
+            steps: 10,
+            interface: 1_323,
+            motions: 1_323,
+            contact: true,
+            condensed: true,
+            friction: true,
+            flows: false,
+            precision: FactorPrecision::Double,
+        };
+        let bytes = |problem: ProblemSize, preconditioner| {
+            [problem.contact_bytes(preconditioner), problem.flow_bytes(preconditioner)]
+        };
+        assert_eq!(bytes(block, Preconditioner::Gamg), [0.0; 2]);
+        let dense = 44.0 * 1_323.0 * 1_323.0;
+        assert_eq!(bytes(block, Preconditioner::Cholesky), [dense, 0.0]);
+        let flowing = ProblemSize { flows: true, ..block };
+        let matrix = flowing.matrix_bytes() + flowing.assembly_bytes();
+        let second = matrix + flowing.cost(Preconditioner::Cholesky).memory + dense;
+        assert_eq!(bytes(flowing, Preconditioner::Cholesky)[1], second);
+        assert_eq!(ProblemSize { ranks: 2, ..block }.contact_bytes(Preconditioner::Cholesky), 2.0 * dense);
+    }
+
+    #[test]
     fn a_large_factor_in_3d_costs_more_than_multigrid() {
         let problem = ProblemSize {
             dimension: 3,
@@ -261,9 +318,11 @@ mod tests {
             ranks: 1,
             steps: 1,
             interface: 0,
+            motions: 0,
             contact: true,
             condensed: true,
             friction: false,
+            flows: false,
             precision: FactorPrecision::Double,
         };
         let [factor, multigrid] =
@@ -281,9 +340,11 @@ mod tests {
             ranks,
             interface: if ranks > 1 { 3 * cells } else { 0 },
             steps: 64,
+            motions: 0,
             contact: true,
             condensed: true,
             friction: false,
+            flows: false,
             precision: FactorPrecision::Auto,
         };
         let does_not_help = |cells, ranks| square(cells, ranks).ranks_do_not_help(Preconditioner::Cholesky);

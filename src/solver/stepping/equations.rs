@@ -476,7 +476,11 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         let digests = self.contacts.iter().map(Contact::set_digest);
         let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
         // Half the bits suffice to distinguish sets, and their sum over ranks is exact.
-        let [all] = self.session.sum([(mine >> 32) as f64]);
+        let is_asked_to_stop = f64::from(u8::from(self.session.is_asked_to_stop()));
+        let [all, asked_to_stop] = self.session.sum([(mine >> 32) as f64, is_asked_to_stop]);
+        if asked_to_stop > 0.0 {
+            return Err(Error::Stopped("the run was asked to stop within a step".into()));
+        }
         self.counts.sets.push(all);
         match self.counts.period() {
             Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle_message(period))),

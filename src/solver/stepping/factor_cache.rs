@@ -98,9 +98,11 @@ mod tests {
                 ranks,
                 steps: 2,
                 interface: 0,
+                motions: 0,
                 contact: true,
                 condensed: true,
                 friction: false,
+                flows: false,
                 precision,
             };
             Preconditioner::Auto.resolve(problem).0.cache_capacity(

@@ -26,6 +26,8 @@ pub struct ProblemSize {
     pub steps: u64,
     /// Unknowns of the interface between subdomains and of the contact, for which ranks share a dense matrix; not used on one rank.
     pub interface: usize,
+    /// Motions of contact nodes on which laws act, over all ranks.
+    pub motions: usize,
     /// Whether there is contact.
     pub contact: bool,
     /// Whether a factor condenses steps to the contact: there is contact, at nodes that are not too many, and without contact nothing
@@ -33,6 +35,8 @@ pub struct ProblemSize {
     pub condensed: bool,
     /// Whether there is friction.
     pub friction: bool,
+    /// Whether cells flow at the end of a step.
+    pub flows: bool,
     /// The requested precision of factors; double where cells flow at the end of a step.
     pub precision: FactorPrecision,
 }
@@ -190,9 +194,11 @@ mod tests {
             ranks,
             interface,
             steps,
+            motions: 0,
             contact: true,
             condensed: true,
             friction: false,
+            flows: false,
             precision,
         }
     }

@@ -233,33 +233,3 @@ impl<const D: usize> Shape<D> {
 pub(super) fn sides<const D: usize>() -> &'static [(usize, usize)] {
     &SIDES[..if D == 2 { 1 } else { 3 }]
 }
-
-/// The inverse of a matrix, by elimination with row pivoting after its rows are scaled to a largest entry of
-/// 1; none where a pivot is below `least`.
-pub(super) fn inverse(mut matrix: [[f64; 3]; 3], least: f64) -> Option<[[f64; 3]; 3]> {
-    let mut inverse = [[0.0; 3]; 3];
-    for (i, row) in matrix.iter_mut().enumerate() {
-        let most = row.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        *row = row.map(|x| x / most);
-        inverse[i][i] = 1.0 / most;
-    }
-    for k in 0..3 {
-        let pivot = (k..3).max_by(|&i, &j| matrix[i][k].abs().total_cmp(&matrix[j][k].abs()))?;
-        matrix.swap(k, pivot);
-        inverse.swap(k, pivot);
-        let divisor = matrix[k][k];
-        // Also false for NaN.
-        let regular = divisor.abs() >= least;
-        if !regular {
-            return None;
-        }
-        matrix[k] = matrix[k].map(|x| x / divisor);
-        inverse[k] = inverse[k].map(|x| x / divisor);
-        for i in (0..3).filter(|&i| i != k) {
-            let factor = matrix[i][k];
-            matrix[i] = std::array::from_fn(|j| matrix[i][j] - factor * matrix[k][j]);
-            inverse[i] = std::array::from_fn(|j| inverse[i][j] - factor * inverse[k][j]);
-        }
-    }
-    Some(inverse)
-}
