@@ -212,7 +212,7 @@ pub(super) fn gaps<const D: usize, const S: usize>(
             ContactGaps {
                 on: table.on.clone(),
                 range: (smallest <= largest).then_some([smallest, largest]),
-                points: session.total(contact.normal.point_count()),
+                points: session.total(contact.normal.boundary().count()),
                 points_without_obstacle: without,
             }
         },

@@ -130,7 +130,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             } else {
                 vec![contact(&bottom, if moves { belt::<D>() } else { wall() }), contact(&right, wall())]
             };
-            assert!(session.total(contacts[0].normal.point_count()) > 0);
+            assert!(session.total(contacts[0].normal.boundary().count()) > 0);
             contacts.iter_mut().for_each(|c| c.normal.scale = 2.0 * normal.monotonicity_constant(1.0) + 30.0);
             if let Some(friction) = friction.clone() {
                 contacts[0].add_friction(friction, &body.mesh, &body.held).expect("friction");

@@ -21,8 +21,8 @@ pub(super) fn resistances<const D: usize>(
     };
     let mut resistance = |contact: &Contact<D>| -> Result<[f64; 2]> {
         motion.fill(0.0)?;
-        contact.normal.add_normals(&mut motion.owned_mut()?);
-        let square = contact.normal.normal_square(&motion.owned()?);
+        contact.normal.boundary().add_normals(&mut motion.owned_mut()?);
+        let square = contact.normal.boundary().normal_square(&motion.owned()?);
         let normal = against(&motion, square)?.max(2.0 * contact.monotonicity_constant());
         let Some(friction) = &contact.friction else { return Ok([normal; 2]) };
         motion.fill(0.0)?;
@@ -46,7 +46,7 @@ pub(super) fn set_reference_values<const D: usize>(
     let all = resistances(session, contacts, like, |motion| matrix.power(motion))?;
     for (contact, resistance) in contacts.iter_mut().zip(all) {
         contact.reference.resistance = resistance;
-        [contact.reference.area] = session.sum([contact.normal.area()]);
+        [contact.reference.area] = session.sum([contact.normal.boundary().area()]);
     }
     Ok(())
 }

@@ -383,7 +383,9 @@ impl StepSolver {
             let square = body
                 .contacts
                 .iter()
-                .map(|contact| contact.normal.square_of_closing_forces(contact.reference.resistance[0]))
+                .map(|contact| {
+                    contact.normal.approach().square_of_closing_forces(contact.reference.resistance[0])
+                })
                 .sum();
             norm = session.sum([square])[0].sqrt();
             *scale = norm;
