@@ -144,7 +144,7 @@ impl StepSolver {
             match solved {
                 Ok(solved) => {
                     // Where only an obstacle moves the body, its forces are those with which the step begins.
-                    let first = self.newton.as_ref().map_or(0.0, |newton| newton.first_residual());
+                    let first = self.newton.as_ref().map_or(0.0, |newton| newton.counts.first);
                     let reference = accuracy.reference.max(first);
                     let residual = if reference > 0.0 { solved.residual / reference } else { 0.0 };
                     return Ok(StepOutcome { residual, ..solved });
