@@ -132,9 +132,10 @@ impl Header {
     }
 }
 
-/// The digest of a checkpoint, by which a run that starts from it knows it. On one rank.
+/// The digest that the seal of a checkpoint records, by which a run that starts from it knows it wherever it is. On one rank.
 pub fn state_digest(path: &Path) -> Result<String> {
-    Ok(format!("{:016x}", seal::recorded_digest(path, seal::CHECKPOINT)?))
+    let (_, digest) = seal::read_seal(path, seal::CHECKPOINT)?;
+    Ok(format!("{digest:016x}"))
 }
 
 /// The digest of the checkpoint from which the run that wrote this one started; `None` if it started from none, or if the file cannot

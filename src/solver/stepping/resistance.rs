@@ -17,7 +17,8 @@ pub(super) fn resistances<const D: usize>(
     let mut motion = like.like()?;
     let mut against = |motion: &DistributedVector, square: f64| -> Result<f64> {
         let [square] = session.sum([square]);
-        Ok(positive_or_one(power(motion)? / square))
+        let resistance = power(motion)? / square;
+        Ok(if resistance.is_finite() && resistance > 0.0 { resistance } else { 1.0 })
     };
     let mut resistance = |contact: &Contact<D>| -> Result<[f64; 2]> {
         motion.fill(0.0)?;
@@ -49,8 +50,4 @@ pub(super) fn set_reference_values<const D: usize>(
         [contact.reference.area] = session.sum([contact.normal.boundary().area()]);
     }
     Ok(())
-}
-
-fn positive_or_one(stiffness: f64) -> f64 {
-    if stiffness.is_finite() && stiffness > 0.0 { stiffness } else { 1.0 }
 }

@@ -27,7 +27,7 @@ impl<const D: usize> Contact<D> {
         if !obstacle.is_driven() || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
-        let [change, _] = obstacle.changes();
+        let change = obstacle.change();
         for point in self.normal.points.iter_mut().filter(|_| obstacle.moves()) {
             let seen = obstacle.seen_after(&point.place);
             point.set_gap(obstacle.gap.of_moved(obstacle.rate.time, &seen, &point.normal, point.moved)?);
@@ -42,7 +42,7 @@ impl<const D: usize> Contact<D> {
         if !obstacle.moves() {
             return;
         }
-        let [change, _] = obstacle.changes();
+        let change = obstacle.change();
         obstacle.follows = follows;
         for point in &mut self.normal.points {
             point.follows = if follows && point.can_touch() { point.along_obstacle } else { 0.0 };

@@ -161,9 +161,9 @@ impl<const D: usize> Obstacle<D> {
         ]
     }
 
-    /// By how much the velocity of each motion in m/s (rad/s) differs from that at the start of the step.
-    pub(super) fn changes(&self) -> [f64; 2] {
-        self.motions().map(|motion| motion.map_or(0.0, LoadedMotion::change))
+    /// By how much its velocity along its direction in m/s differs from that at the start of the step.
+    pub(super) fn change(&self) -> f64 {
+        self.translation.as_ref().map_or(0.0, |(_, motion)| motion.change())
     }
 
     /// Commits the motion of the step.
