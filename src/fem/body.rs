@@ -970,7 +970,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// The motions of obstacles that forces drive.
     pub fn obstacle_motions(&self) -> impl Iterator<Item = &LoadedMotion> {
-        self.contacts.iter().flat_map(|contact| contact.obstacle.motions()).flatten()
+        self.contacts.iter().flat_map(|contact| &contact.obstacle.motions).flatten()
     }
 
     /// Makes all trial histories the converged ones.

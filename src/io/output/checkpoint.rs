@@ -104,7 +104,7 @@ impl Header {
         totals: &Totals,
     ) -> Self {
         let motions = |number: usize| {
-            body.contacts.iter().filter_map(move |contact| contact.obstacle.motions()[number])
+            body.contacts.iter().filter_map(move |contact| contact.obstacle.motions[number].as_ref())
         };
         Self {
             format: FORMAT,
@@ -402,8 +402,7 @@ fn loaded_motions<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     number: usize,
 ) -> impl Iterator<Item = &mut LoadedMotion> {
-    let motions = body.contacts.iter_mut().map(|contact| contact.obstacle.motions_mut());
-    motions.filter_map(move |motions| motions.into_iter().nth(number)?)
+    body.contacts.iter_mut().filter_map(move |contact| contact.obstacle.motions[number].as_mut())
 }
 
 /// What a body keeps in its cells and at its nodes, with the numbers of values of a cell or node.

@@ -602,7 +602,7 @@ impl Stepper {
         let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);
         for (number, contact) in body.contacts.iter_mut().enumerate() {
             for (cause, freedom) in [("force", Freedom::Translation), ("moment", Freedom::Rotation)] {
-                let Some(motion) = contact.obstacle.motion_mut(freedom) else { continue };
+                let Some(motion) = &mut contact.obstacle.motions[freedom as usize] else { continue };
                 motion.start(blend, time, ratio);
                 let value = motion.driving;
                 if !value.is_finite() {

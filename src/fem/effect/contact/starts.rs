@@ -18,7 +18,7 @@ impl<const D: usize> Contact<D> {
     /// Adds to nodal forces in N of the body, with ghosts, those with which the force on the obstacle presses it against the points in front
     /// of it, with pressures in proportion to the components of their normals along the force. Collective.
     pub fn add_driving_force(&self, session: &Session, nodal: &mut [f64]) {
-        let [Some(motion), _] = self.obstacle.motions() else { return };
+        let [Some(motion), _] = &self.obstacle.motions else { return };
         let driving = motion.driving;
         let against = |point: &Point<D>| (-driving.signum() * point.along_obstacle).max(0.0);
         let faced = || self.normal.points.iter().filter(|point| point.can_touch());

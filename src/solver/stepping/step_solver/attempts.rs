@@ -409,8 +409,8 @@ impl StepSolver {
         // The forces that drive obstacles are among those of the step.
         let mut driving = 0.0;
         for contact in &mut body.contacts {
-            let [along, _] = contact.obstacle.motions();
-            let own = along.map_or(0.0, |motion| motion.driving.abs());
+            let [along, _] = &contact.obstacle.motions;
+            let own = along.as_ref().map_or(0.0, |motion| motion.driving.abs());
             contact.reference.forces = total.max(own);
             driving = larger(driving, own);
         }
