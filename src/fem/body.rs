@@ -899,13 +899,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
         read(forces)
     }
 
-    /// Adds the forces of damping by the mass at this velocity to `forces`; both with ghosts.
-    pub fn add_damping_by_mass(&self, velocity: &[f64], forces: &mut [f64]) {
-        self.add_drag(0..self.geometry.runs.len(), velocity, forces);
-    }
-
-    /// Adds these forces in these runs of cells, and those that the redistribution of the mass adds.
-    fn add_drag(&self, runs: impl Iterator<Item = usize>, velocity: &[f64], forces: &mut [f64]) {
+    /// Adds the forces of damping by the mass in these runs of cells at this velocity to `forces`, both with ghosts, and those that the
+    /// redistribution of the mass adds.
+    pub fn add_drag(&self, runs: impl Iterator<Item = usize>, velocity: &[f64], forces: &mut [f64]) {
         let drag = Called::filter(&self.effects, |effect| is_drag(&effect.term()));
         let needs = Needs { velocity: true, ..Needs::default() };
         let inputs = Inputs { nodal: Nodal::all(velocity), needs };
@@ -974,7 +970,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// The motions of obstacles that forces drive.
     pub fn obstacle_motions(&self) -> impl Iterator<Item = &LoadedMotion> {
-        self.contacts.iter().flat_map(|contact| contact.obstacle.motions()).flatten()
+        self.contacts.iter().flat_map(|contact| &contact.obstacle.motions).flatten()
     }
 
     /// Makes all trial histories the converged ones.

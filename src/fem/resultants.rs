@@ -154,7 +154,9 @@ impl<const D: usize> Resultants<D> {
         let (mut masses, mut drags) = (Vec::new(), Vec::new());
         if body.has_drag() {
             sources.push(Source::Damping);
-            drags = shares_of_nodes(&mesh.nodes, |x, forces| body.add_damping_by_mass(x, forces));
+            drags = shares_of_nodes(&mesh.nodes, |x, forces| {
+                body.add_drag(0..body.geometry.runs.len(), x, forces)
+            });
         }
         if body.has_form(Form::Mass) {
             sources.push(Source::Momentum);

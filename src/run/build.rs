@@ -124,7 +124,7 @@ fn contacts<const D: usize>(
         laws.turn_edges(session, mesh, held, job.time.end)?;
         if let Some(motion) = motion {
             let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired {
-                laws.normal.surface_points().collect()
+                laws.normal.boundary().surface_points().collect()
             } else {
                 surface_points(session, mesh, &facets)?.into_iter().map(|point| held.whole(point)).collect()
             };

@@ -35,7 +35,7 @@ impl Inventory {
             let bytes = session.total(history.bytes);
             history_bytes.insert(history.name().to_owned(), bytes as u64);
         }
-        let points: usize = body.contacts.iter().map(|c| c.normal.point_count()).sum();
+        let points: usize = body.contacts.iter().map(|c| c.normal.boundary().count()).sum();
         let with_friction: usize =
             body.contacts.iter().flat_map(|c| &c.friction).map(Friction::free_points).sum();
         Self {

@@ -212,7 +212,7 @@ pub(super) fn gaps<const D: usize, const S: usize>(
             ContactGaps {
                 on: table.on.clone(),
                 range: (smallest <= largest).then_some([smallest, largest]),
-                points: session.total(contact.normal.point_count()),
+                points: session.total(contact.normal.boundary().count()),
                 points_without_obstacle: without,
             }
         },
@@ -265,8 +265,9 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                  have to carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
             ));
         }
-        let [translation, _] = contact.obstacle.motions();
-        if let Some(leap) = translation.map(|motion| motion.longest_way).filter(|leap| *leap > size) {
+        let [translation, _] = &contact.obstacle.motions;
+        if let Some(leap) = translation.as_ref().map(|motion| motion.longest_way).filter(|leap| *leap > size)
+        {
             out.push(format!(
                 "contact.{number}: the obstacle that a force moves leapt by {leap:.3e} m in one step, more than the size of the body, \
                  {size:.3e} m: steps that long don't resolve its motion; take a smaller [time] step, or correct its force or its mass"

@@ -288,7 +288,9 @@ fn residual<const D: usize, const S: usize>(
     let mut of_node: BTreeMap<u32, Vec<SurfacePoint<D>>> = BTreeMap::new();
     let nodal = body.contacts.iter().filter(|contact| !contact.normal.needs_ghosts && !contact.is_paired);
     for contact in nodal {
-        contact.normal.surface_points().for_each(|point| of_node.entry(point.node).or_default().push(point));
+        for point in contact.normal.boundary().surface_points() {
+            of_node.entry(point.node).or_default().push(point);
+        }
     }
     let add_tractions = |forces: &mut DistributedVector| {
         let Some(traction) = &state.contact_traction else { return Ok(()) };

@@ -130,7 +130,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             } else {
                 vec![contact(&bottom, if moves { belt::<D>() } else { wall() }), contact(&right, wall())]
             };
-            assert!(session.total(contacts[0].normal.point_count()) > 0);
+            assert!(session.total(contacts[0].normal.boundary().count()) > 0);
             contacts.iter_mut().for_each(|c| c.normal.scale = 2.0 * normal.monotonicity_constant(1.0) + 30.0);
             if let Some(friction) = friction.clone() {
                 contacts[0].add_friction(friction, &body.mesh, &body.held).expect("friction");
@@ -260,15 +260,17 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
     contact.obstacle.set_load(&load);
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
     for freedom in Freedom::ALL {
-        contact.obstacle.motion_mut(freedom).expect("a motion").start(Blend::euler(0.1), 0.1, None);
+        let motion = contact.obstacle.motions[freedom as usize].as_mut();
+        motion.expect("a motion").start(Blend::euler(0.1), 0.1, None);
     }
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
     contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");
     contact.follow_obstacle(true);
     let start = [0.7, -3.0];
     let mut velocities_at = |[along, about]: [f64; 2]| {
-        contact.obstacle.motion_mut(Freedom::Translation).expect("a motion").set_velocity(along);
-        contact.obstacle.motion_mut(Freedom::Rotation).expect("a motion").set_velocity(about);
+        for (motion, velocity) in contact.obstacle.motions.iter_mut().zip([along, about]) {
+            motion.as_mut().expect("a motion").set_velocity(velocity);
+        }
         contact.place_obstacle().expect("placed");
         let mut apart = vec![0.0; state.velocity.owned().expect("owned").len()];
         contact.subtract_obstacle(&mut apart);

@@ -123,7 +123,7 @@ fn throw(session: &Session, text: &str) -> (f64, clarke::fem::effect::Energy) {
     while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {
         let imbalance = run.totals.energy_imbalance;
         assert!(imbalance < 1e-9, "imbalance {imbalance:e} at t = {}\n{text}", run.state.time);
-        let obstacle = run.body.contacts[0].obstacle.motions()[0].expect("a motion");
+        let obstacle = run.body.contacts[0].obstacle.motions[0].as_ref().expect("a motion");
         let [way, velocity] = obstacle.converged;
         let own = 0.5 * 6.0 * velocity * velocity;
         assert!((run.totals.energy[OBSTACLE_KINETIC] - own).abs() < 1e-12, "{velocity}");
@@ -176,7 +176,7 @@ fn falling(session: &Session, scheme: &str, steps: usize) -> [f64; 2] {
     let mesh = rectangle([1.0, 1.0], [2, 2], Diagonal::Crossed, [1.0, 1.0]).expect("mesh");
     let mut run = simulation::<2, 4>(session, &text, &mesh);
     while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}
-    let obstacle = run.body.contacts[0].obstacle.motions()[0].expect("a motion");
+    let obstacle = run.body.contacts[0].obstacle.motions[0].as_ref().expect("a motion");
     obstacle.converged
 }
 

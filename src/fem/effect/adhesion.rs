@@ -1,6 +1,6 @@
 use super::{
     Curvature, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Role, Step, StressError,
-    SurfaceEffect, SurfaceForce, Tangents, contact::tangents, evolution::Evolution,
+    SurfaceEffect, SurfaceForce, Tangents, contact::tangents, evolution::IrreversibleStep,
     node_history::NodeHistory, quantity,
 };
 use crate::{
@@ -150,7 +150,7 @@ impl<const D: usize> Adhesion<D> {
     }
 
     /// Advances the bonding with the displacement at the end of a step.
-    fn advance(&mut self, evolution: Evolution, displacement: &[f64]) {
+    fn advance(&mut self, evolution: IrreversibleStep, displacement: &[f64]) {
         let mut trial = std::mem::take(&mut self.bonding.trial);
         let mut slopes = std::mem::take(&mut self.slopes);
         slopes.clear();
@@ -245,7 +245,7 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
             Evaluation::Converged => self.add_explicit(step, displacement, forces, &mut outcome.energy),
             Evaluation::Start(_) => {}
             Evaluation::End(blend) => {
-                self.advance(Evolution { blend, length: step.length }, displacement);
+                self.advance(IrreversibleStep { blend, length: step.length }, displacement);
                 self.add_forces(blend.length, displacement, outcome.tangents.as_deref_mut(), forces);
             }
         }
@@ -271,7 +271,7 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
 
     fn add_step_energy(&mut self, at: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy) {
         let Evaluation::End(blend) = at else { return };
-        self.advance(Evolution { blend, length: step.length }, nodal.displacement);
+        self.advance(IrreversibleStep { blend, length: step.length }, nodal.displacement);
         let bondings = self.bonding.converged.iter().zip(&self.bonding.trial);
         for (group, (bonding, next)) in self.groups().zip(bondings) {
             let (before, after) = (bonding * bonding, next * next);

@@ -166,8 +166,9 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
     }
 
     fn extrapolate(&mut self) {
-        debug_assert!(self.earlier.is_none(), "the trial values are those before the step");
-        for (converged, before) in self.converged.iter_mut().zip(&self.trial) {
+        // Without a place of their own the trial values are those before the step.
+        for (converged, before) in self.converged.iter_mut().zip(self.earlier.as_ref().unwrap_or(&self.trial))
+        {
             let both = converged.0.as_flattened_mut().iter_mut().zip(before.0.as_flattened());
             both.for_each(|(value, before)| *value += *value - before);
         }
@@ -231,6 +232,22 @@ mod tests {
         other.commit();
         assert_eq!(other.last_change(2, 1), [0.5, -2.0]);
         assert_eq!(other.last_change(1, 0), [0.0; 2], "no such cell");
+    }
+
+    #[test]
+    fn values_are_extrapolated_by_the_last_change_whether_those_before_are_kept_or_not() {
+        for keeps in [false, true] {
+            let mut history = history(1);
+            if keeps {
+                history.keep_earlier(Evaluation::Converged);
+            }
+            for value in [1.0, 3.0, 7.0] {
+                history.set_trial(0, 0, [value, 0.0]);
+                history.commit();
+            }
+            history.extrapolate();
+            assert_eq!(history.converged(0).expect("values").lane(0), [11.0, 0.0], "7 + (7 - 3)");
+        }
     }
 
     #[test]

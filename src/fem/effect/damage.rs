@@ -1,6 +1,6 @@
 use super::{
     Curvature, Effect, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Phases, Role, Step,
-    StressError, cell_history::CellHistory, evolution::Evolution, quantity,
+    StressError, cell_history::CellHistory, evolution::IrreversibleStep, quantity,
 };
 use crate::{
     fem::space::{Batch, Geometry, Needs},
@@ -57,7 +57,7 @@ impl Damage {
     /// weakens the batch.
     fn advance_implicitly<const D: usize, const S: usize>(
         &mut self,
-        evolution: Evolution,
+        evolution: IrreversibleStep,
         batch: &mut Batch<D, S>,
         outcome: &mut Outcome,
     ) {
@@ -82,7 +82,7 @@ impl Damage {
                 let (tangent, flows) = tangents.entry::<S>(batch.first_point + lane);
                 weaken_tangent(law, growth, &sound, tangent);
                 if flows && slope != 0.0 {
-                    tangents.mark_skew();
+                    tangents.skew = true;
                 }
             }
         }
@@ -155,7 +155,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
             Evaluation::Converged => self.advance_explicitly(step, batch, &mut outcome.energy),
             Evaluation::Start(_) => {}
             Evaluation::End(blend) => {
-                self.advance_implicitly(Evolution { blend, length: step.length }, batch, outcome);
+                self.advance_implicitly(IrreversibleStep { blend, length: step.length }, batch, outcome);
             }
         }
     }

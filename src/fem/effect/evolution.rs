@@ -8,14 +8,14 @@ use crate::laws::step::Blend;
 /// Euler of twice the formula's length, which is continuous. A variable that did not change in the last step takes a step of implicit
 /// Euler.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Evolution {
+pub(super) struct IrreversibleStep {
     /// How the step starts.
     pub(super) blend: Blend,
     /// Length of the step in s.
     pub(super) length: f64,
 }
 
-impl Evolution {
+impl IrreversibleStep {
     /// The value at the end of the step and its derivative by the driving force, given the value before the step and its change in
     /// the last step. `relax` gives both after a step of implicit Euler from a value over a length in s.
     #[inline]
@@ -39,8 +39,8 @@ mod tests {
         move |start, length| [start + length * rate, length]
     }
 
-    const EULER: Evolution = Evolution { blend: Blend::euler(0.3), length: 0.3 };
-    const TWO_STEPS: Evolution = Evolution {
+    const EULER: IrreversibleStep = IrreversibleStep { blend: Blend::euler(0.3), length: 0.3 };
+    const TWO_STEPS: IrreversibleStep = IrreversibleStep {
         blend: Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(0.2) },
         length: 0.3,
     };

@@ -79,6 +79,6 @@ pub trait HistoryStore {
     /// Makes the trial values the converged ones.
     fn commit(&mut self) {}
 
-    /// Adds to the converged values the change in the step just committed once more; not where earlier values are kept.
+    /// Adds to the converged values of cells the change in the step just committed once more.
     fn extrapolate(&mut self) {}
 }

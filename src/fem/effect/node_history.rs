@@ -54,11 +54,6 @@ impl HistoryStore for NodeHistory {
         std::mem::swap(&mut self.converged, &mut self.trial);
     }
 
-    fn extrapolate(&mut self) {
-        debug_assert!(self.earlier.is_none(), "the trial values are those before the step");
-        self.converged.iter_mut().zip(&self.trial).for_each(|(value, before)| *value += *value - before);
-    }
-
     fn restore(&mut self, quantity: Quantity, moment: Moment, values: &[f64]) {
         let kept = moment.of(&mut self.converged, self.earlier.as_mut());
         let Some(target) = kept.filter(|_| quantity == self.quantity) else { return };

@@ -11,7 +11,8 @@ pub struct Tangents {
     values: Vec<f64>,
     nodes: Vec<u32>,
     nodal: Vec<f64>,
-    skew: bool,
+    /// Whether a matrix is not symmetric.
+    pub(super) skew: bool,
 }
 
 impl Default for Tangents {
@@ -69,11 +70,6 @@ impl Tangents {
             at
         });
         (&mut self.values[at * S * S..][..S * S], found.is_ok())
-    }
-
-    /// Records that a matrix is not symmetric.
-    pub(super) fn mark_skew(&mut self) {
-        self.skew = true;
     }
 
     /// Adds the matrix of a node of this rank.

@@ -104,7 +104,7 @@ impl Header {
         totals: &Totals,
     ) -> Self {
         let motions = |number: usize| {
-            body.contacts.iter().filter_map(move |contact| contact.obstacle.motions()[number])
+            body.contacts.iter().filter_map(move |contact| contact.obstacle.motions[number].as_ref())
         };
         Self {
             format: FORMAT,
@@ -132,9 +132,10 @@ impl Header {
     }
 }
 
-/// The digest of a checkpoint, by which a run that starts from it knows it. On one rank.
+/// The digest that the seal of a checkpoint records, by which a run that starts from it knows it wherever it is. On one rank.
 pub fn state_digest(path: &Path) -> Result<String> {
-    Ok(format!("{:016x}", seal::recorded_digest(path, seal::CHECKPOINT)?))
+    let (_, digest) = seal::read_seal(path, seal::CHECKPOINT)?;
+    Ok(format!("{digest:016x}"))
 }
 
 /// The digest of the checkpoint from which the run that wrote this one started; `None` if it started from none, or if the file cannot
@@ -401,8 +402,7 @@ fn loaded_motions<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     number: usize,
 ) -> impl Iterator<Item = &mut LoadedMotion> {
-    let motions = body.contacts.iter_mut().map(|contact| contact.obstacle.motions_mut());
-    motions.filter_map(move |motions| motions.into_iter().nth(number)?)
+    body.contacts.iter_mut().filter_map(move |contact| contact.obstacle.motions[number].as_mut())
 }
 
 /// What a body keeps in its cells and at its nodes, with the numbers of values of a cell or node.

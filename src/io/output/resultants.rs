@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::ContactAreas,
+        effect::{ContactAreas, LoadedMotion},
         resultants::{BalancedMotion, Resultants, Source},
         state::State,
     },
@@ -80,11 +80,13 @@ impl<const D: usize> ResultantTable<D> {
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
             let rows = resultants.sources.iter().zip(resultants.rows());
             for (name, (source, (resultant, areas))) in names.iter().zip(rows) {
-                let motions = match source {
-                    Source::Contact(at) => body.contacts[*at].obstacle.motions(),
+                let [path, turn] = match source {
+                    Source::Contact(at) => {
+                        let motions = body.contacts[*at].obstacle.motions.each_ref();
+                        motions.map(|motion| motion.as_ref().map(LoadedMotion::balanced))
+                    }
                     _ => [None; 2],
                 };
-                let [path, turn] = [0, 1].map(|number| motions[number].map(|motion| motion.balanced()));
                 let moment = &resultant.moment_about(about)[if D == 2 { 2 } else { 0 }..];
                 let [_, of_contacts, of_friction, of_path, of_turn] = *with;
                 file.row(format_args!(

@@ -76,11 +76,6 @@ pub fn verify_alone(path: &Path, kind: Kind) -> Result<()> {
     compare(path, kind, found, expected)
 }
 
-/// The digest that the seal of a file records, by which the file is known wherever it is; nothing else is read.
-pub fn recorded_digest(path: &Path, kind: Kind) -> Result<u64> {
-    read_seal(path, kind).map(|(_, digest)| digest)
-}
-
 /// Whether the file starts with the seal of this kind.
 pub fn is_sealed(path: &Path, kind: Kind) -> bool {
     starts_with(path, kind.magic)
@@ -125,8 +120,8 @@ fn stamp(path: &Path, kind: Kind, length: u64, digest: u64) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Length of the file and digest of the bytes after the seal.
-fn read_seal(path: &Path, kind: Kind) -> Result<(u64, u64)> {
+/// Length of the file and digest of the bytes after the seal, as the seal records them; nothing else is read.
+pub(super) fn read_seal(path: &Path, kind: Kind) -> Result<(u64, u64)> {
     let unreadable = |error| Error::unreadable(path, error);
     let mut file = regular_file(path).and_then(|_| File::open(path)).map_err(unreadable)?;
     let found = file.metadata().map_err(unreadable)?.len();

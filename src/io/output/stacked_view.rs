@@ -29,7 +29,9 @@ pub(super) fn create<T: Element>(
         // SAFETY: makes a property list of a predefined class; the identifier is closed on drop.
         let list = Open(unsafe { H5Pcreate(*H5P_CLS_DATASET_CREATE) }, H5Pclose);
         let whole = columns.iter().copied().eq(0..columns.len());
-        let bands = if whole { vec![(0, 0, columns.len())] } else { single_columns(columns) };
+        // Columns of the view, the columns that they show, and their number.
+        let each = columns.iter().enumerate().map(|(to, from)| (to, *from, 1));
+        let bands = if whole { vec![(0, 0, columns.len())] } else { each.collect() };
         for (to, from, width) in bands {
             let view = space(rows, columns.len(), true, to, width)?;
             let table = space(rows, columns.len(), false, from, width)?;
@@ -45,11 +47,6 @@ pub(super) fn create<T: Element>(
         );
         check(if made.0 < 0 { -1 } else { 0 })
     })
-}
-
-/// For each column of the view: itself, the column it shows, and the width 1.
-fn single_columns(columns: &[usize]) -> Vec<(usize, usize, usize)> {
-    columns.iter().enumerate().map(|(to, from)| (to, *from, 1)).collect()
 }
 
 /// A table of the given size, or without end, with `width` columns selected from `column` on.

@@ -12,6 +12,13 @@ use crate::laws::{
     step::{Blend, Quantity},
 };
 
+/// The fault of a static coefficient below the dynamic one.
+pub(super) fn static_below_dynamic(at_rest: f64, dynamic: f64) -> Vec<LawFault> {
+    let help = format!("it must be at least {dynamic}");
+    let fault = LawFault::at_value("static", "the static coefficient is below the dynamic one", help);
+    if at_rest >= dynamic { Vec::new() } else { vec![fault] }
+}
+
 /// The point of a friction graph with a given parameter `s = c v + q`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slip {

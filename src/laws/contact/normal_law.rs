@@ -35,11 +35,6 @@ impl NodeContext {
     pub(super) fn penetration_at(&self, velocity: f64) -> f64 {
         self.penetration + self.step_length * velocity
     }
-
-    /// The normal velocity in m/s with which the gap closes exactly at the end of the step.
-    pub(super) fn closing_velocity(&self) -> f64 {
-        -self.penetration / self.step_length
-    }
 }
 
 /// The point of a graph with a given parameter `s = c v + p`.

@@ -105,7 +105,7 @@ impl Certificates {
             if viscous && decrease.is_none() {
                 known.theta = Some(if falling { suprema.find(Supremum::Theta)? } else { 0.0 });
             }
-            let normals = body.contacts.iter().flat_map(|contact| contact.normal.directions());
+            let normals = body.contacts.iter().flat_map(|contact| contact.normal.boundary().directions());
             if !moves_rigidly(session, body, normals, false)? {
                 known.trace_norm_squared = Some(suprema.find(Supremum::TraceNorm)?);
             }

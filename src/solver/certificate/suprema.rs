@@ -317,7 +317,7 @@ fn contact_load<const D: usize, const S: usize>(
     let mut values = out.owned_mut()?;
     values.iter_mut().for_each(|value| *value *= 1e-2);
     for contact in &body.contacts {
-        contact.normal.add_normals(&mut values);
+        contact.normal.boundary().add_normals(&mut values);
         contact.friction.iter().for_each(|friction| friction.add_unit_sliding(&mut values));
     }
     body.held.clear(&mut values);

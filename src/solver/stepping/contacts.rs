@@ -108,7 +108,7 @@ pub(super) fn multiple_to_touch<const D: usize, const S: usize>(
     let motion = motion.local()?;
     let mut most = 1.0_f64;
     for contact in &body.contacts {
-        let [negative] = session.largest([-contact.normal.multiple_to_touch(&motion)]);
+        let [negative] = session.largest([-contact.normal.approach().multiple_to_touch(&motion)]);
         most = if negative.is_finite() { most.max(-2.0 * negative) } else { most };
     }
     Ok(most)

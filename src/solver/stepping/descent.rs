@@ -11,10 +11,10 @@
 //! The length of a step is where the power `R . v` of the residual along it vanishes: there the energy is smallest, without
 //! being computed.
 
-use super::equations::{ContactEquations, Curvature};
+use super::equations::ContactEquations;
 use crate::{
     error::Result,
-    linear_algebra::petsc::{DistributedVector, NonlinearProblem},
+    linear_algebra::petsc::{DistributedVector, NonlinearProblem, ProjectedKind},
 };
 
 /// Largest number of directions for each Newton iteration that a solve may take, on the way to another equilibrium.
@@ -113,9 +113,8 @@ impl Descent {
             let place = loop {
                 equations.set_softening(share);
                 equations.linearise(x)?;
-                let curvature =
-                    equations.solve_if_definite(&self.residual, &mut self.direction, share == 0.0)?;
-                if curvature == Curvature::Positive
+                let kind = (ProjectedKind::Definite, share == 0.0);
+                if equations.solve_linearised(&self.residual, &mut self.direction, kind)?
                     && let Some(place) = self.search(equations, x, norm, share == 0.0)?
                 {
                     break place;

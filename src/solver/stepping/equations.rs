@@ -311,13 +311,6 @@ fn add_contact<const D: usize>(
     out.add_scaled(1.0, forces)
 }
 
-/// Whether the linearised equations have a solution that lowers the energy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Curvature {
-    Positive,
-    Negative,
-}
-
 impl<const D: usize> ContactEquations<'_, D> {
     /// Sets the share of softening in the derivatives of all laws: with 0 they are those of a convex energy.
     pub(super) fn set_softening(&mut self, share: f64) {
@@ -325,17 +318,6 @@ impl<const D: usize> ContactEquations<'_, D> {
             cells.set_softening(share);
         }
         self.contacts.iter_mut().for_each(|contact| contact.normal.softening = share);
-    }
-
-    /// As [`NonlinearProblem::solve_jacobian`], where the derivative is positive definite; otherwise `direction` is not changed. If the
-    /// energy is convex, a derivative that is not definite is singular.
-    pub(super) fn solve_if_definite(
-        &mut self,
-        residual: &DistributedVector,
-        direction: &mut DistributedVector,
-        is_convex: bool,
-    ) -> Result<Curvature> {
-        self.solve_linearised(residual, direction, (ProjectedKind::Definite, is_convex))
     }
 
     /// Writes the residual at these unknowns, with the motions of obstacles that belong to them.
@@ -512,14 +494,13 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         residual: &DistributedVector,
         direction: &mut DistributedVector,
     ) -> Result<()> {
-        match self.solve_linearised(residual, direction, (ProjectedKind::Symmetric, true))? {
-            Curvature::Positive => {
-                let has_settled = self.counts.sets.last_chunk().is_some_and(|[one, other]| one == other);
-                if self.halves && !has_settled { direction.scale(0.5) } else { Ok(()) }
-            }
-            // Without a direction, iterations would repeat the same velocity.
-            Curvature::Negative => Err(Error::Failed(NO_DIRECTION.into())),
+        let is_solved = self.solve_linearised(residual, direction, (ProjectedKind::Symmetric, true))?;
+        // Without a direction, iterations would repeat the same velocity.
+        if !is_solved {
+            return Err(Error::Failed(NO_DIRECTION.into()));
         }
+        let has_settled = self.counts.sets.last_chunk().is_some_and(|[one, other]| one == other);
+        if self.halves && !has_settled { direction.scale(0.5) } else { Ok(()) }
     }
 }
 
@@ -528,24 +509,25 @@ const LARGEST_LINEAR_RESIDUAL: f64 = 0.01;
 const NEARLY_SINGULAR: &str = "the linear equations are nearly singular";
 
 impl<const D: usize> ContactEquations<'_, D> {
-    /// Solves the linearised equations, which negative curvature ends early unless they are symmetric alone. Where all points slide, nothing
-    /// resists the motion of a whole body along them, although at the solution some point sticks: such singular equations, on which
-    /// iterations break down, are solved as if soft springs held the body as well.
-    fn solve_linearised(
+    /// Solves the linearised equations, the derivative being of this kind, unless they are coupled; false, without a change of `direction`,
+    /// where negative curvature ends this early, which it does not do for equations that are symmetric alone. Where all points slide,
+    /// nothing resists the motion of a whole body along them, although at the solution some point sticks: equations that may be singular,
+    /// as those of a convex energy whose derivative is not definite, and on which iterations break down, are solved as if soft springs
+    /// held the body as well.
+    pub(super) fn solve_linearised(
         &mut self,
         residual: &DistributedVector,
         direction: &mut DistributedVector,
         (kind, may_be_singular): (ProjectedKind, bool),
-    ) -> Result<Curvature> {
+    ) -> Result<bool> {
         let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
-        let is_unsymmetric = cells.is_some()
-            && self.session.total(cells.as_ref().map_or(0, |cells| usize::from(!cells.is_symmetric()))) > 0;
-        let coupled = self.contacts.iter().any(|contact| contact.friction.is_some())
-            && self.session.total(usize::from(
-                self.contacts.iter().flat_map(|contact| &contact.friction).any(Friction::is_coupled),
-            )) > 0;
-        let coupled = coupled || is_unsymmetric || self.obstacles.is_unsymmetric(self.contacts);
+        let mut frictions = self.contacts.iter().flat_map(|contact| &contact.friction).peekable();
+        let may_couple = cells.is_some() || frictions.peek().is_some();
+        let is_coupled =
+            cells.as_ref().is_some_and(|cells| !cells.is_symmetric()) || frictions.any(Friction::is_coupled);
+        let coupled = (may_couple && self.session.total(usize::from(is_coupled)) > 0)
+            || self.obstacles.is_unsymmetric(self.contacts);
         let mut operator = ReducedJacobian {
             matrix: self.matrix,
             cells,
@@ -611,7 +593,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         self.counts.refreshed += usize::from(outcome.refreshed);
         if !is_solved && !is_on_springs {
             if outcome.indefinite {
-                return Ok(Curvature::Negative);
+                return Ok(false);
             }
             let reason =
                 if outcome.linear.converged() { NEARLY_SINGULAR } else { outcome.linear.description() };
@@ -626,7 +608,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         }
         let (open, mut direction) = (open.owned()?, direction.owned_mut()?);
         self.contacts.iter().for_each(|contact| contact.unmap_direction(&open, &mut direction));
-        Ok(Curvature::Positive)
+        Ok(true)
     }
 }
 

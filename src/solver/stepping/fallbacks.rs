@@ -42,7 +42,7 @@ impl Search {
 
 /// The properties that determine the fallbacks of a step.
 #[derive(Clone, Copy)]
-pub(super) struct Conditions {
+pub(super) struct Properties {
     /// Whether some friction bound depends on the contact pressure.
     pub follows_pressure: bool,
     /// How such bounds obtain the pressure at first.
@@ -54,16 +54,16 @@ pub(super) struct Conditions {
     /// Whether cells flow.
     pub flows: bool,
     /// Whether there is friction.
-    pub rubs: bool,
+    pub has_friction: bool,
     /// Whether friction moves obstacles that forces drive.
-    pub rubs_obstacles: bool,
+    pub friction_moves_obstacles: bool,
     /// Whether forces of laws may fall with the motion.
     pub softens: bool,
     /// Whether these include those of bonds.
     pub has_bonds: bool,
 }
 
-impl Conditions {
+impl Properties {
     /// The fallbacks that are tried in turn until a step is solved, each from the start value of the step.
     ///
     /// Full steps are tried first: a new set of branches raises the residual of the whole body, so that a line search would take very
@@ -83,7 +83,7 @@ impl Conditions {
         use Search::{Backtracking, Descent, Equilibrated, Falling, FullSteps, HalfSteps, Yielding};
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
-        let rubs = self.rubs && !self.rubs_obstacles;
+        let rubs = self.has_friction && !self.friction_moves_obstacles;
         [
             (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
@@ -93,7 +93,7 @@ impl Conditions {
             (follows_bounds, Equilibrated, 1.0, Newton),
             (follows_bounds, Equilibrated, 10.0, Newton),
             (follows_bounds, FullSteps, 10.0, Newton),
-            (self.rubs_obstacles, Yielding, 1.0, FixedPoint),
+            (self.friction_moves_obstacles, Yielding, 1.0, FixedPoint),
             (follows_bounds && !self.flows, Backtracking, 1.0, Newton),
             (follows_bounds, FullSteps, 100.0, Newton),
             (follows_bounds, Backtracking, 1.0 / 30.0, Newton),
@@ -105,7 +105,7 @@ impl Conditions {
             (follows_bounds, Descent, 1.0, Newton),
             (fixes_bounds, Descent, 1.0, FixedPoint),
             (rubs && self.softens, Yielding, 1.0, FixedPoint),
-            (self.rubs, Falling, 1.0, FixedPoint),
+            (self.has_friction, Falling, 1.0, FixedPoint),
         ]
         .into_iter()
         .filter(move |(is_wanted, search, ..)| *is_wanted && self.allows(*search))
@@ -131,26 +131,26 @@ impl Conditions {
 mod tests {
     use super::*;
 
-    const FRICTIONLESS: Conditions = Conditions {
+    const FRICTIONLESS: Properties = Properties {
         follows_pressure: false,
         friction: FrictionIteration::Newton,
         has_user_search: false,
         interior_is_linear: true,
         flows: false,
-        rubs: false,
-        rubs_obstacles: false,
+        has_friction: false,
+        friction_moves_obstacles: false,
         softens: false,
         has_bonds: false,
     };
 
-    fn searches(conditions: Conditions) -> Vec<Search> {
-        conditions.fallbacks().map(|fallback| fallback.search).collect()
+    fn searches(properties: Properties) -> Vec<Search> {
+        properties.fallbacks().map(|fallback| fallback.search).collect()
     }
 
     #[test]
     fn full_steps_come_first_and_the_descent_of_bonds_before_them() {
         assert_eq!(searches(FRICTIONLESS)[..2], [Search::FullSteps, Search::Equilibrated]);
-        let bonds = Conditions { softens: true, has_bonds: true, interior_is_linear: false, ..FRICTIONLESS };
+        let bonds = Properties { softens: true, has_bonds: true, interior_is_linear: false, ..FRICTIONLESS };
         let found = searches(bonds);
         assert_eq!(found[..2], [Search::Descent, Search::FullSteps]);
         assert_eq!(found.last(), Some(&Search::Descent), "from the start value again");
@@ -158,43 +158,49 @@ mod tests {
 
     #[test]
     fn shorter_steps_come_second_where_cells_flow() {
-        let flows = Conditions { flows: true, interior_is_linear: false, ..FRICTIONLESS };
+        let flows = Properties { flows: true, interior_is_linear: false, ..FRICTIONLESS };
         let found = searches(flows);
         assert_eq!(found[..2], [Search::FullSteps, Search::Backtracking]);
-        assert_eq!(found.len(), searches(Conditions { flows: false, ..flows }).len());
+        assert_eq!(found.len(), searches(Properties { flows: false, ..flows }).len());
     }
 
     #[test]
     fn friction_points_yield_third() {
-        let rubs = Conditions { rubs: true, rubs_obstacles: true, interior_is_linear: false, ..FRICTIONLESS };
-        let found = searches(rubs);
+        let driving = Properties {
+            has_friction: true,
+            friction_moves_obstacles: true,
+            interior_is_linear: false,
+            ..FRICTIONLESS
+        };
+        let found = searches(driving);
         assert_eq!(found[..3], [Search::FullSteps, Search::FullSteps, Search::Yielding]);
         assert_eq!(found.iter().filter(|search| **search == Search::Yielding).count(), 1);
-        let coulomb = Conditions { rubs: true, follows_pressure: true, ..FRICTIONLESS };
-        let tresca = Conditions { rubs: true, ..FRICTIONLESS };
+        let coulomb = Properties { has_friction: true, follows_pressure: true, ..FRICTIONLESS };
+        let tresca = Properties { has_friction: true, ..FRICTIONLESS };
         let second = [Search::HalfSteps, Search::Yielding];
-        assert!([coulomb, tresca].into_iter().all(|rubs| searches(rubs)[1..3] == second));
-        assert_eq!(searches(Conditions { softens: true, ..tresca })[1], Search::HalfSteps);
+        assert!([coulomb, tresca].into_iter().all(|friction| searches(friction)[1..3] == second));
+        let weakening = searches(Properties { softens: true, ..tresca });
+        assert!(weakening[1] == Search::HalfSteps && weakening[2] != Search::Yielding);
         assert!(!searches(FRICTIONLESS).contains(&Search::Yielding));
     }
 
     #[test]
     fn bounds_follow_the_speeds_at_last_where_friction_falls() {
-        let falls = Conditions { rubs: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
+        let falls = Properties { has_friction: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
         assert_eq!(searches(falls).last(), Some(&Search::Falling));
-        for other in [Conditions { softens: false, ..falls }, Conditions { rubs: false, ..falls }] {
+        for other in [Properties { softens: false, ..falls }, Properties { has_friction: false, ..falls }] {
             assert!(!searches(other).contains(&Search::Falling));
         }
     }
 
     #[test]
     fn a_line_search_of_the_user_and_a_fixed_point_iteration_leave_out_what_they_replace() {
-        let own = Conditions { has_user_search: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
+        let own = Properties { has_user_search: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
         assert!(
             searches(own).iter().all(|search| matches!(search, Search::Backtracking | Search::Equilibrated))
         );
         let fixed = FrictionIteration::FixedPoint;
-        let fixed_point = Conditions { follows_pressure: true, friction: fixed, ..FRICTIONLESS };
+        let fixed_point = Properties { follows_pressure: true, friction: fixed, ..FRICTIONLESS };
         assert!(fixed_point.fallbacks().all(|fallback| fallback.iteration == fixed));
     }
 }

@@ -10,7 +10,7 @@ use super::{
     contacts::restore_pressures,
     descent::{DIRECTIONS_PER_ITERATION, Descent, SHORT_DESCENT},
     equations::{CellForces, ContactEquations, Floor, PATIENCE, Scratch, SolveCounts, cycle_message},
-    fallbacks::{Conditions, Fallback, Search},
+    fallbacks::{Fallback, Properties, Search},
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
     obstacle_motions::ObstacleMotions,
@@ -48,7 +48,7 @@ pub(super) struct Newton {
     /// Whether it solved the last equations.
     has_descended: bool,
     /// Counts of the work done for the step.
-    counts: SolveCounts,
+    pub(super) counts: SolveCounts,
     /// The velocity from which the step was started.
     start: DistributedVector,
     /// Whether the user has set a line search.
@@ -124,15 +124,15 @@ impl Newton {
             return self.check_inclusion(problem, equations.velocity, inclusion);
         }
         self.start(problem, &mut equations)?;
-        let conditions = self.conditions(problem.body);
+        let properties = self.properties(problem.body);
         // With these parameters, whatever those of the last step were: a restarted run does not know them.
-        if let Some(first) = conditions.fallbacks().next() {
+        if let Some(first) = properties.fallbacks().next() {
             self.set_graph_parameters(&mut problem.body.contacts, system.scales, first);
         }
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let mut failure = String::new();
         let is_yielding = |fallback: &Fallback| fallback.search == Search::Yielding;
-        let mut rest = conditions.fallbacks().take(system.fallbacks);
+        let mut rest = properties.fallbacks().take(system.fallbacks);
         let (mut next, mut has_yielded) = (rest.next(), false);
         while let Some(fallback) = next {
             loop {
@@ -173,12 +173,12 @@ impl Newton {
             has_yielded |= is_yielding(&fallback);
             // Full steps move a body that nothing but friction holds to and fro.
             next = match self.counts.singular > 0 && !has_yielded {
-                true => conditions.fallbacks().find(is_yielding),
+                true => properties.fallbacks().find(is_yielding),
                 false => None,
             };
             next = next.or_else(|| rest.find(|fallback| !(has_yielded && is_yielding(fallback))));
         }
-        Err(problem.explain(&failure, conditions.softens))
+        Err(problem.explain(&failure, properties.softens))
     }
 
     /// Prepares obstacles, linear solves and parameters of friction graphs for new equations. Collective.
@@ -280,13 +280,13 @@ impl Newton {
             .set_columns(problem.session, contacts, &self.start, |x, y| system.matrix.multiply(x, y))
     }
 
-    fn conditions<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Conditions {
+    fn properties<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Properties {
         let contacts = &body.contacts;
         let follows =
             |contact: &Contact<D>| contact.friction.as_ref().is_some_and(|f| f.law.follows_pressure());
         let flows = self.flow.is_some();
-        let rubs = contacts.iter().any(|contact| contact.friction.is_some());
-        Conditions {
+        let has_friction = contacts.iter().any(|contact| contact.friction.is_some());
+        Properties {
             follows_pressure: contacts.iter().any(follows),
             friction: self.settings.friction,
             has_user_search: self.has_user_search,
@@ -296,8 +296,8 @@ impl Newton {
                     .iter()
                     .any(|contact| contact.normal.needs_ghosts || contact.obstacle.is_driven()),
             flows,
-            rubs,
-            rubs_obstacles: rubs && !self.obstacles.is_empty(),
+            has_friction,
+            friction_moves_obstacles: has_friction && !self.obstacles.is_empty(),
             softens: (flows && body.softens()) || contacts.iter().any(decreases),
             has_bonds: flows && body.softens_at_surface(),
         }
@@ -487,11 +487,6 @@ impl Newton {
         flow.copy_free_parts(&problem.body.held, &problem.state.previous_velocity, start)?;
         write_unknowns(&problem.body.contacts, start)?;
         Ok(true)
-    }
-
-    /// The norm of the first residual of the last solve, in N.
-    pub(super) fn first_residual(&self) -> f64 {
-        self.counts.first
     }
 
     /// The residual at the end of the last solve, in N.

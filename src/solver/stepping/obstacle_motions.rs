@@ -128,7 +128,9 @@ impl ObstacleMotions {
             self.may_part = false;
             contacts[contact].follow_obstacle(false);
             for freedom in Freedom::ALL {
-                let Some(motion) = contacts[contact].obstacle.motion_mut(freedom) else { continue };
+                let Some(motion) = &mut contacts[contact].obstacle.motions[freedom as usize] else {
+                    continue;
+                };
                 let free = motion.velocity() + motion.change_to_free();
                 if free.is_finite() {
                     motion.set_velocity(free);
@@ -154,8 +156,8 @@ impl ObstacleMotions {
     ) -> Result<()> {
         (self.touched, self.parted) = (None, None);
         let driven = contacts.iter().enumerate().flat_map(|(contact, laws)| {
-            Freedom::ALL.into_iter().zip(laws.obstacle.motions()).filter_map(move |(freedom, motion)| {
-                motion.map(|motion| ((contact, freedom), motion.inertia()))
+            Freedom::ALL.into_iter().zip(&laws.obstacle.motions).filter_map(move |(freedom, motion)| {
+                motion.as_ref().map(|motion| ((contact, freedom), motion.inertia()))
             })
         });
         for (at, (place, inertia)) in driven.enumerate() {
@@ -179,7 +181,8 @@ impl ObstacleMotions {
             let motion = &mut self.motions[at];
             (motion.place, motion.inertia, motion.held, motion.approach) = (place, inertia, 0.0, None);
             let (contact, freedom) = place;
-            let has_stops = freedom == Freedom::Translation && contacts[contact].normal.has_stops();
+            let has_stops =
+                freedom == Freedom::Translation && contacts[contact].normal.approach().has_stops();
             (motion.has_stops, motion.stop) = (session.total(usize::from(has_stops)) > 0, None);
             motion.velocities.fill(0.0)?;
             contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
@@ -242,11 +245,6 @@ impl ObstacleMotions {
         for Motion { place: (contact, freedom), .. } in &self.motions {
             self.work.push(contacts[*contact].held_stiffness(*freedom, velocity));
         }
-        for Motion { place: (contact, freedom), .. } in &self.motions {
-            let reaction =
-                if *freedom == Freedom::Translation { contacts[*contact].normal.reaction() } else { 0.0 };
-            self.work.push(reaction);
-        }
         session.sum_lists_into(&self.work, &mut self.sums);
         let sums = &self.sums;
         self.motions.iter_mut().zip(&sums[3 * count..]).for_each(|(motion, held)| motion.held = *held);
@@ -257,8 +255,8 @@ impl ObstacleMotions {
         self.values.clear();
         self.unbalanced.clear();
         for (at, Motion { place: (contact, freedom), .. }) in self.motions.iter().enumerate() {
-            let Some(motion) = contacts[*contact].obstacle.motion_mut(*freedom) else { continue };
-            let [open, terms] = motion.unbalanced(sums[at] - sums[4 * count + at]);
+            let Some(motion) = &mut contacts[*contact].obstacle.motions[*freedom as usize] else { continue };
+            let [open, terms] = motion.unbalanced(sums[at]);
             self.values.push(open + sums[count + at]);
             self.unbalanced.push([open, terms]);
         }
@@ -289,7 +287,7 @@ impl ObstacleMotions {
         }
         let mut placed = Ok(());
         for (Motion { place: (contact, freedom), .. }, change) in self.motions.iter().zip(&self.values) {
-            if let Some(motion) = contacts[*contact].obstacle.motion_mut(*freedom) {
+            if let Some(motion) = &mut contacts[*contact].obstacle.motions[*freedom as usize] {
                 motion.set_velocity(motion.velocity() - change);
             }
         }
@@ -327,7 +325,6 @@ impl ObstacleMotions {
         contacts: &mut [Contact<D>],
         velocity: &[f64],
     ) {
-        let count = self.motions.len();
         for (at, motion) in self.motions.iter_mut().enumerate() {
             (motion.room, motion.stop) = (ANYWHERE, None);
             if !motion.has_stops {
@@ -335,7 +332,7 @@ impl ObstacleMotions {
             }
             let (contact, freedom) = motion.place;
             let (laws, [open, _]) = (&mut contacts[contact], self.unbalanced[at]);
-            let [least, greatest] = laws.normal.room(velocity);
+            let [least, greatest] = laws.normal.approach().room(velocity);
             let [least, greatest] = session.largest([least, -greatest]);
             motion.room = [least, -greatest];
             // Beyond a stop the obstacle is moved back, whatever its force.
@@ -344,14 +341,13 @@ impl ObstacleMotions {
                 [least, _] if least > 0.0 => -1.0,
                 _ => -self.values[at].signum(),
             };
-            let [area] = session.sum([laws.normal.stopping_area(sign, velocity)]);
+            let [area] = session.sum([laws.normal.approach().stopping_area(sign, velocity)]);
             let reaction = if area > 0.0 && sign * open < 0.0 { open } else { 0.0 };
             laws.normal.stop(sign, if reaction == 0.0 { 0.0 } else { reaction / area }, velocity);
             if area > 0.0
-                && let Some(driven) = laws.obstacle.motion_mut(freedom)
+                && let Some(driven) = &mut laws.obstacle.motions[freedom as usize]
             {
-                let others = self.sums[at] - self.sums[4 * count + at];
-                self.unbalanced[at] = driven.unbalanced(others + reaction);
+                self.unbalanced[at] = driven.unbalanced(self.sums[at] + reaction);
                 motion.stop = Some(f64::max(0.0, least).min(-greatest));
                 self.values[at] = 0.0;
             }
@@ -396,7 +392,8 @@ impl ObstacleMotions {
             if grip > 0.0 || motion.stop.is_some() {
                 continue;
             }
-            let driving = laws.obstacle.motions()[freedom as usize].map_or(0.0, |motion| motion.driving);
+            let driving =
+                laws.obstacle.motions[freedom as usize].as_ref().map_or(0.0, |motion| motion.driving);
             let [open, _] = self.unbalanced.get(at).copied().unwrap_or([-driving, 0.0]);
             if open == 0.0 {
                 motion.approach = Some(0.0);
@@ -449,7 +446,7 @@ impl ObstacleMotions {
     /// Keeps the velocities of all motions.
     pub(super) fn keep<const D: usize>(&mut self, contacts: &[Contact<D>]) {
         let velocity = |(contact, freedom): (usize, Freedom)| {
-            contacts[contact].obstacle.motions()[freedom as usize].map_or(0.0, LoadedMotion::velocity)
+            contacts[contact].obstacle.motions[freedom as usize].as_ref().map_or(0.0, LoadedMotion::velocity)
         };
         self.kept.clear();
         self.kept.extend(self.motions.iter().map(|motion| velocity(motion.place)));
@@ -458,8 +455,8 @@ impl ObstacleMotions {
     /// Sets the velocities that were kept last.
     pub(super) fn restore<const D: usize>(&self, contacts: &mut [Contact<D>]) -> Result<()> {
         for (Motion { place: (contact, freedom), .. }, velocity) in self.motions.iter().zip(&self.kept) {
-            let motion = contacts[*contact].obstacle.motion_mut(*freedom);
-            motion.into_iter().for_each(|motion| motion.set_velocity(*velocity));
+            let motion = &mut contacts[*contact].obstacle.motions[*freedom as usize];
+            motion.iter_mut().for_each(|motion| motion.set_velocity(*velocity));
         }
         contacts.iter_mut().try_for_each(Contact::place_obstacle)
     }
@@ -468,7 +465,7 @@ impl ObstacleMotions {
     /// from which gaps are evaluated: velocities are rounded as differences from them.
     pub(super) fn speed<const D: usize>(&self, contacts: &[Contact<D>]) -> f64 {
         let change = |(contact, freedom): (usize, Freedom)| {
-            contacts[contact].obstacle.motions()[freedom as usize].map_or(0.0, |m| m.change())
+            contacts[contact].obstacle.motions[freedom as usize].as_ref().map_or(0.0, LoadedMotion::change)
         };
         let speed = |motion: &Motion| motion.size * (change(motion.place).abs() + motion.places);
         self.motions.iter().map(speed).sum()
@@ -515,11 +512,11 @@ fn change_to_press<const D: usize>(
     let (contact, freedom) = motion.place;
     let (laws, sign) = (&contacts[contact], -open.signum());
     let nearest = match freedom {
-        Freedom::Translation => laws.normal.change_to_touch(velocity, sign),
+        Freedom::Translation => laws.normal.approach().change_to_touch(velocity, sign),
         Freedom::Rotation => f64::INFINITY,
     };
     let nearest = -session.largest([-nearest])[0];
-    let [area] = session.sum([laws.normal.area()]);
+    let [area] = session.sum([laws.normal.boundary().area()]);
     let left = open.abs() - motion.inertia * nearest;
     (left > 0.0).then(|| sign * (nearest + left / (motion.inertia + laws.normal.scale * area)))
 }
@@ -533,10 +530,11 @@ fn find_contacts<const D: usize>(
 ) -> Result<()> {
     let velocity = start.owned()?;
     for contact in contacts.iter_mut().filter(|contact| contact.obstacle.is_driven()) {
-        let mut touches = contact.has_tractions() || contact.normal.would_touch(&velocity);
-        let [along, _] = contact.obstacle.motions();
-        if let Some(change) = along.map(LoadedMotion::change_to_free) {
-            touches |= contact.normal.change_to_touch(&velocity, change.signum()) <= change.abs();
+        let approach = contact.normal.approach();
+        let mut touches = contact.has_tractions() || approach.would_touch(&velocity);
+        let [along, _] = &contact.obstacle.motions;
+        if let Some(change) = along.as_ref().map(LoadedMotion::change_to_free) {
+            touches |= approach.change_to_touch(&velocity, change.signum()) <= change.abs();
         }
         contact.follow_obstacle(session.total(usize::from(touches)) > 0);
         contact.follow_along_tangents(session, &velocity);

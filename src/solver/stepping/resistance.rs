@@ -17,12 +17,13 @@ pub(super) fn resistances<const D: usize>(
     let mut motion = like.like()?;
     let mut against = |motion: &DistributedVector, square: f64| -> Result<f64> {
         let [square] = session.sum([square]);
-        Ok(positive_or_one(power(motion)? / square))
+        let resistance = power(motion)? / square;
+        Ok(if resistance.is_finite() && resistance > 0.0 { resistance } else { 1.0 })
     };
     let mut resistance = |contact: &Contact<D>| -> Result<[f64; 2]> {
         motion.fill(0.0)?;
-        contact.normal.add_normals(&mut motion.owned_mut()?);
-        let square = contact.normal.normal_square(&motion.owned()?);
+        contact.normal.boundary().add_normals(&mut motion.owned_mut()?);
+        let square = contact.normal.boundary().normal_square(&motion.owned()?);
         let normal = against(&motion, square)?.max(2.0 * contact.monotonicity_constant());
         let Some(friction) = &contact.friction else { return Ok([normal; 2]) };
         motion.fill(0.0)?;
@@ -46,11 +47,7 @@ pub(super) fn set_reference_values<const D: usize>(
     let all = resistances(session, contacts, like, |motion| matrix.power(motion))?;
     for (contact, resistance) in contacts.iter_mut().zip(all) {
         contact.reference.resistance = resistance;
-        [contact.reference.area] = session.sum([contact.normal.area()]);
+        [contact.reference.area] = session.sum([contact.normal.boundary().area()]);
     }
     Ok(())
-}
-
-fn positive_or_one(stiffness: f64) -> f64 {
-    if stiffness.is_finite() && stiffness > 0.0 { stiffness } else { 1.0 }
 }

@@ -55,7 +55,7 @@ pub struct StepSolver {
     /// The matrix of the step, if its length is not that of the preconditioner.
     step_matrix: Option<Matrix>,
     /// The lengths for which matrix and preconditioner are prepared.
-    prepared: Option<Lengths>,
+    pub(super) prepared: Option<Lengths>,
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     /// The velocity from which a step with a factor in single precision, or of a body that softens, was started.
@@ -67,7 +67,7 @@ pub struct StepSolver {
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
     /// Time spent on factors with derivatives at velocities of steps, until it is taken.
-    refactoring: Duration,
+    pub(super) refactoring: Duration,
     /// Springs that keep the factors of bodies supported by contact alone regular.
     springs: Springs,
 }
@@ -135,16 +135,6 @@ impl StepSolver {
     /// Forgets factors with derivatives at velocities of earlier steps, so that the next step is solved as after a restart.
     pub fn forget_tangents(&mut self) {
         self.with_tangents = None;
-    }
-
-    /// The time spent within steps on their matrices and factors since it was last taken.
-    pub(super) fn take_assembly_time(&mut self) -> Duration {
-        std::mem::take(&mut self.refactoring)
-    }
-
-    /// Whether the matrices belong to these lengths.
-    pub(super) fn is_prepared_for(&self, lengths: Lengths) -> bool {
-        self.prepared == Some(lengths)
     }
 
     /// Assembles the matrix of this length and sets up its preconditioner, unless they are available; returns whether a

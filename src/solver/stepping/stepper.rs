@@ -190,7 +190,7 @@ impl Stepper {
     ) -> Result<()> {
         let cached = self.integrator.steady_length(nearest_cached_length(self.base_length, step.length));
         let lengths = Lengths { matrix: self.integrator.matrix_length(step), cached };
-        if self.solver.is_prepared_for(lengths) {
+        if self.solver.prepared == Some(lengths) {
             return Ok(());
         }
         let start = Instant::now();
@@ -274,7 +274,7 @@ impl Stepper {
             supports.set(body, &mut self.trial)?;
         }
         drop(stage);
-        let assembly = self.solver.take_assembly_time();
+        let assembly = std::mem::take(&mut self.solver.refactoring);
         self.clock.assembly += assembly;
         self.clock.solve += solving.elapsed().saturating_sub(assembly);
         self.traffic.add_solve(self.solver.traffic(session.ranks())?);
@@ -648,7 +648,7 @@ impl Stepper {
         let ratio = extrapolates(state, step).then(|| step.length / step.previous_length);
         for (number, contact) in body.contacts.iter_mut().enumerate() {
             for (cause, freedom) in [("force", Freedom::Translation), ("moment", Freedom::Rotation)] {
-                let Some(motion) = contact.obstacle.motion_mut(freedom) else { continue };
+                let Some(motion) = &mut contact.obstacle.motions[freedom as usize] else { continue };
                 motion.start(blend, time, ratio);
                 let value = motion.driving;
                 if !value.is_finite() {

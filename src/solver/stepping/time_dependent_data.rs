@@ -62,7 +62,7 @@ impl<const D: usize> TimeDependentData<D> {
             add("heat at a boundary", std::slice::from_ref(value), true);
         }
         for contact in &body.contacts {
-            let motions = contact.obstacle.motions().into_iter().flatten();
+            let motions = contact.obstacle.motions.iter().flatten();
             let forces = motions.map(|motion| &motion.force);
             forces.for_each(|force| add("the force on an obstacle", std::slice::from_ref(force), true));
             contact

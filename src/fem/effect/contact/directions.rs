@@ -66,7 +66,7 @@ impl<const D: usize> Contact<D> {
     pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
         let presses = !self.normal.law.is_zero();
         let rubs = self.friction.as_ref().is_some_and(|friction| presses || !friction.law.follows_pressure());
-        let normals = presses.then(|| self.normal.directions()).into_iter().flatten();
+        let normals = presses.then(|| self.normal.boundary().directions()).into_iter().flatten();
         normals.chain(self.friction.iter().filter(|_| rubs).flat_map(Friction::directions)).collect()
     }
 

@@ -12,7 +12,6 @@
 use super::{
     Contact,
     loaded_obstacle::Freedom,
-    normal::NormalContact,
     point::{Point, Unknown, Vectors::Newton},
 };
 use crate::{
@@ -21,113 +20,6 @@ use crate::{
     parallel::session::Session,
 };
 
-/// The accuracy of velocities at which pressures begin.
-const NEAR: f64 = 1e-6;
-
-/// Distance from a point that stops the obstacle at which they touch, as a share of the body's size.
-const TOUCH: f64 = 1e-12;
-
-/// Whether a point and the obstacle touch at the end of the step, at these velocities of Newton's method; the size is that of the body in m.
-fn is_touched<const D: usize>(point: &Point<D>, velocity: &[f64], size: f64) -> bool {
-    point.depth(velocity) >= -TOUCH * size
-}
-
-impl<const D: usize> NormalContact<D> {
-    /// The change in m/s of the normal velocity with which a point in the obstacle comes under pressure: a dashpot lets go of a surface that
-    /// recedes fast, however deep it is.
-    fn change_to_press(&self, point: &Point<D>, velocity: &[f64]) -> f64 {
-        let now = point.normal_component(Newton, velocity);
-        let presses = |change: f64| self.law.pressure(now + change, point.context) > 0.0;
-        let size = now.abs() + point.depth(velocity) / point.context.step_length;
-        let mut bracket = [0.0, NEAR * size];
-        // Bisection of numbers without full precision would not end.
-        if self.law.has_vertical_parts() || presses(0.0) || bracket[1] < f64::MIN_POSITIVE / NEAR {
-            return 0.0;
-        }
-        while !presses(bracket[1]) {
-            bracket = [bracket[1], 2.0 * bracket[1]];
-            if !bracket[1].is_finite() {
-                return f64::INFINITY;
-            }
-        }
-        while bracket[1] - bracket[0] > NEAR * bracket[1] {
-            let middle = f64::midpoint(bracket[0], bracket[1]);
-            bracket[usize::from(presses(middle))] = middle;
-        }
-        bracket[1]
-    }
-
-    /// The points on this rank that may stop the obstacle.
-    fn stops(&self) -> impl Iterator<Item = &Point<D>> {
-        self.points.iter().filter(|point| point.unknown == Unknown::Stop)
-    }
-
-    /// The least and the greatest change in m/s of the obstacle's velocity at which it is beyond no point on this rank that stops it, at
-    /// these velocities of Newton's method.
-    pub fn room(&self, velocity: &[f64]) -> [f64; 2] {
-        let [mut least, mut greatest] = [f64::NEG_INFINITY, f64::INFINITY];
-        for point in self.stops() {
-            let along = point.along_obstacle;
-            let depth = point.depth(velocity);
-            let depth = if depth.abs() <= TOUCH * self.body_size { 0.0 } else { depth };
-            let change = depth / (along * point.context.step_length);
-            if along > 0.0 {
-                least = f64::max(least, change);
-            } else if along < 0.0 {
-                greatest = f64::min(greatest, change);
-            }
-        }
-        [least, greatest]
-    }
-
-    /// The sum over points on this rank that stop a motion of this sign where the obstacle is of their weights in m^(D-1) times the squares
-    /// of the components of their normals along the direction; 0 if nothing stops it.
-    pub fn stopping_area(&self, sign: f64, velocity: &[f64]) -> f64 {
-        let stopping = |point: &&Point<D>| {
-            is_touched(point, velocity, self.body_size) && sign * point.along_obstacle < 0.0
-        };
-        self.stops()
-            .filter(stopping)
-            .map(|point| point.weight * point.along_obstacle * point.along_obstacle)
-            .sum()
-    }
-
-    /// The resultant in N along the direction of the pressures at points on this rank that stop the obstacle.
-    pub fn reaction(&self) -> f64 {
-        self.stops().map(|point| point.weight * point.pressure * point.along_obstacle).sum()
-    }
-
-    /// Sets the pressures at points that stop a motion of this sign to `share` in Pa times the components of their normals, at other
-    /// points to 0. Of all pressures with the same resultant these have the smallest sum of squares over the area.
-    pub fn stop(&mut self, sign: f64, share: f64, velocity: &[f64]) {
-        for point in self.points.iter_mut().filter(|point| point.unknown == Unknown::Stop) {
-            let along = point.along_obstacle;
-            let stops = is_touched(point, velocity, self.body_size) && sign * along < 0.0;
-            point.pressure = if stops { share * along } else { 0.0 };
-        }
-    }
-
-    /// The smallest change in m/s of the obstacle's velocity, of this sign, at which it presses on a point on this rank in the step, at these
-    /// velocities of Newton's method; infinite if it does not come nearer.
-    pub fn change_to_touch(&self, velocity: &[f64], sign: f64) -> f64 {
-        let change = |point: &Point<D>| {
-            let along =
-                if point.unknown == Unknown::Parameter { point.follows } else { point.along_obstacle };
-            let approach = -sign * along;
-            let depth = point.depth(velocity);
-            if approach <= 0.0 || !depth.is_finite() {
-                f64::INFINITY
-            } else if depth < 0.0 {
-                -depth / (approach * point.context.step_length)
-            } else {
-                self.change_to_press(point, velocity) / approach
-            }
-        };
-        let pressed = self.points.iter().filter(|point| self.is_pressed(point));
-        pressed.map(change).fold(f64::INFINITY, f64::min)
-    }
-}
-
 impl<const D: usize> Contact<D> {
     /// Evaluates gaps and velocities of the obstacle after its velocities have been set.
     pub fn place_obstacle(&mut self) -> Result<()> {
@@ -135,7 +27,7 @@ impl<const D: usize> Contact<D> {
         if !obstacle.is_driven() || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
-        let [change, _] = obstacle.changes();
+        let change = obstacle.change();
         for point in self.normal.points.iter_mut().filter(|_| obstacle.moves()) {
             let seen = obstacle.seen_after(&point.place);
             point.set_gap(obstacle.gap.of_moved(obstacle.rate.time, &seen, &point.normal, point.moved)?);
@@ -150,7 +42,7 @@ impl<const D: usize> Contact<D> {
         if !obstacle.moves() {
             return;
         }
-        let [change, _] = obstacle.changes();
+        let change = obstacle.change();
         obstacle.follows = follows;
         for point in &mut self.normal.points {
             point.follows = if follows && point.can_touch() { point.along_obstacle } else { 0.0 };
@@ -253,9 +145,11 @@ impl<const D: usize> Contact<D> {
     }
 
     /// The resultant of the tractions on the obstacle for a motion, in N or N m, of points on this rank at these velocities, a vector of
-    /// Newton's method with ghosts.
+    /// Newton's method with ghosts; without the pressures at points that stop a translation.
     pub fn resultant(&self, freedom: Freedom, velocity: &[f64]) -> f64 {
-        let normal = self.normal.points.iter().enumerate().map(|(at, point)| {
+        let stops = |point: &Point<D>| freedom == Freedom::Translation && point.unknown == Unknown::Stop;
+        let points = self.normal.points.iter().enumerate().filter(|(_, point)| !stops(point));
+        let normal = points.map(|(at, point)| {
             let pressure = point.pressure_at(&self.normal.law, Newton, velocity);
             point.weight * pressure * dot(&point.normal, &self.obstacle.carrying(freedom, at))
         });
@@ -290,7 +184,8 @@ impl<const D: usize> Contact<D> {
         let Some((_, way)) = self.obstacle.translation().filter(|_| freedom == Freedom::Translation) else {
             return 0.0;
         };
-        let is_held = |point: &&Point<D>| point.unknown == Unknown::Held && self.normal.is_pressed(point);
+        let is_held =
+            |point: &&Point<D>| point.unknown == Unknown::Held && point.is_pressed(&self.normal.law);
         let held = self.normal.points.iter().filter(is_held);
         held.map(|point| {
             let slope = self.normal.law.slope(point.normal_component(Newton, velocity), point.context);

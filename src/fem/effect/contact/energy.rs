@@ -7,6 +7,8 @@ use super::{
 use crate::{
     error::Result,
     fem::effect::{EnergyKind, Role},
+    laws::contact::{NodeContext, NormalResponse},
+    linear_algebra::tensor::larger,
 };
 
 /// Dissipated by contact, or absorbed by contact memory.
@@ -40,21 +42,18 @@ impl<const D: usize> Contact<D> {
     /// friction there.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> ContactEnergy {
         let mut sum = ContactEnergy::default();
-        let is_of_two_steps = self.blend.earlier != 0.0;
+        let (law, is_of_two_steps) = (&self.normal.law, self.blend.earlier != 0.0);
         for point in &self.normal.points {
             let v = point.normal_component(Body, velocity);
-            let pressure = point.pressure_at(&self.normal.law, Body, velocity);
+            let pressure = point.pressure_at(law, Body, velocity);
             let of_supports = point.weight * pressure * point.held_velocity(velocity);
-            if !self.normal.law.depends_on_displacement() {
+            if !law.depends_on_displacement() {
                 sum.dissipated_power += point.weight * pressure * v;
                 sum.driving_power += of_supports;
                 continue;
             }
-            let mean = if is_of_two_steps {
-                0.5 * (pressure + self.normal.pressure_before(point))
-            } else {
-                pressure
-            };
+            let mean =
+                if is_of_two_steps { 0.5 * (pressure + pressure_before(law, point)) } else { pressure };
             let change = point.context.step_length * v;
             let eroded = point.worn[0] - point.worn[1] - point.continued_wear;
             let after = point.context.penetration + change - eroded;
@@ -63,13 +62,11 @@ impl<const D: usize> Contact<D> {
                 if pressure == 0.0 || !way.is_finite() { 0.0 } else { pressure * way }
             };
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
-            let energies =
-                self.normal.law.energy(after).zip(self.normal.law.energy(point.penetration_before));
+            let energies = law.energy(after).zip(law.energy(point.penetration_before));
             let (stored, lost) = match energies {
-                Some(energies) => (
-                    energies.0 - energies.1,
-                    self.normal.lost_at_wall(pressure, [point.penetration_before, after]),
-                ),
+                Some(energies) => {
+                    (energies.0 - energies.1, lost_at_wall(law, pressure, [point.penetration_before, after]))
+                }
                 None => (0.0, times(pressure, after - before)),
             };
             // The growth of the wear that this step has seen, which is no longer stored.
@@ -82,7 +79,7 @@ impl<const D: usize> Contact<D> {
             let given = times(mean, point.growth);
             sum.dissipated += point.weight * dissipated;
             sum.work += length * of_supports - point.weight * given;
-            let damped = self.normal.damping_power(point, after, (after - before) / length, is_of_two_steps);
+            let damped = damping_power(law, point, [after, (after - before) / length], is_of_two_steps);
             sum.dissipated_power += point.weight * damped;
             sum.numerical += point.weight * (stored + dissipated + given + length * (damped - pressure * v));
         }
@@ -105,4 +102,44 @@ impl<const D: usize> Contact<D> {
         };
         self.normal.points.iter().map(energy).sum()
     }
+}
+
+/// Pressure in Pa at a point before the step.
+fn pressure_before<const D: usize>(law: &NormalResponse, point: &Point<D>) -> f64 {
+    let is_stored = point.unknown.has_pressure() && law.damping() > 0.0;
+    if law.has_vertical_parts() || is_stored {
+        return point.pressure_before;
+    }
+    let penetration = point.penetration_before;
+    law.pressure(
+        0.0,
+        NodeContext { penetration, depth_before: penetration.max(0.0), ..NodeContext::AT_THE_GAP },
+    )
+}
+
+/// What a rigid obstacle behind a law that stores energy dissipates of the work of this pressure in Pa in J/m^(D-1), where the
+/// penetration in m changes from the first to the second value: that inside of it, beyond what the law stores.
+fn lost_at_wall(law: &NormalResponse, pressure: f64, penetrations: [f64; 2]) -> f64 {
+    let Some([wall, stored]) = law.wall() else { return 0.0 };
+    let [before, after] = penetrations.map(|penetration| larger(penetration - wall, 0.0));
+    if pressure > stored { (pressure - stored) * (after - before) } else { 0.0 }
+}
+
+/// Power in W/m^(D-1) that the dashpot at a point dissipates at the end of the step, at this penetration in m, which has grown by
+/// this mean rate in m/s; the formula of the step may be one of two steps.
+fn damping_power<const D: usize>(
+    law: &NormalResponse,
+    point: &Point<D>,
+    [after, growth]: [f64; 2],
+    of_two_steps: bool,
+) -> f64 {
+    if law.damping() == 0.0 || !growth.is_finite() {
+        return 0.0;
+    }
+    let rate = if of_two_steps {
+        (after.max(0.0) - point.context.depth_before) / point.context.step_length
+    } else {
+        growth
+    };
+    law.damping_pressure(after, point.context) * rate
 }

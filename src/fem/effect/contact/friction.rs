@@ -167,11 +167,6 @@ impl<const D: usize> Friction<D> {
         may_fall.then(|| pairs.map(fall).fold(0.0, larger))
     }
 
-    /// Removes points that have no tangent.
-    pub(super) fn keep_points_with_tangents(&mut self) {
-        self.points.retain(TangentialPoint::has_tangents);
-    }
-
     /// Reads the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
     pub(super) fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
         for point in &mut self.points {
@@ -200,11 +195,6 @@ impl<const D: usize> Friction<D> {
     /// Sets the velocities of supports in the step in m/s by local nodes.
     pub fn set_support_velocities(&mut self, velocities: &[f64]) {
         self.points.iter_mut().for_each(|point| point.set_support_velocity(velocities));
-    }
-
-    /// Marks the points that face nothing in the step.
-    pub(super) fn mark_bare_points(&mut self, points: &[Point<D>]) {
-        self.points.iter_mut().for_each(|point| point.context.is_bare = !points[point.at].can_touch());
     }
 
     /// Advances the histories by a step from this blend of earlier ones, at these velocities at its end, with ghosts.

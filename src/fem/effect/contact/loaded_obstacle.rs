@@ -79,8 +79,11 @@ pub struct Obstacle<const D: usize> {
     pub gap: Gap,
     /// Whether the unknowns of the points are relative to its motion.
     pub follows: bool,
-    translation: Option<(Vector<D>, LoadedMotion)>,
-    rotation: Option<(Vector<3>, LoadedMotion)>,
+    /// Its motion along the direction and about the axis, where a force and a moment cause them: one for each [`Freedom`].
+    pub motions: [Option<LoadedMotion>; 2],
+    /// Unit vectors, each of a motion that there is.
+    direction: Vector<D>,
+    axis: Vector<3>,
     /// The formula of its velocity in the current step.
     pub(super) rate: Rate,
     /// If a moment turns it: for each point, the place that touches it relative to the centre, where the equations of the step hold.
@@ -90,22 +93,23 @@ pub struct Obstacle<const D: usize> {
 impl<const D: usize> Obstacle<D> {
     /// The obstacle at time 0, which no force moves.
     pub(super) fn new(gap: Gap) -> Self {
-        let (translation, rotation) = (None, None);
-        Self { gap, follows: true, translation, rotation, rate: Rate::euler(0.0, 1.0), arms: Vec::new() }
+        let (motions, rate) = ([None, None], Rate::euler(0.0, 1.0));
+        Self { gap, follows: true, motions, direction: [0.0; D], axis: [0.0; 3], rate, arms: Vec::new() }
     }
 
     /// Lets a force and a moment move it.
     pub fn set_load(&mut self, load: &ObstacleLoad) {
         let direction: Vector<D> = std::array::from_fn(|i| load.direction.get(i).copied().unwrap_or(0.0));
-        self.translation = (!load.direction.is_empty()).then(|| {
-            let motion = LoadedMotion::new(load.force.clone(), load.mass, load.velocity);
-            (direction.map(|x| x / norm(&direction)), motion)
-        });
         let axis = self.gap.axis();
-        self.rotation = load.moment.as_ref().map(|moment| {
-            let motion = LoadedMotion::new(moment.clone(), load.moment_of_inertia, load.angular_velocity);
-            (axis.map(|x| x / norm(&axis)), motion)
-        });
+        self.direction = direction.map(|x| x / norm(&direction));
+        self.axis = axis.map(|x| x / norm(&axis));
+        let moves = !load.direction.is_empty();
+        self.motions = [
+            moves.then(|| LoadedMotion::new(load.force.clone(), load.mass, load.velocity)),
+            load.moment.as_ref().map(|moment| {
+                LoadedMotion::new(moment.clone(), load.moment_of_inertia, load.angular_velocity)
+            }),
+        ];
     }
 
     /// Whether forces or moments move it.
@@ -118,63 +122,35 @@ impl<const D: usize> Obstacle<D> {
         self.is_driven() || self.gap.surface_may_move()
     }
 
-    /// The motions: along the direction, and about the axis.
-    pub fn motions(&self) -> [Option<&LoadedMotion>; 2] {
-        [
-            self.translation.as_ref().map(|(_, motion)| motion),
-            self.rotation.as_ref().map(|(_, motion)| motion),
-        ]
-    }
-
-    /// The same to be changed.
-    pub fn motions_mut(&mut self) -> [Option<&mut LoadedMotion>; 2] {
-        [
-            self.translation.as_mut().map(|(_, motion)| motion),
-            self.rotation.as_mut().map(|(_, motion)| motion),
-        ]
-    }
-
     /// Sets the velocities to those from which the step starts.
     pub fn restart(&mut self) {
-        self.motions_mut().into_iter().flatten().for_each(LoadedMotion::restart);
-    }
-
-    /// The motion of this degree of freedom, to be changed.
-    pub fn motion_mut(&mut self, freedom: Freedom) -> Option<&mut LoadedMotion> {
-        let [translation, rotation] = self.motions_mut();
-        match freedom {
-            Freedom::Translation => translation,
-            Freedom::Rotation => rotation,
-        }
+        self.motions.iter_mut().flatten().for_each(LoadedMotion::restart);
     }
 
     /// The velocity in m/s of the material at this place relative to the centre for each motion at 1 m/s (1 rad/s). The component of a
     /// force along it is the force along the direction, and its moment about the axis.
     pub(super) fn velocities_at(&self, arm: &Vector<D>) -> [Option<Vector<D>>; 2] {
-        let turned = |axis: &Vector<3>| {
-            let velocity = cross(axis, &std::array::from_fn(|i| arm.get(i).copied().unwrap_or(0.0)));
+        let turned = || {
+            let velocity = cross(&self.axis, &std::array::from_fn(|i| arm.get(i).copied().unwrap_or(0.0)));
             std::array::from_fn(|i| velocity[i])
         };
-        [
-            self.translation.as_ref().map(|(direction, _)| *direction),
-            self.rotation.as_ref().map(|(axis, _)| turned(axis)),
-        ]
+        [self.moves().then_some(self.direction), self.turns().then(turned)]
     }
 
-    /// By how much the velocity of each motion in m/s (rad/s) differs from that at the start of the step.
-    pub(super) fn changes(&self) -> [f64; 2] {
-        self.motions().map(|motion| motion.map_or(0.0, LoadedMotion::change))
+    /// By how much its velocity along its direction in m/s differs from that at the start of the step.
+    pub(super) fn change(&self) -> f64 {
+        self.motions[0].as_ref().map_or(0.0, LoadedMotion::change)
     }
 
     /// Commits the motion of the step.
     pub fn commit(&mut self) {
-        self.motions_mut().into_iter().flatten().for_each(LoadedMotion::commit);
+        self.motions.iter_mut().flatten().for_each(LoadedMotion::commit);
     }
 
     /// The velocity in m/s of its material at this place relative to the centre, in the equations of the step.
     pub(super) fn velocity_at(&self, arm: &Vector<D>) -> Vector<D> {
         let mut velocity = [0.0; D];
-        for (motion, along) in self.motions().into_iter().zip(self.velocities_at(arm)) {
+        for (motion, along) in self.motions.iter().zip(self.velocities_at(arm)) {
             if let (Some(motion), Some(along)) = (motion, along) {
                 velocity = add_scaled(&velocity, motion.velocity(), &along);
             }
@@ -184,24 +160,24 @@ impl<const D: usize> Obstacle<D> {
 
     /// The direction along which a force moves it and the length in s that multiplies its velocity in the displacement of a step.
     pub(super) fn translation(&self) -> Option<(&Vector<D>, f64)> {
-        self.translation.as_ref().map(|(direction, motion)| (direction, motion.blend.way()))
+        self.motions[0].as_ref().map(|motion| (&self.direction, motion.blend.way()))
     }
 
     /// The velocity in m/s of its material at this place relative to the centre by its rotation alone.
     pub(super) fn turning_velocity(&self, arm: &Vector<D>) -> Vector<D> {
         let [_, turned] = self.velocities_at(arm);
-        let speed = self.rotation.as_ref().map_or(0.0, |(_, motion)| motion.velocity());
+        let speed = self.motions[1].as_ref().map_or(0.0, LoadedMotion::velocity);
         turned.map_or([0.0; D], |velocity| velocity.map(|v| speed * v))
     }
 
     /// Whether a force moves the obstacle.
     pub(super) fn moves(&self) -> bool {
-        self.translation.is_some()
+        self.motions[0].is_some()
     }
 
     /// Whether a moment turns the obstacle.
     pub(super) fn turns(&self) -> bool {
-        self.rotation.is_some()
+        self.motions[1].is_some()
     }
 
     /// Places as seen from the obstacle: after the last step.
@@ -220,8 +196,8 @@ impl<const D: usize> Obstacle<D> {
     }
 
     fn seen(&self, place: &Vector<D>, displacement: impl Fn(&LoadedMotion) -> f64) -> Vector<D> {
-        let Some((direction, motion)) = &self.translation else { return *place };
-        add_scaled(place, -displacement(motion), direction)
+        let Some(motion) = &self.motions[0] else { return *place };
+        add_scaled(place, -displacement(motion), &self.direction)
     }
 
     /// The displacement in m of a point along the normal at `time`, and its gap there, where the obstacle is after the last step, and
@@ -483,7 +459,7 @@ mod tests {
         let velocities = disc.velocities_at(&[0.0, -0.5]).map(|velocity| velocity.expect("both"));
         assert_eq!(velocities, [[0.0, -1.0], [0.5, 0.0]]);
         assert_eq!((disc.velocity_at(&[0.0, -0.5]), disc.turns()), ([-1.5, -1.0], true));
-        let [falling, turning] = disc.motions_mut().map(|motion| motion.expect("both"));
+        let [falling, turning] = disc.motions.each_mut().map(|motion| motion.as_mut().expect("both"));
         for motion in [falling, turning] {
             motion.start(Blend::euler(0.5), 0.5, None);
             motion.set_velocity(2.0);
@@ -491,7 +467,10 @@ mod tests {
         assert_eq!(disc.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
         assert_eq!(disc.seen_before(&[1.0, 0.0]), [1.0, 0.0]);
         disc.commit();
-        assert_eq!(disc.motions().map(|motion| motion.expect("both").converged), [[1.0, 2.0]; 2]);
+        assert_eq!(
+            disc.motions.each_ref().map(|motion| motion.as_ref().expect("both").converged),
+            [[1.0, 2.0]; 2]
+        );
         disc.set_load(&ObstacleLoad { direction: vec![], ..load });
         assert_eq!((disc.seen_after(&[1.0, 0.0]), disc.moves()), ([1.0, 0.0], false));
     }

@@ -26,6 +26,8 @@
 //! At Gauss points, and at edges where smooth laws without friction act, the velocity remains the unknown; these laws must not have
 //! vertical parts.
 
+mod approach;
+mod boundary;
 mod bounds;
 mod closeness;
 mod corners;

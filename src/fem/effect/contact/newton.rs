@@ -144,7 +144,7 @@ impl<const D: usize> Contact<D> {
     /// Adds the change of the contact forces: of the direction last mapped or, where the unknown is the velocity, of the change
     /// `direction` of the velocity.
     pub fn add_derivative(&self, direction: &[f64], forces: &mut [f64]) {
-        self.normal.add_changes(direction, |point| point.change, forces);
+        add_changes(&self.normal.points, direction, |point| point.change, forces);
         if let Some(friction) = &self.friction {
             friction.add_derivative(forces);
         }
@@ -153,7 +153,7 @@ impl<const D: usize> Contact<D> {
     /// Adds the change of the contact forces with the velocity; zero where the graph is vertical.
     pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
         let change = |point: &Point<D>| point.slope * point.free_length * point.along(Newton, direction);
-        self.normal.add_changes(direction, change, forces);
+        add_changes(&self.normal.points, direction, change, forces);
         if let Some(friction) = &self.friction {
             friction.add_slopes(&self.normal.points, direction, forces);
         }
@@ -199,5 +199,24 @@ impl<const D: usize> Contact<D> {
         let mut digest = Xxh3::new();
         numbers.for_each(|number| digest.update(&number.to_le_bytes()));
         digest.digest()
+    }
+}
+
+/// Adds the forces of the changes of the pressures: of these where the unknown is the parameter, and of the change `direction` of the
+/// velocity where it is the velocity.
+#[inline]
+fn add_changes<const D: usize>(
+    points: &[Point<D>],
+    direction: &[f64],
+    of_parameter: impl Fn(&Point<D>) -> f64,
+    forces: &mut [f64],
+) {
+    for point in points {
+        let change = match point.unknown {
+            Unknown::Parameter => of_parameter(point),
+            Unknown::Velocity => point.slope * point.normal_component(Newton, direction),
+            Unknown::Held | Unknown::Stop => continue,
+        };
+        point.add_force(Newton, change, forces);
     }
 }

@@ -421,6 +421,11 @@ impl<const D: usize> Point<D> {
         self.unknown != Unknown::Held || !law.has_vertical_parts()
     }
 
+    /// Whether the obstacle may press on it with a known or unknown pressure.
+    pub(super) fn is_pressed(&self, law: &NormalResponse) -> bool {
+        self.unknown != Unknown::Velocity && self.carries(law) && self.can_touch()
+    }
+
     /// The velocity along the normal that supports prescribe, in m/s: that of the point without its part in the free components.
     pub(super) fn held_velocity(&self, velocity: &[f64]) -> f64 {
         let first = self.numbers[Vectors::Body as usize][..self.count].iter().zip(&self.force);

@@ -51,8 +51,8 @@ impl<const D: usize> Contact<D> {
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
-        if let Some(friction) = &mut self.friction {
-            friction.mark_bare_points(&self.normal.points);
+        for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
+            point.context.is_bare = !self.normal.points[point.at].can_touch();
         }
         if self.normal.law.damping() > 0.0 {
             self.set_depths_before(time_before - step.previous_length)?;

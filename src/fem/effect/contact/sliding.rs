@@ -103,7 +103,7 @@ impl<const D: usize> Contact<D> {
         (displacement, velocity): (&[f64], &[f64]),
     ) -> [Deviation; CONTACT_QUANTITIES] {
         let mut out = [Deviation::default(); CONTACT_QUANTITIES];
-        for (number, motion) in self.obstacle.motions().into_iter().enumerate() {
+        for (number, motion) in self.obstacle.motions.iter().enumerate() {
             let Some(motion) = motion else { continue };
             for (kind, [now, before, earlier, start]) in motion.last_values().into_iter().enumerate() {
                 let error = curvature.error([now, before, earlier]);

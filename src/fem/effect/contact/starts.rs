@@ -18,7 +18,7 @@ impl<const D: usize> Contact<D> {
     /// Adds to nodal forces in N of the body, with ghosts, those with which the force on the obstacle presses it against the points in front
     /// of it, with pressures in proportion to the components of their normals along the force. Collective.
     pub fn add_driving_force(&self, session: &Session, nodal: &mut [f64]) {
-        let [Some(motion), _] = self.obstacle.motions() else { return };
+        let [Some(motion), _] = &self.obstacle.motions else { return };
         let driving = motion.driving;
         let against = |point: &Point<D>| (-driving.signum() * point.along_obstacle).max(0.0);
         let faced = || self.normal.points.iter().filter(|point| point.can_touch());
@@ -32,9 +32,7 @@ impl<const D: usize> Contact<D> {
     /// Sets the normal velocity of the nodal points to the value of `velocity` for their node, in m/s, and the velocity along a
     /// tangent to the same value where there is friction. `nodal` contains velocities at the owned nodes of the body.
     pub fn set_start_velocities(&self, velocity: impl Fn(usize) -> f64, nodal: &mut [f64]) {
-        for point in
-            self.normal.points.iter().filter(|point| !self.normal.needs_ghosts && point.free_length > 0.0)
-        {
+        for point in self.normal.points.iter().filter(|point| point.free_length > 0.0) {
             let target = velocity(point.node()) / point.free_length;
             point.add_along(Body, target - point.along(Body, nodal), nodal);
         }

@@ -81,11 +81,6 @@ impl<const D: usize> TangentialPoint<D> {
         self.count > 0
     }
 
-    /// Whether friction can act: some tangent is left.
-    pub(super) fn has_tangents(&self) -> bool {
-        self.all > 0
-    }
-
     /// `q`, with what supports take up.
     pub(super) fn whole_traction(&self) -> Vector<D> {
         add_scaled(&self.traction, 1.0, &self.held_traction)

@@ -126,7 +126,7 @@ fn keep_tangents_free_of_normals<const D: usize>(
             let others = normals.get(&point.node()).into_iter().flatten();
             others.filter(|(at, _)| *at != own).for_each(|(_, direction)| point.remove_direction(direction));
         }
-        friction.keep_points_with_tangents();
+        friction.points.retain(|point| point.all > 0);
     }
 }
 

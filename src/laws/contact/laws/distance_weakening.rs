@@ -12,7 +12,7 @@
 //! steepest decrease is `k (static - dynamic) / distance p`. In a two-step scheme `s0` is its blend of the last two slips and `k` its length.
 
 use crate::laws::{
-    contact::friction_law::{FrictionBound, FrictionHistory, SlidingContext},
+    contact::friction_law::{FrictionBound, FrictionHistory, SlidingContext, static_below_dynamic},
     law::LawFault,
     step::{Blend, quantity},
 };
@@ -100,11 +100,7 @@ impl FrictionBound for DistanceWeakening {
     }
 
     fn own_faults(&self) -> Vec<LawFault> {
-        if self.at_rest >= self.dynamic {
-            return Vec::new();
-        }
-        let help = format!("it must be at least {}", self.dynamic);
-        vec![LawFault::at_value("static", "the static coefficient is below the dynamic one", help)]
+        static_below_dynamic(self.at_rest, self.dynamic)
     }
 }
 

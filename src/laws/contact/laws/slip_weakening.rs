@@ -3,7 +3,7 @@
 //! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact pressure. Its
 //! steepest decrease is `(static - dynamic) / decay_velocity p`.
 
-use crate::laws::contact::friction_law::{FrictionBound, SlidingContext};
+use crate::laws::contact::friction_law::{FrictionBound, SlidingContext, static_below_dynamic};
 use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,11 +42,7 @@ impl FrictionBound for SlipWeakening {
     }
 
     fn own_faults(&self) -> Vec<LawFault> {
-        if self.at_rest >= self.dynamic {
-            return Vec::new();
-        }
-        let help = format!("it must be at least {}", self.dynamic);
-        vec![LawFault::at_value("static", "the static coefficient is below the dynamic one", help)]
+        static_below_dynamic(self.at_rest, self.dynamic)
     }
 }
 

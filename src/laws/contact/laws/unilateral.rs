@@ -68,7 +68,7 @@ impl Unilateral {
     /// The normal velocity in m/s at which the graph is vertical.
     fn wall(&self, node: NodeContext) -> f64 {
         match self.bound {
-            Bound::Displacement => node.closing_velocity(),
+            Bound::Displacement => -node.penetration / node.step_length,
             Bound::Velocity => 0.0,
         }
     }

@@ -144,7 +144,7 @@ impl StepSolver {
             match solved {
                 Ok(solved) => {
                     // Where only an obstacle moves the body, its forces are those with which the step begins.
-                    let first = self.newton.as_ref().map_or(0.0, |newton| newton.first_residual());
+                    let first = self.newton.as_ref().map_or(0.0, |newton| newton.counts.first);
                     let reference = accuracy.reference.max(first);
                     let residual = if reference > 0.0 { solved.residual / reference } else { 0.0 };
                     return Ok(StepOutcome { residual, ..solved });
@@ -383,7 +383,9 @@ impl StepSolver {
             let square = body
                 .contacts
                 .iter()
-                .map(|contact| contact.normal.square_of_closing_forces(contact.reference.resistance[0]))
+                .map(|contact| {
+                    contact.normal.approach().square_of_closing_forces(contact.reference.resistance[0])
+                })
                 .sum();
             norm = session.sum([square])[0].sqrt();
             *scale = norm;
@@ -407,8 +409,8 @@ impl StepSolver {
         // The forces that drive obstacles are among those of the step.
         let mut driving = 0.0;
         for contact in &mut body.contacts {
-            let [along, _] = contact.obstacle.motions();
-            let own = along.map_or(0.0, |motion| motion.driving.abs());
+            let [along, _] = &contact.obstacle.motions;
+            let own = along.as_ref().map_or(0.0, |motion| motion.driving.abs());
             contact.reference.forces = total.max(own);
             driving = larger(driving, own);
         }
