@@ -85,6 +85,9 @@ pub struct Contribution<const D: usize> {
     /// The sum over the corners c of quadratic triangles, which carry no law, of int psi_a phi_c in m^2; otherwise 0. With `weight` it is
     /// int psi_a: the part of the surface for which the node stands, which may be negative where the facet is covered in part.
     pub corners: f64,
+    /// The integrals over the covered part of the facet of its outward unit normal and of those of the master facets, in the undeformed
+    /// bodies, in m^(D-1).
+    pub normals: [Vector<D>; 2],
     /// For each master node b, in ascending order, int psi_a phi_b in m^(D-1), with phi_b at the place on the
     /// master facet that is projected. The corners c of quadratic triangles, which carry no law, are included
     /// with -int psi_a phi_c. All sum to `weight`.
@@ -372,6 +375,7 @@ impl<'a, const D: usize> Slave<'a, D> {
             whole: self.measure * facet.share(i),
             gap: 0.0,
             corners: 0.0,
+            normals: [[0.0; D]; 2],
             masters: Vec::new(),
         }));
         let mut covered: f64 = parts.iter().map(|part| part.measure).sum();
@@ -391,7 +395,13 @@ impl<'a, const D: usize> Slave<'a, D> {
         let basis = Basis::new(parts, &mut samples, (law.len(), covered));
         let own = self.own_products(&basis, &samples, covered);
         let Some(duals) = self.duals(&basis, &own, covered) else { return };
+        let measure: f64 = parts.iter().map(|part| part.measure).sum();
+        let of_masters = parts.iter().fold([0.0; D], |sum, part| {
+            std::array::from_fn(|i| sum[i] + part.measure * part.master.undeformed[i])
+        });
+        let normals = [facet.undeformed.map(|n| measure * n), of_masters];
         let result = &mut result[first..];
+        result.iter_mut().for_each(|contribution| contribution.normals = normals);
         for (contribution, (dual, m)) in result.iter_mut().zip(duals.iter().zip(law.clone())) {
             contribution.weight = own[0][m] * covered.sqrt();
             let corners = (0..law.start).map(|c| (facet.nodes[c], -integral(dual, &own, c)));
