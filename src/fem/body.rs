@@ -14,9 +14,9 @@ use crate::{
             Contact, Curvature, ELASTIC, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form,
             Heat, History, HistoryStore, KINETIC, Load, LoadedMotion, Moment, NUMERICAL, Outcome,
             PeakSquares, Peaks, Phases, Quantity, RedistributedMass, STORED_IN_CONTACT, Step, StressError,
-            SupportMotion, SurfaceEffect, SurfaceForce, Tangents, Term, VISCOUS,
+            SupportMotion, SurfaceEffect, SurfaceForce, Tangents, Term, Touch, VISCOUS,
         },
-        pairs::{Pair, shares},
+        pairs::{Pair, pair_of, shares},
         space::{
             Batch, Cell, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, cell_rule, facet_points,
         },
@@ -286,11 +286,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         for pair in self.pairs.iter().filter(|pair| pair.slides) {
             let contact = &self.contacts[pair.contact];
             let mut least = f64::INFINITY;
-            // Largest motions in either direction of each axis, of nodes that face nothing and of the other body.
+            // Largest motions in either direction of axes that turn with the bodies, of nodes that face nothing and of the other body.
             let mut far = [[f64::NEG_INFINITY; 4]; 3];
             let mut add = |side: usize, node: usize| {
-                for (axis, far) in far.iter_mut().enumerate().take(D) {
-                    let moved = displacement[node * D + axis] - paired[node * D + axis];
+                let moved = std::array::from_fn(|i| displacement[node * D + i] - paired[node * D + i]);
+                for (axis, far) in pair.axes.iter().zip(&mut far) {
+                    let moved = dot(axis, &moved);
                     far[side] = larger(far[side], -moved);
                     far[side + 1] = larger(far[side + 1], moved);
                 }
@@ -319,18 +320,6 @@ impl<const D: usize, const S: usize> Body<D, S> {
         session.total(nodes.filter(|node| !node.masters.is_empty()).count())
     }
 
-    /// Whether pairs were formed at another displacement than this one. Collective.
-    pub fn is_paired_elsewhere(
-        &self,
-        session: &Session,
-        displacement: &DistributedVector,
-    ) -> Result<bool, Agreed> {
-        let Some(paired) = &self.paired_displacement else { return Ok(false) };
-        let [paired, displacement] = [paired, displacement].map(DistributedVector::owned);
-        let differ = *session.agree(paired)? != *session.agree(displacement)?;
-        Ok(session.total(usize::from(differ)) > 0)
-    }
-
     /// Finds what the nodes of pairs face that slide along each other, at this displacement with ghosts: anew, because they have slid, or
     /// for the first time. Collective.
     pub fn form_pairs(
@@ -343,6 +332,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
             session.agree(paired.copy_from(displacement).and_then(|()| paired.update_ghosts()))?;
         }
         let displacement = session.agree(displacement.local())?;
+        // Without mass nothing is thrown.
+        let touches = if anew && self.has_form(Form::Mass) {
+            Some(session.agree(self.touches(&displacement))?)
+        } else {
+            None
+        };
         let moved = self.mesh.nodes.iter().zip(displacement.chunks_exact(D));
         let places: Vec<Vector<D>> =
             moved.map(|(place, moved)| std::array::from_fn(|i| place[i] + moved[i])).collect();
@@ -352,13 +347,40 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         self.coupling = Some(Coupling::new(session, &self.mesh, &shares(&self.mesh, &pairs), &self.held)?);
         let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, &displacement);
-        // Without mass nothing is thrown.
-        let keeps_depth = anew && self.has_form(Form::Mass);
         for pair in pairs.iter().filter(|pair| pair.slides) {
-            session.agree(self.contacts[pair.contact].face(&pair.nodes, &seen, keeps_depth))?;
+            let touches = touches.as_ref().map(|touches| &touches[pair.contact][..]);
+            session.agree(self.contacts[pair.contact].face(&pair.nodes, &self.held, &seen, touches))?;
         }
         self.pairs = pairs;
         Ok(())
+    }
+
+    /// The planes that the nodes owned here face on bodies along which they slide, `D + 1` values each: the normal, of length 0 where there
+    /// is none, and the distance. None if no bodies slide.
+    pub fn faced_planes(&self) -> Option<Vec<f64>> {
+        self.paired_displacement.as_ref()?;
+        let mut all = vec![0.0; (D + 1) * self.mesh.owned];
+        for contact in self.pairs.iter().filter(|pair| pair.slides).map(|pair| &self.contacts[pair.contact]) {
+            contact.normal.write_planes(&mut all);
+        }
+        Some(all)
+    }
+
+    /// Lets nodes face such planes.
+    pub fn face_planes(&mut self, planes: &[f64]) {
+        for pair in self.pairs.iter().filter(|pair| pair.slides) {
+            self.contacts[pair.contact].face_planes(planes, &self.held);
+        }
+    }
+
+    /// How the points of each contact stand to bodies along which they slide, at this displacement with ghosts.
+    fn touches(&self, displacement: &[f64]) -> Result<Vec<Vec<Touch<D>>>> {
+        let seen = self.seen_by_contacts(displacement);
+        let slides = |contact: usize| pair_of(&self.pairs, contact).is_some_and(|pair| pair.slides);
+        let of_contact = |(number, contact): (usize, &Contact<D>)| {
+            if slides(number) { contact.touches(&seen) } else { Ok(Vec::new()) }
+        };
+        self.contacts.iter().enumerate().map(of_contact).collect()
     }
 
     /// Adds the forces of the converged state at the start of a step to `forces` (with ghosts), and gives the energies that are known

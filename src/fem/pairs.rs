@@ -7,7 +7,7 @@ use crate::{
         mortar::{Contribution, Facet, contributions},
         surface_points,
     },
-    linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, norm, outside},
     mesh::Mesh,
     parallel::{
         agreement::Agreed,
@@ -25,7 +25,8 @@ use std::{
 pub struct PairedNode<const D: usize> {
     /// Local number, owned here.
     pub node: u32,
-    /// Outward unit normal of the part of the surface around it that faces the other side.
+    /// Outward unit normal of the part of the surface around it that faces the other side; of surfaces that slide the direction in which it
+    /// touches that side.
     pub normal: Vector<D>,
     /// The part of the surface that the node stands for in m^(D-1).
     pub weight: f64,
@@ -87,6 +88,8 @@ pub struct Pair<const D: usize> {
     /// Whether what nodes face is found anew as bodies slide. All nodes of the slave side carry the law then; those that face nothing are at
     /// an infinite distance.
     pub slides: bool,
+    /// Axes that turn with the bodies, the same on all ranks: with these what happens to them does not depend on how they lie in space.
+    pub axes: [Vector<D>; D],
     /// Whether the undeformed surfaces count as touching wherever they face each other.
     pub is_closed: bool,
     /// The nodes of the slave side, by global numbers, whose part of the surface others of their facets stand for: they belong to other
@@ -101,7 +104,7 @@ impl<const D: usize> Pair<D> {
     pub fn of(contact: usize, [on, against]: [Vec<u32>; 2]) -> Self {
         let (slides, is_closed) = (false, false);
         let (exchange, lawless, nodes) = (None, BTreeSet::new(), Vec::new());
-        Self { contact, on, against, exchange, slides, is_closed, lawless, nodes }
+        Self { contact, on, against, exchange, slides, axes: axes_of_space(), is_closed, lawless, nodes }
     }
 
     /// The pair with its sides exchanged, before it is formed, for this reason if its slave side becomes `against` in the job.
@@ -168,6 +171,7 @@ impl<const D: usize> Pair<D> {
             self.nodes = found;
             return Ok(());
         }
+        self.axes = axes_along_first(session, mesh, places, &self.against)?;
         let mut facing: BTreeMap<u32, PairedNode<D>> =
             found.into_iter().map(|node| (node.node, node)).collect();
         let mut all: BTreeMap<u32, SurfacePoint<D>> = BTreeMap::new();
@@ -180,13 +184,11 @@ impl<const D: usize> Pair<D> {
                 *kept = point;
             }
         }
-        // The normal remains that of the undeformed body.
-        let node_at = |SurfacePoint { node, normal, weight }: SurfacePoint<D>| match facing.remove(&node) {
-            Some(found) => PairedNode { normal, ..found },
-            None => {
+        let node_at = |SurfacePoint { node, normal, weight }: SurfacePoint<D>| {
+            facing.remove(&node).unwrap_or_else(|| {
                 let (distance, masters, neighbours, stretch) = (f64::INFINITY, Vec::new(), Vec::new(), 1.0);
                 PairedNode { node, normal, weight, distance, masters, neighbours, stretch }
-            }
+            })
         };
         self.nodes = all.into_values().map(node_at).collect();
         Ok(())
@@ -217,7 +219,7 @@ impl<const D: usize> Pair<D> {
                 covered.filter(|(_, sum)| !sum.carries_a_law()).map(|(node, _)| *node).collect();
             let further = gather(session.world(), &bearing)?;
             if further.is_empty() {
-                return Ok(paired(mesh, sums, &at));
+                return Ok(paired(mesh, sums, &at, self.slides));
             }
             lawless.extend(further);
         }
@@ -301,7 +303,8 @@ fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) ->
     let of_corners = mesh.facets[facet as usize];
     let nodes = mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect();
     let turns = of_corners.map(|node| mesh.turn(&mesh.nodes[node as usize]));
-    Facet { turns, ..Facet::new(nodes, of_corners.map(|node| places[node as usize])) }
+    let undeformed = Facet::new(Vec::new(), mesh.facet_corners(facet)).normal;
+    Facet { turns, undeformed, ..Facet::new(nodes, of_corners.map(|node| places[node as usize])) }
 }
 
 /// These facets of all ranks. Collective.
@@ -314,11 +317,60 @@ fn gather_facets<const D: usize>(
     let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
     let nodes: Vec<u32> = own.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
     let places: Vec<f64> = own.iter().flat_map(|facet| facet.corners.as_flattened()).copied().collect();
+    let normals: Vec<f64> = own.iter().flat_map(|facet| facet.undeformed).collect();
     let (nodes, places) = (gather(session.world(), &nodes)?, gather(session.world(), &places)?);
+    let normals = gather(session.world(), &normals)?;
     let per_facet = if mesh.order() == 2 { D + D * (D - 1) / 2 } else { D };
     let corners = places.chunks_exact(D * D);
     let corners = corners.map(|all| std::array::from_fn(|a| std::array::from_fn(|i| all[a * D + i])));
-    Ok(nodes.chunks_exact(per_facet).zip(corners).map(|(nodes, at)| Facet::new(nodes.to_vec(), at)).collect())
+    let facets = nodes.chunks_exact(per_facet).zip(corners.zip(normals.as_chunks().0));
+    let facet = |(nodes, (at, undeformed)): (&[u32], (_, &Vector<D>))| {
+        let undeformed = *undeformed;
+        Facet { undeformed, ..Facet::new(nodes.to_vec(), at) }
+    };
+    Ok(facets.map(facet).collect())
+}
+
+/// Axes of space.
+fn axes_of_space<const D: usize>() -> [Vector<D>; D] {
+    std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))))
+}
+
+/// Axes along the first of these facets of all ranks by the numbers of its nodes in the whole mesh, with the local nodes at `places` in m.
+/// Collective.
+fn axes_along_first<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    places: &[Vector<D>],
+    facets: &[u32],
+) -> Result<[Vector<D>; D], Agreed> {
+    let sorted = |facet: &u32| {
+        let mut corners = mesh.facets[*facet as usize].map(|node| (mesh.node_ids[node as usize], node));
+        corners.sort_unstable();
+        corners
+    };
+    let first = facets.iter().map(sorted).min();
+    let record = first.iter().flatten().flat_map(|(id, node)| {
+        let place = places[*node as usize];
+        std::iter::once(f64::from(*id)).chain(place)
+    });
+    let all = gather(session.world(), &record.collect::<Vec<f64>>())?;
+    let ids = |record: &&[f64]| std::array::from_fn::<_, D, _>(|i| record[i * (D + 1)] as u64);
+    let Some(record) = all.chunks_exact(D * (D + 1)).min_by_key(ids) else { return Ok(axes_of_space()) };
+    let corners: [Vector<D>; D] =
+        std::array::from_fn(|i| std::array::from_fn(|j| record[i * (D + 1) + 1 + j]));
+    let mut axes = [[0.0; D]; D];
+    axes[D - 1] = Facet::new(Vec::new(), corners).normal;
+    for k in 0..D - 1 {
+        let side = add_scaled(&corners[k + 1], -1.0, &corners[0]);
+        let size = norm(&side);
+        let known: Vec<Vector<D>> = axes[..k].iter().chain(&axes[D - 1..]).copied().collect();
+        let Some(axis) = outside(&side.map(|x| x / size), &known, LEAST_SPREAD) else {
+            return Ok(axes_of_space());
+        };
+        axes[k] = axis;
+    }
+    Ok(axes)
 }
 
 /// The places in m of the nodes of these facets of all ranks, by global numbers. Collective.
@@ -359,6 +411,8 @@ struct Sum {
     gap: f64,
     passed: f64,
     normal: [f64; 3],
+    covered: f64,
+    normals: [[f64; 3]; 2],
     masters: BTreeMap<u32, f64>,
     neighbours: BTreeSet<u32>,
 }
@@ -369,7 +423,24 @@ impl Sum {
         let Self { weight, whole, passed, .. } = *self;
         weight > LEAST_SHARE * whole && weight + passed > LEAST_STRETCH * weight
     }
+
+    /// The direction in which a node of a surface that slides touches the other side: at right angles to the one of the two surfaces that is
+    /// flat there in the undeformed bodies. Thus a corner or a rounded edge touches a plate along the normal of the plate, whichever of them has the law. Between
+    /// curved surfaces the normal of each has the more weight the more that of the other one varies; of two flat ones that are inclined, an
+    /// edge beside them touches first, and the node has the normal of what it faces.
+    fn direction<const D: usize>(&self) -> Vector<D> {
+        let [own, faced] = self.normals.map(|sum| std::array::from_fn::<f64, D, _>(|i| sum[i]));
+        let [sizes, others] = [norm(&own), norm(&faced)];
+        let spread = |size: f64| (1.0 - size / self.covered).max(0.0);
+        let sum =
+            add_scaled(&own.map(|n| spread(others) / sizes * n), -(spread(sizes) + FLAT) / others, &faced);
+        let length = norm(&sum);
+        sum.map(|n| n / length)
+    }
 }
+
+/// How much the unit normals of a surface may vary, as one less the length of their mean, for it to count as flat (1.6 degrees).
+const FLAT: f64 = 1e-4;
 
 /// The sums of the contributions to the nodes of this rank, by global numbers, those of `lawless` left out, from those of the facets of each
 /// rank with the nodes of these facets. Collective.
@@ -385,10 +456,12 @@ fn sum_of_contributions<const D: usize>(
     for of_facet in all.chunks_exact(per_facet) {
         let (of_facet, passed) = pass_on(of_facet, lawless);
         for contribution in of_facet.iter().filter(|one| !lawless.contains(&one.node)) {
-            let Contribution { node, normal, weight, whole, gap, corners, masters } = contribution;
+            let Contribution { node, normal, weight, whole, gap, corners, normals, masters } = contribution;
             let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*node)];
             list.extend([f64::from(*node), *weight, *whole, *gap, passed + corners]);
             list.extend(normal.map(|n| weight * n));
+            list.push(norm(&normals[0]));
+            list.extend(normals.as_flattened());
             list.push(masters.len() as f64);
             let is_own = |master: &u32| f64::from(u8::from(own.contains(master)));
             list.extend(
@@ -406,8 +479,13 @@ fn sum_of_contributions<const D: usize>(
         sum.gap += gap;
         sum.passed += passed;
         (0..D).for_each(|i| sum.normal[i] += after[i]);
-        let count = after[D] as usize;
-        let (masters, next) = after[D + 1..].split_at(3 * count);
+        sum.covered += after[D];
+        for (sum, normal) in sum.normals.iter_mut().zip(after[D + 1..].chunks_exact(D)) {
+            (0..D).for_each(|i| sum[i] += normal[i]);
+        }
+        let after = &after[3 * D + 1..];
+        let count = after[0] as usize;
+        let (masters, next) = after[1..].split_at(3 * count);
         for &[master, value, is_own] in masters.as_chunks().0 {
             *sum.masters.entry(master as u32).or_default() += value;
             sum.neighbours.extend((is_own != 0.0).then_some(master as u32));
@@ -417,11 +495,12 @@ fn sum_of_contributions<const D: usize>(
     Ok(sums)
 }
 
-/// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m.
+/// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m, and whether they slide.
 fn paired<const D: usize>(
     mesh: &Mesh<D>,
     sums: BTreeMap<u32, Sum>,
     places: &BTreeMap<u32, Vector<D>>,
+    slides: bool,
 ) -> Vec<PairedNode<D>> {
     sums.into_iter()
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
@@ -429,15 +508,22 @@ fn paired<const D: usize>(
         .map(|(node, sum)| {
             let normal: Vector<D> = std::array::from_fn(|i| sum.normal[i]);
             let length = norm(&normal);
-            let normal = normal.map(|n| n / length);
+            let normal = if slides { sum.direction() } else { normal.map(|n| n / length) };
+            let mut distance = sum.gap / sum.weight;
             let shares = sum.masters.into_iter().map(|(master, value)| (master, value / sum.weight));
             let mut masters: Vec<(u32, f64)> = shares.collect();
             face_along_normal(&mut masters, &sum.neighbours, (&places[&node], &normal), places);
+            if slides {
+                let ways = masters
+                    .iter()
+                    .map(|(master, share)| (share, add_scaled(&places[master], -1.0, &places[&node])));
+                distance = ways.map(|(share, way)| share * dot(&way, &normal)).sum();
+            }
             PairedNode {
                 node: mesh.owned_node(node) as u32,
                 normal,
                 weight: sum.weight,
-                distance: sum.gap / sum.weight,
+                distance,
                 masters,
                 neighbours: sum.neighbours.into_iter().collect(),
                 stretch: 1.0 + sum.passed / sum.weight,
@@ -494,6 +580,25 @@ fn face_along_normal<const D: usize>(
 mod tests {
     use super::*;
 
+    /// A corner of 90 degrees, which is turned by 20 degrees, on a plate, and a plate on the corner.
+    #[test]
+    fn a_node_touches_at_right_angles_to_the_flat_one_of_two_surfaces() {
+        let (sine, cosine) = 20.0f64.to_radians().sin_cos();
+        let of = |own: Vector<2>, faced: Vector<2>| {
+            let normals = [own, faced].map(|[x, y]| [x, y, 0.0]);
+            Sum { covered: 2.0, normals, ..Sum::default() }.direction::<2>()
+        };
+        let [corner, plate] = [[sine - cosine, -sine - cosine], [0.0, -2.0]];
+        let opposite = |[x, y]: Vector<2>| [-x, -y];
+        for [own, faced] in [[corner, opposite(plate)], [plate, opposite(corner)], [plate, opposite(plate)]] {
+            let [x, y] = of(own, faced);
+            assert!(x.abs() < 1e-3 && (y + 1.0).abs() < 1e-6, "{own:?} on {faced:?}: {x}, {y}");
+        }
+        // Flat ones that are inclined: a corner beside them touches.
+        let [x, y] = of([2.0 * sine, -2.0 * cosine], opposite(plate));
+        assert!(x.abs() < 1e-12 && (y + 1.0).abs() < 1e-12, "{x}, {y}");
+    }
+
     /// What a segment of 1 m between two slave nodes has that faces the whole of another one at a distance of 3 m.
     fn segment() -> [Contribution<2>; 2] {
         let of = |node: u32, master: u32| Contribution {
@@ -503,6 +608,7 @@ mod tests {
             whole: 0.5,
             gap: 1.5,
             corners: 0.0,
+            normals: [[0.0, 1.0], [0.0, -1.0]],
             masters: vec![(master, 0.5)],
         };
         [of(0, 10), of(1, 11)]

@@ -178,6 +178,177 @@ fn a_block_that_slides_over_the_end_of_a_plate_gains_no_energy_by_short_steps() 
     assert!(case.results().text("history.csv") == all, "in its middle");
 }
 
+/// Writes triangles of several bodies, with the sides of these names on their boundaries.
+fn write_triangles(path: &Path, nodes: &[[f64; 2]], sides: &[(&str, Vec<[usize; 2]>)], cells: &[[usize; 3]]) {
+    let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n", sides.len() + 1);
+    let mut elements = Vec::new();
+    for (number, (name, facets)) in sides.iter().enumerate() {
+        let group = number + 1;
+        text += &format!("1 {group} \"{name}\"\n");
+        elements.extend(facets.iter().map(|[a, b]| format!("1 2 {group} {group} {} {}", a + 1, b + 1)));
+    }
+    let group = sides.len() + 1;
+    elements
+        .extend(cells.iter().map(|[a, b, c]| format!("2 2 {group} {group} {} {} {}", a + 1, b + 1, c + 1)));
+    text += &format!("2 {group} \"bodies\"\n$EndPhysicalNames\n$Nodes\n{}\n", nodes.len());
+    nodes.iter().enumerate().for_each(|(at, [x, y])| text += &format!("{} {x:?} {y:?} 0\n", at + 1));
+    text += &format!("$EndNodes\n$Elements\n{}\n", elements.len());
+    elements.iter().enumerate().for_each(|(at, element)| text += &format!("{} {element}\n", at + 1));
+    std::fs::write(path, text + "$EndElements\n").expect("written");
+}
+
+/// A square with its lower corner 1 mm above a plate, turned by this angle, which falls on it at 1 m/s and moves along it at this speed.
+fn falling_on_a_corner(degrees: f64, speed: f64) -> Case {
+    let case = Case::written_as(&format!(
+        "mesh.file = 'corner.msh'
+         material = {{ hypothesis = 'plane_strain', density = 1000.0, elasticity = {{ youngs_modulus = 1e8, poisson_ratio = 0.3 }} }}
+         support = [{{ on = ['base'], fix = 'all' }}]
+         initial.velocity = ['{speed:?}*(y>0.0005)', '-1.0*(y>0.0005)']
+         contact = [{{ on = ['skin'], against = ['top'], sliding = 'finite', normal.unilateral = {{}} }}]
+         time = {{ end = 0.012, step = 2e-4, scheme = 'implicit_euler' }}"
+    ));
+    let (sine, cosine) = degrees.to_radians().sin_cos();
+    let (mut nodes, mut cells) = (Vec::new(), Vec::new());
+    let mut sides = vec![("skin", Vec::new()), ("top", Vec::new()), ("base", Vec::new())];
+    for (nx, ny, is_plate) in [(5, 5, false), (14, 3, true)] {
+        let first = nodes.len();
+        let at = |i: usize, j: usize| first + i + (nx + 1) * j;
+        for (j, i) in (0..=ny).flat_map(|j| (0..=nx).map(move |i| (j, i))) {
+            let [x, y] = [(i, nx), (j, ny)].map(|(at, of)| at as f64 / of as f64);
+            let turned = [0.2 * (cosine * x - sine * y), 0.001 + 0.2 * (sine * x + cosine * y)];
+            nodes.push(if is_plate { [0.5 * x - 0.22, 0.1 * y - 0.1] } else { turned });
+        }
+        for (i, j) in (0..nx).flat_map(|i| (0..ny).map(move |j| (i, j))) {
+            cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        for i in 0..nx {
+            sides[if is_plate { 2 } else { 0 }].1.push([at(i, 0), at(i + 1, 0)]);
+            sides[usize::from(is_plate)].1.push([at(i, ny), at(i + 1, ny)]);
+        }
+        for j in (0..ny).filter(|_| !is_plate) {
+            sides[0].1.extend([[at(0, j), at(0, j + 1)], [at(nx, j), at(nx, j + 1)]]);
+        }
+    }
+    write_triangles(&case.folder().join("corner.msh"), &nodes, &sides, &cells);
+    case
+}
+
+/// The forces of a contact on its body in each step, along x and y.
+fn forces_of(results: &Results, contact: &str) -> Vec<[f64; 2]> {
+    let table = results.table("resultants.csv").only("source", contact);
+    let [along, across] = ["force_x", "force_y"].map(|column| table.numbers(column));
+    along.into_iter().zip(across).map(|(along, across)| [along, across]).collect()
+}
+
+/// The least dissipation of contact until the end of any step.
+fn least_dissipation(results: &Results) -> f64 {
+    results.table("history.csv").numbers("contact_dissipation").into_iter().fold(0.0, f64::min)
+}
+
+/// The corner touches along the normal of the plate: along its own mean normal it would be pushed to the side, and as it slides the normals of
+/// its facets would lift it without end (4 kJ of 80 J).
+#[test]
+fn a_corner_that_slides_on_a_flat_body_is_pressed_at_right_angles_to_it_and_gains_no_energy() {
+    let mass = 40.0;
+    for (degrees, speed) in [(45.0, 0.0), (20.0, 2.0), (20.0, -2.0), (45.0, 2.0)] {
+        for (scheme, step) in [("implicit_euler", "2e-4"), ("implicit_euler", "5e-5"), ("bdf2", "2e-4")] {
+            let case = falling_on_a_corner(degrees, speed).set("time.scheme", &format!("'{scheme}'"));
+            let case = case.set("time.step", step);
+            let results = case.run(1);
+            let energy = 0.5 * mass * (1.0 + speed * speed);
+            let told = format!("{degrees} degrees, {speed} m/s, {scheme}, {step} s");
+            assert!(least_dissipation(&results) > -1e-4 * energy, "{told}: {}", least_dissipation(&results));
+            let forces = forces_of(&results, "contact skin");
+            let [along, across] = [0, 1].map(|axis| forces.iter().map(|force| force[axis]).sum::<f64>());
+            assert!(across > 0.0 && along.abs() < 0.01 * across, "{told}: {along} N beside {across} N");
+            let kinetic = results.table("history.csv").numbers("kinetic_energy");
+            assert!(kinetic.iter().all(|kinetic| *kinetic < 1.001 * energy), "{told}: {kinetic:?}");
+        }
+    }
+    let rubbing =
+        falling_on_a_corner(45.0, 2.0).set("contact.0.friction", "{ coulomb = { coefficient = 0.2 } }");
+    for ranks in [1, 2] {
+        let forces = forces_of(&rubbing.run(ranks), "contact skin");
+        let [along, across] = [0, 1].map(|axis| forces.iter().map(|force| force[axis]).sum::<f64>());
+        assert!((along / across + 0.2).abs() < 0.005, "{along} N beside {across} N");
+    }
+}
+
+/// Two discs that meet obliquely, in a scene turned by this angle.
+fn discs(degrees: f64) -> Case {
+    let (sine, cosine) = degrees.to_radians().sin_cos();
+    let upper = format!("(({cosine:?}*y - {sine:?}*x) > 0.455)");
+    let case = Case::written_as(&format!(
+        "mesh.file = 'discs.msh'
+         material = {{ hypothesis = 'plane_strain', density = 1000.0, elasticity = {{ youngs_modulus = 1e8, poisson_ratio = 0.3 }} }}
+         initial.velocity = ['{:?}*{upper}', '{:?}*{upper}']
+         contact = [{{ on = ['upper'], against = ['lower'], side = 'on', sliding = 'finite', normal.unilateral = {{}} }}]
+         time = {{ end = 0.01, step = 2e-4, scheme = 'implicit_euler' }}",
+        5.0 * sine,
+        -5.0 * cosine
+    ));
+    let (mut nodes, mut cells) = (Vec::new(), Vec::new());
+    let mut sides = vec![("upper", Vec::new()), ("lower", Vec::new())];
+    // At 25 degrees to the direction in which they meet.
+    for (body, (around, [x, y])) in [(36, [0.4235, 0.9083]), (29, [0.0, 0.0])].into_iter().enumerate() {
+        let (first, rings) = (nodes.len(), 5);
+        let at = |ring: usize, number: usize| {
+            if ring == 0 { first } else { first + 1 + around * (ring - 1) + number % around }
+        };
+        let mut push = |x: f64, y: f64| nodes.push([cosine * x - sine * y, sine * x + cosine * y]);
+        push(x, y);
+        for (ring, number) in (1..=rings).flat_map(|ring| (0..around).map(move |number| (ring, number))) {
+            let (radius, angle) = (0.1 * ring as f64, std::f64::consts::TAU * number as f64 / around as f64);
+            push(x + radius * angle.cos(), y + radius * angle.sin());
+        }
+        for number in 0..around {
+            cells.push([first, at(1, number), at(1, number + 1)]);
+            for ring in 1..rings {
+                cells.push([at(ring, number), at(ring + 1, number), at(ring + 1, number + 1)]);
+                cells.push([at(ring, number), at(ring + 1, number + 1), at(ring, number + 1)]);
+            }
+            sides[body].1.push([at(rings, number), at(rings, number + 1)]);
+        }
+    }
+    write_triangles(&case.folder().join("discs.msh"), &nodes, &sides, &cells);
+    case
+}
+
+/// What nodes of the discs face jumps when it is found anew. Removed within one step, the jumps would make forces that grow as steps become
+/// shorter, and energy.
+#[test]
+fn forces_between_curved_bodies_that_slide_are_continuous_whatever_the_step_and_the_axes() {
+    let run = |step: &str, degrees: f64, ranks: usize| {
+        let case = discs(degrees).set("time.step", step);
+        let results = case.run(ranks);
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let turned = |[x, y]: [f64; 2]| [cosine * x + sine * y, cosine * y - sine * x];
+        let forces = forces_of(&results, "contact upper").into_iter().map(turned).collect::<Vec<_>>();
+        (least_dissipation(&results), forces)
+    };
+    let size = |[x, y]: [f64; 2]| x.hypot(y);
+    let largest = |forces: &[[f64; 2]]| forces.iter().map(|force| size(*force)).fold(0.0, f64::max);
+    for step in ["2e-4", "5e-5"] {
+        let (least, forces) = run(step, 0.0, 1);
+        assert!(least > -1e-6, "{step} s: {least} J");
+        // Without the impacts of the first nodes.
+        let first = (3e-3 / step.parse::<f64>().expect("a number")) as usize;
+        let pairs = forces.windows(2).skip(first);
+        let jumps = pairs.map(|pair| size([pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]]));
+        let jump = jumps.fold(0.0, f64::max) / largest(&forces);
+        assert!(jump < 0.1, "{step} s: the force jumps by {jump} of the largest");
+    }
+    let (_, straight) = run("2e-4", 0.0, 1);
+    for (degrees, ranks) in [(30.0, 1), (137.0, 2)] {
+        let (_, turned) = run("2e-4", degrees, ranks);
+        for (step, (one, other)) in straight.iter().zip(&turned).enumerate() {
+            let difference = size([one[0] - other[0], one[1] - other[1]]) / largest(&straight);
+            assert!(difference < 1e-8, "{degrees} degrees, step {step}: {difference:e}");
+        }
+    }
+}
+
 /// All nodes of both sides that supports move along the boundary, those at its ends, have a sliding velocity that is relative.
 #[test]
 fn bodies_that_supports_move_along_their_contact_rub_by_their_relative_velocity() {

@@ -31,6 +31,8 @@ const PREVIOUS_DISPLACEMENT: &str = "previous_displacement";
 const TRACTION: &str = "contact_traction";
 /// The displacement from which pairs of bodies that slide were formed.
 const PAIRED: &str = "paired_displacement";
+/// The planes that the nodes of these pairs face.
+const PLANES: &str = "faced_planes";
 /// The displacement from which outputs and supports count.
 const ORIGIN: &str = "displacement_origin";
 /// Version of the format; increased when older files can no longer be read.
@@ -197,6 +199,9 @@ pub fn save<const D: usize, const S: usize>(
     }
     let mut tables: Vec<IdTable> =
         owned.iter().map(|(name, values)| IdTable { name, set: SETS[NODES], width: D, values }).collect();
+    let planes = body.faced_planes();
+    let table = |values| IdTable { name: PLANES, set: SETS[NODES], width: D + 1, values };
+    tables.extend(planes.as_deref().map(table));
     let of_cells: Vec<History> = body.all_cell_histories().collect();
     let of_nodes: Vec<History> = body.all_node_histories().collect();
     for (set, histories) in SETS.into_iter().zip([&of_cells, &of_nodes]) {
@@ -234,8 +239,8 @@ pub fn restore<const D: usize, const S: usize>(
     if body.paired_displacement.is_some() {
         let mut paired = state.displacement.like()?;
         saved.fill::<D>(PAIRED, &mut paired)?;
-        let anew = body.is_paired_elsewhere(session, &paired)?;
-        body.form_pairs(session, &paired, anew)?;
+        body.form_pairs(session, &paired, false)?;
+        saved.face_planes(body)?;
     }
     for (at, kept) in kept_by(body).into_iter().enumerate() {
         for (quantity, moment, width) in kept {
@@ -299,18 +304,21 @@ pub fn transfer<const D: usize, const S: usize>(
     }
     if body.paired_displacement.is_some() {
         // What was in contact stays paired as it was: under small sliding without any displacement.
-        let (mut paired, mut anew) = (state.displacement.like()?, false);
-        if surfaces_in_contact(&header.physics) != surfaces_in_contact(physics) {
+        let mut paired = state.displacement.like()?;
+        let are_same = surfaces_in_contact(&header.physics) == surfaces_in_contact(physics);
+        if !are_same {
             paired.copy_from(&state.displacement)?;
             paired.update_ghosts()?;
         } else if saved.has(PAIRED) {
             saved.fill::<D>(PAIRED, &mut paired)?;
-            anew = body.is_paired_elsewhere(session, &paired)?;
         }
-        body.form_pairs(session, &paired, anew)?;
+        body.form_pairs(session, &paired, false)?;
+        if are_same && saved.has(PAIRED) {
+            saved.face_planes(body)?;
+        }
     }
     saved.count_from_origin(body, state)?;
-    let mut known: Vec<&str> = vec![DISPLACEMENT, VELOCITY, PAIRED, ORIGIN];
+    let mut known: Vec<&str> = vec![DISPLACEMENT, VELOCITY, PAIRED, PLANES, ORIGIN];
     if let Some(traction) = &mut state.contact_traction
         && saved.has(TRACTION)
     {
@@ -427,6 +435,14 @@ impl<'a> Saved<'a> {
 
     fn has(&self, field: &str) -> bool {
         self.tables[NODES].iter().any(|name| name == field)
+    }
+
+    /// Lets nodes of pairs that slide face the saved planes, of files that have them.
+    fn face_planes<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
+        if self.has(PLANES) {
+            body.face_planes(&self.rows[NODES].read(PLANES, D + 1)?);
+        }
+        Ok(())
     }
 
     /// Reads a nodal field.

@@ -33,7 +33,8 @@ pub enum Sliding {
     #[default]
     Small,
     /// Any distance: what nodes face is found anew from the displacements, whenever some node has slid by a quarter of a facet since the
-    /// last time; normals remain those of the undeformed body. Requires a normal law with a gap, without adhesion and memory.
+    /// last time, and so is the direction of the pressure: at right angles to a flat surface on which a corner or a rounded edge slides.
+    /// Requires a normal law with a gap, without adhesion and memory.
     Finite,
 }
 

@@ -50,12 +50,6 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     }
     let (converged, start) = (state.displacement.local()?, start.local()?);
     let (converged, start) = (body.seen_by_contacts(&converged), body.seen_by_contacts(&start));
-    if body.contacts.iter().any(|contact| contact.normal.keeps_depths()) {
-        let velocity = state.velocity.local()?;
-        let velocity = body.seen_by_contacts(&velocity);
-        let ahead: Vec<f64> = converged.iter().zip(&*velocity).map(|(u, v)| u + step.length * v).collect();
-        body.contacts.iter_mut().for_each(|contact| contact.normal.allow_depths(&ahead));
-    }
     for contact in &mut body.contacts {
         if let Some((friction, heat)) = contact.friction.as_mut().zip(body.heat.as_ref()) {
             friction.set_temperatures(heat.seen());

@@ -23,7 +23,7 @@ use super::{
         Vectors::{self, Body, Newton},
     },
     reference::{ReferenceValues, worst},
-    tangential_point::{ROUNDING, Tangent, TangentialPoint, span_without},
+    tangential_point::{ROUNDING, Tangent, TangentialPoint, held_part_of_normal, tangents_of},
 };
 use crate::{
     error::{Error, Result},
@@ -75,8 +75,7 @@ impl<const D: usize> Friction<D> {
         let (mut out, mut partly_held) = (Vec::new(), Vec::new());
         for (at, point) in points.iter().enumerate() {
             let node = point.node();
-            let (frame, free) = held.frame(node);
-            if free == 0 {
+            if held.frame(node).1 == 0 {
                 continue;
             }
             let (is_held, place) = (point.unknown == Unknown::Held, &mesh.nodes[node]);
@@ -85,11 +84,8 @@ impl<const D: usize> Friction<D> {
                     "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, on which this friction law depends; free the normal component there, or use tresca"
                 )));
             }
-            let (mut tangents, count) = span_without(&frame[..free], &[point.direction]);
+            let (tangents, count, all) = tangents_of(point, held);
             let (held_normal, size) = held_part_of_normal(point);
-            let (held_tangents, held_count) = span_without(&frame[free..], &[held_normal]);
-            let all = count + held_count;
-            tangents[count..all].copy_from_slice(&held_tangents[..held_count]);
             if obstacle_moves && count > 0 && size > 0.0 {
                 let tangent: Vector<D> =
                     std::array::from_fn(|i| point.free_length * held_normal[i] - size * point.direction[i]);
@@ -583,13 +579,6 @@ fn distance_along_parameter<const D: usize>(
         norm(&add_scaled(value, -share, &parameter))
     };
     (off(&sliding, found.speed) / speeds).hypot(off(&traction, found.traction) / tractions)
-}
-
-/// The direction of the part of the normal at a point that supports hold, and its size; zero if it is a rounding error.
-fn held_part_of_normal<const D: usize>(point: &Point<D>) -> (Vector<D>, f64) {
-    let part = add_scaled(&point.normal, -point.free_length, &point.direction);
-    let size = norm(&part);
-    if size > ROUNDING { (part.map(|x| x / size), size) } else { ([0.0; D], 0.0) }
 }
 
 #[cfg(test)]

@@ -86,12 +86,10 @@ pub(super) struct Point<const D: usize> {
     pub facet_size: f64,
     /// The ratio of its velocity relative to that body to the mean over the part of the surface for which it stands.
     pub stretch: f64,
+    /// Whether its normal follows what it faces: no other contact acts at the node.
+    pub turns: bool,
     /// Displacement in m relative to the body that it faces when it began to face it.
     pub faced_at: Vector<D>,
-    /// The depth in m in that body that it had then because bodies slid, which it may keep until it has slid on.
-    pub overlap: f64,
-    /// What is left of it in the step.
-    pub allowance: f64,
     /// The gap in m at the end of the step of the undeformed surface without wear.
     pub reach: f64,
     /// Normal displacement in m of the surface without wear at the start of the step.
@@ -146,8 +144,7 @@ impl<const D: usize> Point<D> {
             facet_size: f64::INFINITY,
             stretch: 1.0,
             faced_at: [0.0; D],
-            overlap: 0.0,
-            allowance: 0.0,
+            turns: false,
             reach: 0.0,
             moved: 0.0,
             follows: 0.0,
@@ -187,6 +184,21 @@ impl<const D: usize> Point<D> {
     pub(super) fn set_weight(&mut self, weight: f64) {
         self.weight = weight;
         self.force[0] = self.direction.map(|d| weight * self.free_length * d);
+    }
+
+    /// Turns a nodal point to another normal, if supports leave it free and no other contact acts there.
+    pub(super) fn turn(&mut self, normal: &Vector<D>, held: &Held<D>) {
+        if !self.turns {
+            return;
+        }
+        let node = self.node() as u32;
+        let turned =
+            Self::nodal(held.whole(SurfacePoint { node, normal: *normal, weight: self.weight }), held);
+        if [self.unknown, turned.unknown] == [Unknown::Parameter; 2] {
+            (self.normal, self.direction) = (turned.normal, turned.direction);
+            (self.dual, self.wall) = (turned.dual, turned.wall);
+            (self.free_length, self.force) = (turned.free_length, turned.force);
+        }
     }
 
     /// A point at a node, whose unknown is the parameter of the law.

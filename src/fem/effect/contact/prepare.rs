@@ -28,9 +28,8 @@ impl<const D: usize> Contact<D> {
                 [self.obstacle.seen_after(&point.place), self.obstacle.seen_before(&point.place)];
             let along = point.normal_component(Body, converged);
             let [worn, worn_before] = point.worn;
-            let allowance = point.allowance;
-            let gap = self.obstacle.gap_of(point, time, &after, along - worn)? + allowance;
-            let before = self.obstacle.gap_of(point, time_before, &before, along - worn)? + allowance;
+            let gap = self.obstacle.gap_of(point, time, &after, along - worn)?;
+            let before = self.obstacle.gap_of(point, time_before, &before, along - worn)?;
             let point = &mut self.normal.points[at];
             point.reach = gap;
             point.moved = along - worn;

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{effect::Step, pairs::PairedNode},
+    fem::{effect::Step, pairs::PairedNode, space::Held},
     laws::contact::{Gap, Sweep},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
 };
@@ -19,6 +19,44 @@ pub const OVERRUN: f64 = 1e-6;
 
 /// The slip between bodies, as a share of the size of a facet, after which what they face is found anew.
 pub const SLIP_BETWEEN_PAIRINGS: f64 = 0.25;
+
+/// The gap, as a share of the size of a facet, up to which a point touches another body along which it slides.
+const TOUCHING: f64 = 1e-6;
+/// The slip, as a share of the size of a facet, from which on its direction is known.
+const LEAST_SLIP: f64 = 1e-3;
+/// The steepest ascent and descent of the plane that a point faces until it reaches a surface that is found anew. Farther behind the plane
+/// the surface has ended.
+const STEEPEST: f64 = 1.5;
+
+/// How a point stands to another body along which it slides, before it faces it anew.
+#[derive(Debug, Clone, Copy)]
+pub struct Touch<const D: usize> {
+    /// In m.
+    gap: f64,
+    /// How far it has moved relative to the body since it began to face it, in m.
+    moved: Vector<D>,
+}
+
+impl<const D: usize> Touch<D> {
+    /// The gap in m and the normal at which a point faces a plane from now on, given its gap to the surface found.
+    fn plane(&self, found: f64, point: &Point<D>) -> (f64, Vector<D>) {
+        let gap = match self.gap {
+            own if own <= TOUCHING * point.facet_size => own,
+            _ => found.max(0.0),
+        };
+        let along = add_scaled(&self.moved, -dot(&self.moved, &point.normal), &point.normal);
+        let slip = norm(&along);
+        let least = point.stretch * point.facet_size;
+        let ascent = (gap - found) / slip.max(SLIP_BETWEEN_PAIRINGS * least);
+        if ascent < -STEEPEST {
+            return (found, point.normal);
+        }
+        let share = if slip < LEAST_SLIP * least { 0.0 } else { ascent.min(STEEPEST) / slip };
+        let normal = add_scaled(&point.normal, share, &along);
+        let length = norm(&normal);
+        (gap, normal.map(|n| n / length))
+    }
+}
 
 /// How far a point has slid along another body since it began to face it, as a share of the size of the facets there.
 fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
@@ -35,26 +73,19 @@ impl<const D: usize> NormalContact<D> {
         facing.map(|point| slip(point, displacement)).fold(0.0, larger)
     }
 
+    /// Writes the planes that the points face: at their nodes the normal and the distance.
+    pub fn write_planes(&self, nodal: &mut [f64]) {
+        for point in &self.points {
+            let plane = &mut nodal[(D + 1) * point.node()..][..=D];
+            plane[..D].copy_from_slice(&point.normal);
+            plane[D] = point.distance;
+        }
+    }
+
     /// The nodes of the points on this rank that face nothing of the other body, with the sizes in m of the facets there.
     pub fn facing_nothing(&self) -> impl Iterator<Item = (usize, f64)> {
         let points = self.points.iter().filter(|point| !point.distance.is_finite());
         points.map(|point| (point.node(), point.facet_size))
-    }
-
-    /// Whether points may be inside of the body that they face, see [`allow_depths`](Self::allow_depths).
-    pub fn keeps_depths(&self) -> bool {
-        self.points.iter().any(|point| point.overlap > 0.0)
-    }
-
-    /// Sets the depths that points may have in the body that they face in the next step, at whose end they will be at these displacements
-    /// relative to it if they move on as they do. What nodes face on a surface that is inclined or deformed jumps when it is found anew. A law
-    /// without a finite pressure would remove the depth within one step, however short, and thus throw the bodies apart; over the slip
-    /// until they face anew they move as the surface rises.
-    pub fn allow_depths(&mut self, displacement: &[f64]) {
-        for point in &mut self.points {
-            let left = 1.0 - slip(point, displacement) / SLIP_BETWEEN_PAIRINGS;
-            point.allowance = point.overlap * left.max(0.0);
-        }
     }
 }
 
@@ -139,27 +170,69 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Lets the points of a contact that slides along another body face it, at displacements that are relative to it. Points that are inside
-    /// of it keep their depth at first, if wanted and if no finite pressure removes it.
-    pub fn face(&mut self, nodes: &[PairedNode<D>], displacement: &[f64], keeps_depth: bool) -> Result<()> {
-        let keeps_depth = keeps_depth && self.normal.law.has_vertical_parts() && self.wear.is_none();
+    /// How the points stand to the other body along which they slide, at displacements that are relative to it.
+    pub fn touches(&self, displacement: &[f64]) -> Result<Vec<Touch<D>>> {
+        let touch = |point: &Point<D>| {
+            let [along, gap] = self.obstacle.position_at(0.0, displacement, point)?;
+            let moved: Vector<D> =
+                std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i]);
+            Ok(Touch { gap: gap - along, moved })
+        };
+        self.normal.points.iter().map(touch).collect()
+    }
+
+    /// Lets the points of a contact that slides along another body face it, at displacements that are relative to it.
+    ///
+    /// Between two such times each point faces a plane. What nodes face on a surface that is curved, or made of facets, jumps when it is
+    /// found anew. A law that removed the jump of a point that touches within one step, however short, would throw the bodies apart. So the
+    /// new plane goes through the place where the point is, given how it stood, and is inclined so that it reaches the surface when the
+    /// point has slid on as far as it will until it faces anew. The pressure, at right angles to the plane, then does no work beyond that
+    /// of closing a gap.
+    pub fn face(
+        &mut self,
+        nodes: &[PairedNode<D>],
+        held: &Held<D>,
+        displacement: &[f64],
+        touches: Option<&[Touch<D>]>,
+    ) -> Result<()> {
         for (at, node) in nodes.iter().enumerate() {
             let point = &mut self.normal.points[at];
-            point.overlap = 0.0;
-            if keeps_depth {
-                let own = self.obstacle.gap.of_moved(0.0, &point.place, &point.normal, 0.0)?;
-                point.overlap = (-(node.distance + node.stretch * own)).max(0.0);
-            }
-            point.allowance = point.overlap;
-            point.set_weight(node.weight);
             point.stretch = node.stretch;
-            let moved = std::array::from_fn(|i| displacement[point.node() * D + i]);
-            (point.distance, point.faced_at) = (node.distance + dot(&moved, &point.normal), moved);
+            point.faced_at = std::array::from_fn(|i| displacement[point.node() * D + i]);
+            point.turn(&node.normal, held);
+            // Along a normal that is not that of the plane.
+            let open = node.distance / dot(&node.normal, &point.normal);
+            point.distance = open + dot(&point.faced_at, &point.normal);
+            if let Some(touch) = touches.map(|touches| touches[at]).filter(|_| open.is_finite()) {
+                let [along, gap] = self.obstacle.position_at(0.0, displacement, point)?;
+                let (kept, normal) = touch.plane(gap - along, point);
+                point.turn(&normal, held);
+                let more = kept - (gap - along);
+                point.distance = open + more + dot(&point.faced_at, &point.normal);
+            }
+            point.set_weight(node.weight);
         }
-        for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
-            point.weight = self.normal.points[point.at].weight;
-        }
+        self.turn_tangents(held);
         Ok(())
+    }
+
+    /// Lets the points face planes of an earlier run, see [`write_planes`](NormalContact::write_planes).
+    pub fn face_planes(&mut self, planes: &[f64], held: &Held<D>) {
+        for point in &mut self.normal.points {
+            let plane = &planes[(D + 1) * point.node()..][..=D];
+            if plane[..D].iter().any(|n| *n != 0.0) {
+                point.turn(&std::array::from_fn(|i| plane[i]), held);
+                point.set_weight(point.weight);
+                point.distance = plane[D];
+            }
+        }
+        self.turn_tangents(held);
+    }
+
+    fn turn_tangents(&mut self, held: &Held<D>) {
+        for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
+            point.face(&self.normal.points[point.at], held);
+        }
     }
 
     /// The smallest and the largest angle in rad between the surface at a point on this rank and a plane in front of it at `time`;
@@ -199,5 +272,35 @@ impl<const D: usize> Contact<D> {
             }
         }
         gaps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::space::SurfacePoint;
+
+    #[test]
+    fn a_point_that_touches_faces_a_plane_through_its_place_which_leads_to_the_surface_found() {
+        let held = Held::<2>::from(vec![false; 2]);
+        let place = SurfacePoint { node: 0, normal: [0.0, -1.0], weight: 1.0 };
+        let mut point = Point::nodal(place, &held);
+        point.facet_size = 0.1;
+        let plane = |gap: f64, slip: f64, found: f64| Touch { gap, moved: [slip, 0.0] }.plane(found, &point);
+        // It is 2.5 mm inside, or outside, and slides by 25 mm until it faces anew: the plane rises, or falls, by a tenth.
+        for found in [-2.5e-3, 2.5e-3] {
+            let (gap, [x, y]) = plane(0.0, 0.025, found);
+            assert_eq!(gap, 0.0);
+            assert!((x / y - 40.0 * found).abs() < 1e-12, "{x}, {y}");
+        }
+        let own = [0.0, -1.0];
+        // A surface that ends, one that is not touched, and one of which the point knows no direction of sliding.
+        assert_eq!(plane(0.0, 0.025, 0.05), (0.05, own));
+        assert_eq!(plane(1e-3, 0.025, 2e-3), (2e-3, own));
+        assert_eq!(plane(0.0, 0.0, -1e-3), (0.0, own));
+        // One that it meets deep inside at first.
+        let (gap, [x, y]) = plane(f64::INFINITY, 0.025, -1.0);
+        assert_eq!(gap, 0.0);
+        assert!((x / y + STEEPEST).abs() < 1e-12, "{x}, {y}");
     }
 }

@@ -1,7 +1,11 @@
 //! Tangential data of a contact point.
 
-use super::point::Vectors::{self, Body, Newton};
+use super::point::{
+    Point,
+    Vectors::{self, Body, Newton},
+};
 use crate::{
+    fem::space::Held,
     laws::contact::{FrictionLaw, SlidingContext, Slip, Tresca},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
 };
@@ -84,6 +88,16 @@ impl<const D: usize> TangentialPoint<D> {
     /// `q`, with what supports take up.
     pub(super) fn whole_traction(&self) -> Vector<D> {
         add_scaled(&self.traction, 1.0, &self.held_traction)
+    }
+
+    /// Follows the point to the normal and the weight that it has on another body.
+    pub(super) fn face(&mut self, point: &Point<D>, held: &Held<D>) {
+        self.weight = point.weight;
+        let is_turned =
+            self.tangents[..self.count].iter().any(|tangent| dot(tangent, &point.direction).abs() > ROUNDING);
+        if is_turned {
+            (self.tangents, self.count, self.all) = tangents_of(point, held);
+        }
     }
 
     /// Removes from the free tangents the components along this direction, which is free.
@@ -216,6 +230,26 @@ impl<const D: usize> TangentialPoint<D> {
                 + (slopes[0] * ahead + coefficient * pressed) * toward[i]
         })
     }
+}
+
+/// The tangents of a point: those that are free, and then those that supports hold, with the numbers of the former and of all.
+pub(super) fn tangents_of<const D: usize>(
+    point: &Point<D>,
+    held: &Held<D>,
+) -> ([Vector<D>; D], usize, usize) {
+    let (frame, free) = held.frame(point.node());
+    let (mut tangents, count) = span_without(&frame[..free], &[point.direction]);
+    let (held_tangents, held_count) = span_without(&frame[free..], &[held_part_of_normal(point).0]);
+    let all = count + held_count;
+    tangents[count..all].copy_from_slice(&held_tangents[..held_count]);
+    (tangents, count, all)
+}
+
+/// The direction of the part of the normal at a point that supports hold, and its size; zero if it is a rounding error.
+pub(super) fn held_part_of_normal<const D: usize>(point: &Point<D>) -> (Vector<D>, f64) {
+    let part = add_scaled(&point.normal, -point.free_length, &point.direction);
+    let size = norm(&part);
+    if size > ROUNDING { (part.map(|x| x / size), size) } else { ([0.0; D], 0.0) }
 }
 
 /// The part of a vector in the span of these orthonormal vectors.

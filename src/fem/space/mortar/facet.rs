@@ -16,6 +16,8 @@ pub struct Facet<const D: usize> {
     pub corners: [Vector<D>; D],
     /// The outward unit normal.
     pub normal: Vector<D>,
+    /// That of the facet in the undeformed body.
+    pub undeformed: Vector<D>,
     /// By how much integrals on a slave facet are multiplied at its corners, and in between linearly: 1, or on a body of revolution the
     /// circumference in m.
     pub turns: [f64; D],
@@ -26,7 +28,8 @@ impl<const D: usize> Facet<D> {
     pub fn new(nodes: Vec<u32>, corners: [Vector<D>; D]) -> Self {
         let normal = facet_normal(&corners);
         let size = norm(&normal);
-        Self { nodes, corners, normal: normal.map(|n| n / size), turns: [1.0; D] }
+        let normal = normal.map(|n| n / size);
+        Self { nodes, corners, normal, undeformed: normal, turns: [1.0; D] }
     }
 
     pub(super) fn is_quadratic(&self) -> bool {
