@@ -84,18 +84,21 @@ impl Properties {
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
         let rubs = self.has_friction && !self.friction_moves_obstacles;
+        let turns = rubs && !self.softens;
         [
             (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
             (follows_bounds && rubs, HalfSteps, 1.0, Newton),
-            (rubs && !self.softens, Yielding, 1.0, FixedPoint),
+            (turns && follows_bounds, FullSteps, 10.0, Newton),
+            (turns && follows_bounds, FullSteps, 100.0, Newton),
+            (turns, Yielding, 1.0, FixedPoint),
             (follows_bounds && self.flows, Backtracking, 1.0, Newton),
             (follows_bounds, Equilibrated, 1.0, Newton),
             (follows_bounds, Equilibrated, 10.0, Newton),
-            (follows_bounds, FullSteps, 10.0, Newton),
+            (follows_bounds && !turns, FullSteps, 10.0, Newton),
             (self.friction_moves_obstacles, Yielding, 1.0, FixedPoint),
             (follows_bounds && !self.flows, Backtracking, 1.0, Newton),
-            (follows_bounds, FullSteps, 100.0, Newton),
+            (follows_bounds && !turns, FullSteps, 100.0, Newton),
             (follows_bounds, Backtracking, 1.0 / 30.0, Newton),
             (fixes_bounds, FullSteps, 1.0, FixedPoint),
             (fixes_bounds, Equilibrated, 1.0, FixedPoint),

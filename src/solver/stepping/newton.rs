@@ -139,9 +139,16 @@ impl Newton {
                 self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
                 let reason = match fallback.search {
                     Search::Yielding => {
-                        let failure = self.solve_yielding(problem, &mut equations, fallback);
+                        let found = self.solve_yielding(problem, &mut equations, fallback);
                         frictions(&mut problem.body.contacts).for_each(|friction| friction.give = 0.0);
-                        failure?
+                        match found? {
+                            Some(true) => None,
+                            Some(false) => match self.solve_with_bounds(problem, &mut equations, fallback)? {
+                                None => self.sharpen(problem, &mut equations, fallback)?,
+                                failure => failure,
+                            },
+                            None => Some(NO_MINIMUM.to_owned()),
+                        }
                     }
                     Search::Falling => {
                         self.solve_falling(problem, &mut equations)?;

@@ -1,6 +1,6 @@
 //! Starts of Newton's method from solutions with friction points that yield.
 
-use super::{NO_MINIMUM, Newton, frictions, write_unknowns, write_velocities};
+use super::{Newton, frictions, write_unknowns, write_velocities};
 use crate::{
     error::Result,
     fem::{body::Body, effect::Contact},
@@ -27,27 +27,38 @@ const YIELDING_TOLERANCE: f64 = 1e5;
 
 impl Newton {
     /// Solves the equations with friction points that yield less and less, each time from the last solution and in shorter steps where there
-    /// is none, until full steps from there find the solution with points that do not yield. Where they find none, descents do, by an
-    /// iteration of friction bounds. Returns the reason for failure, if it fails: points that have no solution by yielding less have none
+    /// is none, until full steps from there find the solution with points that do not yield; returns whether they do. Otherwise some points
+    /// still yield in the solution reached. Nothing is returned where points have no solution by yielding less than at first: they have none
     /// without yielding. Collective.
     pub(super) fn solve_yielding<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         equations: &mut Reduced<'_>,
         fallback: Fallback,
-    ) -> Result<Option<String>> {
+    ) -> Result<Option<bool>> {
+        let loosened = self.loosened(equations.system);
         let mut reached = None;
         let (mut ratio, mut factor) = (FIRST_RATIO, RATIO_FACTOR);
         set_give(problem.body, ratio);
         self.evaluate(problem, equations)?;
-        self.fix_bounds(problem, equations.system)?;
+        self.fix_bounds(problem, loosened)?;
         loop {
-            let has_solution = self.yield_by(problem, equations, ratio)?;
+            set_give(problem.body, ratio);
+            self.scratch.restart();
+            let Reduced { krylov, velocity, .. } = &mut *equations;
+            let mut loose = Reduced { system: loosened, krylov, velocity };
+            let has_solution = self.attempt(problem, &mut loose, Search::ShortDescent, 1.0)?.is_none();
             if has_solution {
-                reached = Some(ratio);
-                factor = f64::max(RATIO_FACTOR, factor * factor);
-                if ratio <= SHARP_RATIO && self.sharpen(problem, equations, fallback)? {
-                    return Ok(None);
+                self.fix_bounds(problem, loosened)?;
+                self.keep_reached(&problem.body.contacts, equations.velocity)?;
+                (reached, factor) = (Some(ratio), f64::max(RATIO_FACTOR, factor * factor));
+                if ratio <= SHARP_RATIO {
+                    self.start_full_steps(problem, equations, fallback)?;
+                    if self.attempt(problem, equations, Search::FullSteps, SHARP)?.is_none() {
+                        return Ok(Some(true));
+                    }
+                    set_give(problem.body, ratio);
+                    self.return_from_full_steps(problem, equations, fallback)?;
                 }
             } else {
                 factor = factor.sqrt();
@@ -62,65 +73,50 @@ impl Newton {
             }
             ratio = last * factor;
         }
-        set_give(problem.body, 0.0);
-        if reached.is_none_or(|ratio| ratio >= FIRST_RATIO) {
-            return Ok(Some(NO_MINIMUM.to_owned()));
-        }
-        let failure = self.solve_with_bounds(problem, equations, fallback)?;
-        if failure.is_some() || self.sharpen(problem, equations, fallback)? {
-            return Ok(failure);
-        }
-        // Bounds follow the pressures of the solution before they are fixed there.
-        self.fix_bounds(problem, equations.system)?;
-        self.attempt(problem, equations, fallback.search, 1.0)
+        Ok(reached.filter(|ratio| *ratio < FIRST_RATIO).map(|_| false))
     }
 
-    /// Solves the equations with friction points that yield by this ratio from this velocity, with bounds at the pressures there; keeps the
-    /// solution, and returns whether there is one. Collective.
-    fn yield_by<const D: usize, const S: usize>(
-        &mut self,
-        problem: &mut StepProblem<'_, D, S>,
-        equations: &mut Reduced<'_>,
-        ratio: f64,
-    ) -> Result<bool> {
-        let system = self.loosened(equations.system);
-        set_give(problem.body, ratio);
-        self.scratch.restart();
-        let equations = &mut Reduced { system, krylov: equations.krylov, velocity: equations.velocity };
-        if self.attempt(problem, equations, Search::ShortDescent, 1.0)?.is_some() {
-            return Ok(false);
-        }
-        self.fix_bounds(problem, system)?;
-        self.keep_reached(&problem.body.contacts, equations.velocity)?;
-        Ok(true)
-    }
-
-    /// Takes full steps from this solution to one without points that yield; returns whether they find it, and goes back where they do not.
-    /// Collective.
-    fn sharpen<const D: usize, const S: usize>(
+    /// Takes full steps from a solution that descents found: energies are flat near it, so that they end within the tolerance but far from the
+    /// accuracy of full steps. Returns to it where these find none; returns the reason for failure, if it is none any more. Collective.
+    pub(super) fn sharpen<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         equations: &mut Reduced<'_>,
         fallback: Fallback,
-    ) -> Result<bool> {
-        let scales = equations.system.scales;
-        self.keep_reached(&problem.body.contacts, equations.velocity)?;
-        let gives: Vec<f64> = frictions(&mut problem.body.contacts)
-            .map(|friction| std::mem::take(&mut friction.give))
-            .collect();
-        let newton = Fallback { iteration: FrictionIteration::Newton, ..fallback };
-        self.set_graph_parameters(&mut problem.body.contacts, scales, newton);
-        self.scratch.restart();
-        let is_found = self.attempt(problem, equations, Search::FullSteps, SHARP)?.is_none();
-        if !is_found {
-            frictions(&mut problem.body.contacts)
-                .zip(gives)
-                .for_each(|(friction, give)| friction.give = give);
-            self.set_graph_parameters(&mut problem.body.contacts, scales, fallback);
-            self.go_to_reached(problem, equations)?;
-            self.fix_bounds(problem, equations.system)?;
+    ) -> Result<Option<String>> {
+        self.start_full_steps(problem, equations, fallback)?;
+        if self.attempt(problem, equations, Search::FullSteps, SHARP)?.is_none() {
+            return Ok(None);
         }
-        Ok(is_found)
+        self.return_from_full_steps(problem, equations, fallback)?;
+        self.attempt(problem, equations, fallback.search, 1.0)
+    }
+
+    /// Keeps this solution, and prepares full steps from it without points that yield.
+    fn start_full_steps<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &Reduced<'_>,
+        fallback: Fallback,
+    ) -> Result<()> {
+        self.keep_reached(&problem.body.contacts, equations.velocity)?;
+        set_give(problem.body, 0.0);
+        let newton = Fallback { iteration: FrictionIteration::Newton, ..fallback };
+        self.set_graph_parameters(&mut problem.body.contacts, equations.system.scales, newton);
+        self.scratch.restart();
+        Ok(())
+    }
+
+    /// Returns to the solution kept, with bounds at the pressures there. Collective.
+    fn return_from_full_steps<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        equations: &mut Reduced<'_>,
+        fallback: Fallback,
+    ) -> Result<()> {
+        self.set_graph_parameters(&mut problem.body.contacts, equations.system.scales, fallback);
+        self.go_to_reached(problem, equations)?;
+        self.fix_bounds(problem, equations.system)
     }
 
     /// Evaluates the contacts at the velocity from which they are solved. Collective.
