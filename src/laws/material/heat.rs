@@ -25,7 +25,7 @@ pub struct Heat {
     /// Coefficient of linear thermal expansion: without stress the body is strained by it times the temperature beyond `reference`, alike
     /// along all axes. Requires elasticity. Absent: no thermal strain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "1/K"), range(min = 0), example = 1.2e-5)]
+    #[schemars(extend("unit" = "1/K"), example = 1.2e-5)]
     pub expansion: Option<f64>,
     /// The temperature without thermal strain; required with `expansion`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

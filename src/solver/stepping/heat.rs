@@ -269,8 +269,15 @@ impl HeatStep {
 
     fn find_changes(&mut self) -> Result<()> {
         let Some(solver) = &mut self.solver else { return Ok(()) };
-        if self.right_hand_side.norm()? == 0.0 {
+        let power = self.right_hand_side.norm()?;
+        if power == 0.0 {
             return self.change.fill(0.0);
+        }
+        if !power.is_finite() {
+            return Err(Error::Failed(
+                "the heat that the step releases is not finite, because its velocities or stresses are not: use smaller steps, or                  scheme = \"implicit_euler\""
+                    .into(),
+            ));
         }
         let outcome = solver.solve(&self.right_hand_side, &mut self.change)?;
         if outcome.converged() {

@@ -10,6 +10,8 @@ use crate::{
 const RELATIVE_DIFFERENCE: f64 = 1e-6;
 /// The same for velocities of which one is certainly not an inaccurate solution of the step of the other.
 const CERTAIN_DIFFERENCE: f64 = 1e-3;
+/// The same for changes of the displacement in a step: a body at rest has velocities of rounding errors.
+const SMALL_CHANGE: f64 = 1e-3;
 /// Uniform normal velocity of all contact points, relative to the largest velocity at which a law has a kink; every second
 /// start has random velocities instead.
 const UNIFORM_VELOCITIES: [f64; 6] = [1.5, 0.25, 0.75, 4.0, -0.5, -2.0];
@@ -27,7 +29,7 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
     let session = problem.session;
     let mut others = Vec::new();
     let mut velocity = trial.like()?;
-    let mut fastest = 0.0;
+    let mut fastest = SMALL_CHANGE * problem.state.displacement.norm()? / problem.step.length;
     for number in 0..starts {
         velocity.copy_from(trial)?;
         write_start(problem, number, &mut velocity)?;
