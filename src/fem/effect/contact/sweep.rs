@@ -216,7 +216,7 @@ impl<const D: usize> Contact<D> {
         Ok(())
     }
 
-    /// Lets the points face planes of an earlier run, see [`write_planes`](NormalContact::write_planes).
+    /// Lets the points face planes of an earlier run, see `write_planes`.
     pub fn face_planes(&mut self, planes: &[f64], held: &Held<D>) {
         for point in &mut self.normal.points {
             let plane = &planes[(D + 1) * point.node()..][..=D];
