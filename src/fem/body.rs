@@ -1057,7 +1057,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Lets cells expand to their strain at the temperature that motion has just been made to see; gives the work in J on the stresses of
     /// this state, of this rank.
     pub fn expand(&mut self, state: &State) -> Result<f64> {
-        self.strain_by_temperature();
+        if self.heat.as_ref().is_some_and(Heat::has_changed) {
+            self.strain_by_temperature();
+        }
         self.work_of_expansion(state)
     }
 

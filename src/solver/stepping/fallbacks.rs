@@ -75,10 +75,9 @@ impl Properties {
     ///
     /// With friction, full steps may let points stick and slide in turn, most of all where little but friction holds a body: steps of half
     /// the length come second, then full steps with larger parameters, which fail or succeed soon, and friction points that yield less and
-    /// less. For a light obstacle on a stiff body, which points that
-    /// stick and slide in turn move to and fro, they yield after more full steps, and where laws soften at last: on the way they slide, while
-    /// there may be another solution in which they stick. Where friction falls faster with the sliding speed than the body resists, bounds
-    /// follow the speeds from one solution to the next.
+    /// less. For a light obstacle on a stiff body, which points that stick and slide in turn move to and fro, they yield after more full
+    /// steps, and where laws soften at last: on the way they slide, while there may be another solution in which they stick. Where friction
+    /// falls faster with the sliding speed than the body resists, bounds follow the speeds from one solution to the next.
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         use FrictionIteration::{FixedPoint, Newton};
         use Search::{Backtracking, Descent, Equilibrated, Falling, FullSteps, HalfSteps, Yielding};

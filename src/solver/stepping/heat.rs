@@ -275,7 +275,8 @@ impl HeatStep {
         }
         if !power.is_finite() {
             return Err(Error::Failed(
-                "the heat that the step releases is not finite, because its velocities or stresses are not: use smaller steps, or                  scheme = \"implicit_euler\""
+                "the heat that the step releases is not finite, because its velocities or stresses are not: use smaller steps, or \
+                 scheme = \"implicit_euler\""
                     .into(),
             ));
         }

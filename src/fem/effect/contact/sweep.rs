@@ -44,7 +44,7 @@ impl<const D: usize> Touch<D> {
             own if own <= TOUCHING * point.facet_size => own,
             _ => found.max(0.0),
         };
-        let along = add_scaled(&self.moved, -dot(&self.moved, &point.normal), &point.normal);
+        let along = along_surface(point, &self.moved);
         let slip = norm(&along);
         let least = point.stretch * point.facet_size;
         let ascent = (gap - found) / slip.max(SLIP_BETWEEN_PAIRINGS * least);
@@ -58,11 +58,19 @@ impl<const D: usize> Touch<D> {
     }
 }
 
+/// How far a point has moved relative to another body since it began to face it, in m.
+fn moved<const D: usize>(point: &Point<D>, displacement: &[f64]) -> Vector<D> {
+    std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i])
+}
+
+/// The part of a motion at right angles to the normal of a point.
+fn along_surface<const D: usize>(point: &Point<D>, motion: &Vector<D>) -> Vector<D> {
+    add_scaled(motion, -dot(motion, &point.normal), &point.normal)
+}
+
 /// How far a point has slid along another body since it began to face it, as a share of the size of the facets there.
 fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
-    let moved: Vector<D> = std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i]);
-    let along = norm(&add_scaled(&moved, -dot(&moved, &point.normal), &point.normal));
-    along / point.stretch / point.facet_size
+    norm(&along_surface(point, &moved(point, displacement))) / point.stretch / point.facet_size
 }
 
 impl<const D: usize> NormalContact<D> {
@@ -174,9 +182,7 @@ impl<const D: usize> Contact<D> {
     pub fn touches(&self, displacement: &[f64]) -> Result<Vec<Touch<D>>> {
         let touch = |point: &Point<D>| {
             let [along, gap] = self.obstacle.position_at(0.0, displacement, point)?;
-            let moved: Vector<D> =
-                std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i]);
-            Ok(Touch { gap: gap - along, moved })
+            Ok(Touch { gap: gap - along, moved: moved(point, displacement) })
         };
         self.normal.points.iter().map(touch).collect()
     }
