@@ -28,7 +28,7 @@ fn load(browser: &str, profile: &Path, page: &Path) -> (String, String) {
     (String::from_utf8_lossy(&said.stderr).into_owned(), String::from_utf8_lossy(&said.stdout).into_owned())
 }
 
-/// The page fits wide and narrow screens, all pictures are drawn, and the console has no messages. `folder` is for temporary files.
+/// The page fits wide and narrow screens, all pictures are drawn, the viewer too, if there is one, and the console has no messages. `folder` is for temporary files.
 #[track_caller]
 pub fn assert_fits(page: &Path, folder: &Path) {
     let Some(browser) = browser() else {
@@ -43,15 +43,17 @@ pub fn assert_fits(page: &Path, folder: &Path) {
             "<body><iframe id='page' src='file://{}' style='border:0;width:{width}px;height:900px'></iframe><script>
             document.getElementById('page').onload = event => {{
               const page = event.target.contentDocument, root = page.documentElement;
-              const wide = [...page.querySelectorAll('svg, img, h1, p, figcaption, .wide, pre')]
+              const wide = [...page.querySelectorAll('svg, img, canvas, select, button, h1, p, figcaption, .wide, pre')]
                 .filter(each => each.getBoundingClientRect().right > root.clientWidth + 1);
               const letters = [...page.querySelectorAll('svg text')].map(each => each.getBoundingClientRect().height);
               const images = [...page.querySelectorAll('figure img')].filter(each => each.naturalWidth > 0);
               const shrunk = images.filter(each => each.getBoundingClientRect().width < each.naturalWidth / 2);
               const drawn = [...page.querySelectorAll('figure > svg'), ...images]
                 .filter(each => each.getBoundingClientRect().height > 50);
+              const viewer = page.querySelector('.viewer canvas');
+              const turned = !viewer || (viewer.dataset.drawn > 1000 && viewer.getBoundingClientRect().height > 50);
               document.body.innerHTML = `<p>client ${{root.clientWidth}} scroll ${{root.scrollWidth}} beyond ${{wide.length}} ` +
-                `drawn ${{drawn.length}} legible ${{Math.min(...letters) >= 8 && shrunk.length === 0}}</p>`;
+                `drawn ${{drawn.length}} legible ${{Math.min(...letters) >= 8 && shrunk.length === 0}} viewer ${{turned}}</p>`;
             }};</script></body>",
             page.display()
         );
@@ -63,7 +65,10 @@ pub fn assert_fits(page: &Path, folder: &Path) {
         let found =
             document.split("<p>").nth(1).and_then(|rest| rest.split("</p>").next()).unwrap_or(&document);
         let fits = (width - 20..=width).any(|client| {
-            found == format!("client {client} scroll {client} beyond 0 drawn {pictures} legible true")
+            found
+                == format!(
+                    "client {client} scroll {client} beyond 0 drawn {pictures} legible true viewer true"
+                )
         });
         assert!(fits, "{width} pixels: {found}");
     }

@@ -40,15 +40,21 @@ fn files(folder: &Path, ending: &str) -> Vec<String> {
     names
 }
 
-/// Every picture of the page has a name, is drawn, and exists as SVG and PNG file; the page refers to no other files.
+/// Every picture of the page has a name, is drawn, and exists as SVG and PNG file; the page refers to no other files, and has no scripts but
+/// those of the viewer, which is hidden without them.
 #[track_caller]
 fn check_page(page: &Path) -> Vec<String> {
     let html = std::fs::read_to_string(page).expect("page");
     assert!(html.len() < 3_000_000, "{} bytes", html.len());
-    for outside in ["http:", "https:", "src=\"/", "url(/", "@import", "<script"] {
+    for outside in ["http:", "https:", "src=\"/", "url(/", "@import", "<script src"] {
         assert!(!html.contains(outside), "{outside}");
     }
     let document = parsed(&html);
+    let is_hidden =
+        |node: Node| node.attribute("class") == Some("viewer") && node.attribute("hidden").is_some();
+    for script in elements(&document, "script") {
+        assert!(script.parent().is_some_and(is_hidden), "a script outside of the viewer");
+    }
     let mut names = Vec::new();
     for figure in elements(&document, "figure") {
         let name = figure.attribute("id").expect("id").to_owned();

@@ -139,7 +139,7 @@ fn refused_at_edges(session: &Session) {
     let refused =
         Simulation::<2, 4>::new(session, &mut loaded, mesh).map(|_| ()).expect_err("an edge").to_string();
     let speaks = !refused.is_empty()
-        && refused.contains("contact memory at [0.0, 0.0] m: two boundaries meet at an edge there");
+        && refused.contains("contact memory at [0.0, 0.0] m: the node belongs to two contacts with memory");
     assert!(speaks, "{refused}");
 }
 

@@ -39,8 +39,9 @@ impl<const D: usize> ContactMemory<D> {
         let (contacts, points): (Vec<usize>, Vec<(Memory, SurfacePoint<D>)>) = all.into_iter().unzip();
         if let Some(pair) = points.windows(2).find(|pair| pair[0].1.node == pair[1].1.node) {
             return Err(Error::Refused(format!(
-                "contact memory at {:?} m: two boundaries meet at an edge there, but a node stores the history of one displacement only; \
-                 round the edge with facets that turn by less than 40 degrees each, or give the memory to one of them",
+                "contact memory at {:?} m: the node belongs to two contacts with memory, but stores the history of one displacement \
+                 only; name both boundaries in one table if they have the same law, round an edge between them with facets that turn \
+                 by less than 40 degrees each, or give the memory to one of them",
                 mesh.nodes[pair[0].1.node as usize]
             )));
         }

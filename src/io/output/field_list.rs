@@ -9,6 +9,8 @@ use super::{
 };
 use crate::{error::Result, linear_algebra::tensor::von_mises};
 
+pub(crate) use super::further_fields::STATES_OF_CONTACT;
+
 /// Computes a field; `None`, on all ranks, if the run does not have this field. Collective.
 type Compute<const D: usize, const S: usize> =
     for<'a> fn(Converged<'a, D, S>) -> Result<Option<Computed<'a>>>;

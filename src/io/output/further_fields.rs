@@ -96,6 +96,10 @@ pub(super) fn contact_traction<'a, const D: usize, const S: usize>(
     Ok(Some(Computed::of(values)))
 }
 
+/// The states of the field `contact_status` in words, by their numbers.
+pub(crate) const STATES_OF_CONTACT: [&str; 5] =
+    ["no contact boundary", "open", "under pressure", "sticking", "slipping"];
+
 /// The number of a state in the field `contact_status`.
 pub(super) fn status<const D: usize>(state: &PointState<D>) -> f64 {
     match (state.pressure != 0.0, state.sticks) {

@@ -8,7 +8,7 @@ use super::{
     picture::Picture,
     scale::{Scale, extent, number, percentiles, unit_by_name},
     svg::{open_svg, text},
-    view::{Face, View, cross, dot, faces, minus, outline},
+    view::{Face, View, cross, dot, faces, minus, outline, unit},
 };
 use crate::{
     error::Result,
@@ -77,13 +77,30 @@ pub enum Drawn {
     Uniform(String),
 }
 
+/// A quantity at the corners of the faces, for drawings that are made elsewhere.
+#[derive(Debug, Clone)]
+pub struct AtCorners {
+    /// Its name in files.
+    pub name: String,
+    /// Description.
+    pub words: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// How values become colours.
+    pub shading: Shading,
+    /// The ends of its colour scale.
+    pub range: Option<(f64, f64)>,
+    /// Its values at the corners of each [face](DrawnBody::faces).
+    pub values: Vec<[f64; 3]>,
+}
+
 /// A quantity that has a picture.
 struct Quantity<'a> {
     /// Name of the picture.
     name: &'a str,
     /// Description.
     words: Cow<'a, str>,
-    unit: &'a str,
+    unit: &'static str,
     place: Place,
     shading: Shading,
     values: Cow<'a, [f64]>,
@@ -181,9 +198,14 @@ impl<'a> DrawnBody<'a> {
         self.drawn(of_history(history))
     }
 
-    /// The quantity of a field.
+    /// The quantity of a field that has a picture.
     fn field(&self, field: &OutputField) -> Option<Quantity<'_>> {
-        let (picture, values) = (field.picture?, self.snapshot.values(field)?);
+        self.as_picture(field, field.picture?)
+    }
+
+    /// The quantity of a field, with these words.
+    fn as_picture(&self, field: &OutputField, picture: FieldPicture) -> Option<Quantity<'_>> {
+        let values = self.snapshot.values(field)?;
         let values: Cow<[f64]> = match field.shape {
             Shape::Scalar => values.into(),
             Shape::Vector | Shape::Tensor => values.chunks_exact(field.width()).map(length).collect(),
@@ -191,6 +213,45 @@ impl<'a> DrawnBody<'a> {
         let unit = field.unit(self.snapshot.dimension());
         let FieldPicture { name, quantity, shading } = picture;
         Some(Quantity { name, words: quantity.into(), unit, place: field.place, shading, values })
+    }
+
+    /// The drawn faces.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+
+    /// The number of the region of each face; `None` if each cell has one colour.
+    pub fn regions_of_faces(&self) -> Option<Vec<f64>> {
+        let regions = self.regions()?;
+        Some(self.faces.iter().map(|face| regions[face.cell as usize]).collect())
+    }
+
+    /// The unit vector toward the viewer of a solid: onto this side of it, if that has a normal.
+    pub fn toward(&self, side: Option<[f64; 3]>) -> Option<[f64; 3]> {
+        let view = side.and_then(|normal| self.view.of_hidden_side(normal)).unwrap_or(self.view);
+        match view {
+            View::Plane => None,
+            View::Oblique(toward) => Some(unit(toward)),
+        }
+    }
+
+    /// All scalars and lengths of vectors that the file contains.
+    pub fn quantities(&self) -> Vec<AtCorners> {
+        let is_drawn = |field: &&OutputField| field.shape != Shape::Tensor && field.name != REGION.name;
+        let fields = FIELDS.iter().filter(is_drawn).filter_map(|field| {
+            let plain = FieldPicture { name: field.name, quantity: field.name, shading: Shading::Linear };
+            self.as_picture(field, field.picture.unwrap_or(plain))
+        });
+        let at_corners = |quantity: Quantity<'_>| {
+            let range = quantity.range();
+            let Quantity { name, words, unit, place, shading, values } = quantity;
+            let regions =
+                if place == Place::Cell && shading != Shading::Errors { self.regions() } else { None };
+            let (scale, is_clipped, common) = (linear(None), false, None);
+            let values = self.at_corners(&Values { values, place, scale, is_clipped, common, regions });
+            AtCorners { name: name.into(), words: words.replace('_', " "), unit, shading, range, values }
+        };
+        fields.chain(self.snapshot.histories.iter().map(of_history)).map(at_corners).collect()
     }
 
     /// Pixels per unit of the drawing.

@@ -11,7 +11,7 @@ pub struct Common {
     /// The ends of the colour scales, by the names of the pictures. A name is missing if the value is the same everywhere.
     pub(super) colours: BTreeMap<String, (f64, f64)>,
     /// Magnification factor of displacements, if there are any.
-    pub(super) magnification: Option<f64>,
+    pub magnification: Option<f64>,
     /// Points at the ends of all drawings, to the right and upwards in m; none except in animations.
     pub(super) section: Vec<[f64; 2]>,
 }
@@ -32,6 +32,11 @@ impl Common {
         Self { words, colours, magnification, section: Vec::new() }
     }
 
+    /// The ends of the colour scale of the picture with this name, if it shows a difference.
+    pub fn range(&self, name: &str) -> Option<(f64, f64)> {
+        self.colours.get(name).copied()
+    }
+
     /// Whether the picture with this name shows a difference.
     pub fn has(&self, name: &str) -> bool {
         self.colours.contains_key(name)
@@ -39,6 +44,6 @@ impl Common {
 }
 
 /// Whether values in this range count as the same: they are in all digits of a caption.
-pub(super) fn is_uniform(low: f64, high: f64) -> bool {
+pub fn is_uniform(low: f64, high: f64) -> bool {
     number(low) == number(high)
 }

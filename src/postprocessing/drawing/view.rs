@@ -222,7 +222,8 @@ pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
 }
 
-fn unit(a: [f64; 3]) -> [f64; 3] {
+/// The vector of length 1 in this direction.
+pub fn unit(a: [f64; 3]) -> [f64; 3] {
     let size = dot(a, a).sqrt();
     a.map(|x| x / size)
 }

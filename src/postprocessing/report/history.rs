@@ -67,15 +67,19 @@ struct ChartColumns<'a> {
     quantity: &'a str,
     unit: &'a str,
     columns: &'a [&'a str],
+    /// The column along the other axis.
+    over: &'a str,
 }
 
-/// The components of the force of each source; of each contact the area by state, the pressure and the motion of its obstacle.
+/// The components of the force of each source; of each contact the moment, the area by state, the pressure, and the motion of its obstacle
+/// with the force and the moment over it.
 /// Components are those of the first of these dimensions, units those of the second.
 pub(super) fn resultants(table: &Table, [dimension, of_units]: [usize; 2]) -> Result<Pictures> {
     let axes = ["x", "y", "z"];
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
     let forces: Vec<&str> = forces.iter().map(String::as_str).collect();
     let areas = ["touching_area", "open_area", "sticking_area", "slipping_area"];
+    let moments = ["moment_x", "moment_y", "moment_z"];
     let mut out = Pictures::default();
     for (number, source) in table.names().iter().enumerate() {
         let rows = table.of(source);
@@ -90,23 +94,26 @@ pub(super) fn resultants(table: &Table, [dimension, of_units]: [usize; 2]) -> Re
         let none = unfelt.iter().map(|force| format!("{} of {what}: 0 {unit}", force.replace('_', " ")));
         out.constant.extend(none);
         let name = format!("force_{number}");
-        let drawn = ChartColumns { name: &name, what, source: what, quantity, unit, columns: &felt };
+        let drawn =
+            ChartColumns { name: &name, what, source: what, quantity, unit, columns: &felt, over: "time" };
         draw(&rows, &drawn, &mut out)?;
         if source.starts_with("contact") {
-            for (name, quantity, columns) in [
-                ("area", "area", &areas[..]),
-                ("pressure", "contact pressure", &["mean_pressure", "largest_pressure"]),
-                ("obstacle_displacement", "displacement of the obstacle", &["obstacle_displacement"]),
-                ("obstacle_rotation", "rotation of the obstacle", &["obstacle_rotation"]),
+            let [displacement, rotation] = ["obstacle_displacement", "obstacle_rotation"];
+            for (name, quantity, columns, over) in [
+                ("moment", "moment about the origin", &moments[..], "time"),
+                ("area", "area", &areas[..], "time"),
+                ("pressure", "contact pressure", &["mean_pressure", "largest_pressure"], "time"),
+                (displacement, "displacement of the obstacle", &[displacement], "time"),
+                ("force_over_displacement", "force", &felt, displacement),
+                (rotation, "rotation of the obstacle", &[rotation], "time"),
+                ("moment_over_rotation", "moment about the origin", &moments, rotation),
             ] {
-                let unit = RESULTANTS.unit(columns[0], of_units);
+                let Some(first) = columns.first() else { continue };
+                let unit = RESULTANTS.unit(first, of_units);
                 let name = format!("{name}_{number}");
                 let what = format!("{source}, {quantity}");
-                draw(
-                    &rows,
-                    &ChartColumns { name: &name, what: &what, source, quantity, unit, columns },
-                    &mut out,
-                )?;
+                let drawn = ChartColumns { name: &name, what: &what, source, quantity, unit, columns, over };
+                draw(&rows, &drawn, &mut out)?;
             }
         }
     }
@@ -127,7 +134,7 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
     ] {
         draw(
             table,
-            &ChartColumns { name, what, source: "", quantity: what, unit, columns: &columns },
+            &ChartColumns { name, what, source: "", quantity: what, unit, columns: &columns, over: "time" },
             &mut out,
         )?;
     }
@@ -150,13 +157,18 @@ fn is_constant((low, high): (f64, f64)) -> bool {
 }
 
 /// Adds a chart of several columns over time, and names the columns that are constant: in the caption of the chart, or in the list if
-/// all of them are.
+/// all of them are. Over another column only if that changes, and without naming again what is constant.
 fn draw(table: &Table, columns: &ChartColumns<'_>, out: &mut Pictures) -> Result<()> {
-    let ChartColumns { name, what, source, quantity, unit, columns } = *columns;
+    let ChartColumns { name, what, source, quantity, unit, columns, over } = *columns;
+    let is_over_time = over == "time";
+    let passed = extent(table.curve("time", over).iter().map(|point| point[1]));
+    if !is_over_time && passed.is_none_or(is_constant) {
+        return Ok(());
+    }
     let mut series = Vec::new();
     let (mut ends, mut constant) = (Vec::new(), Vec::new());
     for column in columns {
-        let points = table.curve("time", column);
+        let points = table.curve(over, column);
         let Some(range) = extent(points.iter().map(|point| point[1])) else { continue };
         let words = column.replace('_', " ");
         let last = points.last().map_or(0.0, |point| point[1]);
@@ -170,7 +182,7 @@ fn draw(table: &Table, columns: &ChartColumns<'_>, out: &mut Pictures) -> Result
     if series.is_empty() {
         let of = if source.is_empty() { String::new() } else { format!(" of {source}") };
         let named = constant.iter().map(|(words, value)| format!("{words}{of}: {} {unit}", number(*value)));
-        out.constant.extend(named);
+        out.constant.extend(named.filter(|_| is_over_time));
         return Ok(());
     }
     let ends = ends.join(", ");
@@ -180,9 +192,16 @@ fn draw(table: &Table, columns: &ChartColumns<'_>, out: &mut Pictures) -> Result
         [] => String::new(),
         all => format!(" Constant: {}.", all.join(", ")),
     };
-    let chart = Chart::new(Axis::time(), Axis::new(quantity, unit), series);
-    let alt = format!("Chart of {what} over time; at the end {ends}");
-    let caption = format!("{}. At the end: {ends}.{constant}", capital(what));
+    let (x, over) = if is_over_time {
+        (Axis::time(), "time".into())
+    } else {
+        let words = over.replace('_', " ");
+        (Axis::new(words.clone(), RESULTANTS.unit(over, 3)), words)
+    };
+    let chart = Chart::new(x, Axis::new(quantity, unit), series);
+    let alt = format!("Chart of {what} over {over}; at the end {ends}");
+    let subject = if is_over_time { capital(what) } else { format!("{} over {over}", capital(what)) };
+    let caption = format!("{subject}. At the end: {ends}.{constant}");
     out.pictures.push(Picture::of_chart(chart, name, alt, caption)?);
     Ok(())
 }
@@ -280,7 +299,8 @@ mod tests {
         let table = Table::read(&path, "source").expect("table").without_rounding();
         let Pictures { pictures, constant } = resultants(&table, [2, 2]).expect("drawn");
         let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
-        assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0"]);
+        assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0", "force_over_displacement_0"]);
+        assert!(pictures[3].caption.contains("force over obstacle displacement"), "{}", pictures[3].caption);
         assert_eq!(
             constant,
             [

@@ -13,11 +13,12 @@ mod page;
 mod run;
 mod study;
 mod table;
+mod viewer;
 
 use crate::{
     error::{Error, Result},
     io::output::field_list::VON_MISES,
-    postprocessing::drawing::{body, chart, colour, markup, picture, scale, svg, view},
+    postprocessing::drawing::{body, chart, colour, common, markup, picture, scale, svg, view},
     run::version,
 };
 use artifacts::RunFiles;

@@ -10,12 +10,14 @@ use super::{
     motion,
     page::{Page, Pictures},
     picture::Picture,
+    view::{facets, mean_direction, unit},
+    viewer,
 };
 use crate::{
     error::Result,
     fem::effect::Energy,
     io::output::{
-        field_list::{FIELDS, VON_MISES},
+        field_list::{CONTACT_TRACTION, FIELDS, VON_MISES},
         field_snapshot::{History, Snapshot},
         fields::Place,
     },
@@ -47,8 +49,13 @@ pub(super) fn title(found: &RunFiles) -> String {
 pub(super) fn page(found: &RunFiles, options: Options) -> Result<Page> {
     let mut page = Page::new(&title(found), head(found));
     let body = drawn_body(found, options);
-    for (heading, words, pictures) in drawn_sections(found, body.as_ref())? {
+    for (heading, mut words, pictures) in drawn_sections(found, body.as_ref())? {
         let is_body = heading == BODY;
+        if is_body {
+            let sides = found.snapshot.as_ref().map(|snapshot| contact_directions(found, snapshot));
+            let side = sides.into_iter().flatten().next();
+            words.insert_str(0, &viewer::viewer(found, look(found, options), side)?);
+        }
         page.section(&heading, &words, pictures);
         if is_body && let Some(motion) = motion::picture(found, look(found, options), &contact_laws(found)?)?
         {
@@ -172,10 +179,20 @@ fn body_section(found: &RunFiles, body: &DrawnBody, snapshot: &Snapshot) -> Resu
     Ok((BODY.into(), words, pictures))
 }
 
-/// The mean outward normals of the contact boundaries of a solid that have a profile.
+/// The mean outward normals of the contact boundaries of a solid that have a profile; without any, that of the facets under contact traction.
 fn contact_directions(found: &RunFiles, snapshot: &Snapshot) -> Vec<[f64; 3]> {
-    let (Some(profiles), Some(job), 3) = (&found.profiles, &found.job, snapshot.dimension()) else {
+    if snapshot.dimension() != 3 {
         return Vec::new();
+    }
+    let (Some(profiles), Some(job)) = (&found.profiles, &found.job) else {
+        let tractions = snapshot.vectors(&CONTACT_TRACTION).unwrap_or_default();
+        let touches =
+            |node: &&u32| tractions.get(**node as usize).is_some_and(|traction| *traction != [0.0; 3]);
+        let of_facet = |(nodes, normal): (Vec<u32>, [f64; 3])| {
+            std::iter::repeat_n(unit(normal), nodes.iter().filter(touches).count())
+        };
+        let normals: Vec<[f64; 3]> = facets(snapshot).into_iter().flat_map(of_facet).collect();
+        return mean_direction(&normals).into_iter().collect();
     };
     let names = profiles.names();
     let has_side = |name: &&String| {

@@ -135,6 +135,14 @@ const LOST: f64 = 100.0;
 /// The same where rounding errors hide that nothing holds a body yet.
 const HIDDEN_PATIENCE: usize = 5;
 
+/// Steps go round in a circle if branches recur with a residual that differs by this share at most: where graphs are curved, circles are
+/// approached, not met.
+const RECURRENCE: f64 = 1e-3;
+
+/// A line search is stuck where residuals fall to more than this share in this number of iterations: its steps end at a corner of the graphs.
+const STUCK: f64 = 0.995;
+const STUCK_ITERATIONS: usize = 10;
+
 /// Forces of the cells in addition to `K v`, at velocities without ghost values.
 pub trait CellForces {
     /// Adds the forces at a velocity.
@@ -257,8 +265,27 @@ pub struct SolveCounts {
     /// The least norm in N of a residual since the search began, and the number of linearisations until then; only decreases by
     /// a tenth count.
     pub least: (f64, usize),
-    /// A hash of the branches of all points for each linearisation; different sets of branches have different hashes.
-    pub sets: Vec<f64>,
+    /// The linearisations of the search.
+    pub sets: Vec<Linearisation>,
+}
+
+/// A linearisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linearisation {
+    /// A hash of the derivatives of all points; different sets of branches have different hashes.
+    pub derivatives: f64,
+    /// A hash of the branches of all points, on which derivatives may differ.
+    pub branches: f64,
+    /// The norm in N of the residual.
+    pub residual: f64,
+}
+
+impl Linearisation {
+    /// Whether steps of this kind from the other one end where those from this one end.
+    fn recurs(&self, other: &Self, are_full: bool) -> bool {
+        let is_near = (self.residual - other.residual).abs() <= RECURRENCE * self.residual;
+        (are_full && self.derivatives == other.derivatives) || (is_near && self.branches == other.branches)
+    }
 }
 
 impl SolveCounts {
@@ -274,11 +301,23 @@ impl SolveCounts {
         *self = Self { sets: std::mem::take(&mut self.sets), ..Self::default() };
     }
 
-    /// The number of iterations since the same set of branches occurred, if other sets occurred in between.
-    pub fn period(&self) -> Option<usize> {
+    /// The number of iterations since the same set of branches occurred, if other sets occurred in between: of full steps with the same
+    /// derivatives, of all steps with nearly the same residual.
+    pub fn period(&self, are_full: bool) -> Option<usize> {
         let (last, before) = self.sets.split_last()?;
-        let at = before.iter().rposition(|set| set == last)?;
+        let at = before.iter().rposition(|set| last.recurs(set, are_full))?;
         (at + 1 < before.len()).then(|| before.len() - at)
+    }
+
+    /// Whether residuals have hardly fallen in the last iterations.
+    fn is_stuck(&self) -> bool {
+        let last = self.sets.last_chunk::<{ STUCK_ITERATIONS + 1 }>();
+        last.is_some_and(|last| last[STUCK_ITERATIONS].residual > STUCK * last[0].residual)
+    }
+
+    /// Whether the branches are those of the linearisation before.
+    fn keeps_branches(&self) -> bool {
+        self.sets.last_chunk().is_some_and(|[one, other]| one.branches == other.branches)
     }
 }
 
@@ -412,7 +451,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             return Err(Error::Failed(outcome.description().into()));
         }
         velocity.add_scaled(-1.0, correction)?;
-        self.write_residual(residual)
+        self.write_residual(residual)?;
+        self.scratch.residuals[0] = residual.norm()?;
+        Ok(())
     }
 
     fn is_exact(&self) -> bool {
@@ -421,7 +462,8 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
 
     fn gives_up(&self) -> bool {
         // Once the branches are those of the solution, few iterations remain, or rounding errors alone.
-        let has_settled = self.counts.sets.last_chunk().is_some_and(|[one, other]| one == other);
+        let has_settled =
+            self.counts.sets.last_chunk().is_some_and(|[one, other]| one.derivatives == other.derivatives);
         let after = if has_settled { 0 } else { self.counts.least.1 };
         let is_lost = self.counts.coupled > 0 && self.scratch.residuals[0] > LOST * self.counts.least.0;
         let patience = match (self.scratch.is_hidden, is_lost) {
@@ -429,7 +471,8 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             (false, true) => self.patience.min(LOST_PATIENCE),
             (false, false) => self.patience,
         };
-        self.counts.sets.len() >= patience.saturating_add(after)
+        let is_stuck = !self.stop_at_cycles && self.counts.is_stuck();
+        is_stuck || self.counts.sets.len() >= patience.saturating_add(after)
     }
 
     fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
@@ -455,16 +498,20 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             self.contacts.iter_mut().for_each(|contact| contact.normal.linearise_velocities(&velocity));
         }
         self.linearise_obstacles()?;
-        let digests = self.contacts.iter().map(Contact::set_digest);
-        let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
+        let digests = self.contacts.iter().map(Contact::set_digests);
+        let join = |sum: u64, digest: u64| sum.rotate_left(7) ^ digest;
+        let mine = digests.fold([0; 2], |sums, digests| [0, 1].map(|at| join(sums[at], digests[at])));
         // Half the bits suffice to distinguish sets, and their sum over ranks is exact.
+        let [derivatives, branches] = mine.map(|digest| (digest >> 32) as f64);
         let is_asked_to_stop = f64::from(u8::from(self.session.is_asked_to_stop()));
-        let [all, asked_to_stop] = self.session.sum([(mine >> 32) as f64, is_asked_to_stop]);
+        let [derivatives, branches, asked_to_stop] =
+            self.session.sum([derivatives, branches, is_asked_to_stop]);
         if asked_to_stop > 0.0 {
             return Err(Error::Stopped("the run was asked to stop within a step".into()));
         }
-        self.counts.sets.push(all);
-        match self.counts.period() {
+        let residual = self.scratch.residuals[0];
+        self.counts.sets.push(Linearisation { derivatives, branches, residual });
+        match self.counts.period(!self.halves) {
             Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle_message(period))),
             _ => Ok(()),
         }
@@ -499,8 +546,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         if !is_solved {
             return Err(Error::Failed(NO_DIRECTION.into()));
         }
-        let has_settled = self.counts.sets.last_chunk().is_some_and(|[one, other]| one == other);
-        if self.halves && !has_settled { direction.scale(0.5) } else { Ok(()) }
+        if self.halves && !self.counts.keeps_branches() { direction.scale(0.5) } else { Ok(()) }
     }
 }
 
@@ -726,9 +772,43 @@ mod tests {
         assert!(!Floor::default().is_reached(1e-300, 1.0));
     }
 
+    fn counts(sets: &[[f64; 3]]) -> SolveCounts {
+        let set =
+            |[derivatives, branches, residual]: [f64; 3]| Linearisation { derivatives, branches, residual };
+        SolveCounts { sets: sets.iter().copied().map(set).collect(), ..SolveCounts::default() }
+    }
+
+    #[test]
+    fn branches_that_recur_with_the_same_residual_have_a_period() {
+        let curved = [[1.0, 7.0, 5.0], [2.0, 8.0, 9.0], [3.0, 7.0, 5.001]];
+        assert_eq!([true, false].map(|are_full| counts(&curved).period(are_full)), [Some(2); 2]);
+        let nearer = [[1.0, 7.0, 5.0], [2.0, 8.0, 9.0], [3.0, 7.0, 4.9]];
+        assert_eq!([true, false].map(|are_full| counts(&nearer).period(are_full)), [None; 2]);
+        let straight = [[1.0, 7.0, 5.0], [2.0, 8.0, 9.0], [1.0, 7.0, 3.0]];
+        assert_eq!([true, false].map(|are_full| counts(&straight).period(are_full)), [Some(2), None]);
+        let unknown = [[1.0, 7.0, f64::NAN], [2.0, 8.0, f64::NAN], [3.0, 7.0, f64::NAN]];
+        assert_eq!(counts(&unknown).period(true), None);
+        assert!(counts(&[[1.0, 7.0, 5.0], [2.0, 7.0, 3.0]]).keeps_branches());
+        assert!(
+            !counts(&[[1.0, 7.0, 5.0], [1.0, 8.0, 3.0]]).keeps_branches()
+                && !counts(&curved[..1]).keeps_branches()
+        );
+    }
+
+    #[test]
+    fn a_line_search_is_stuck_where_ten_iterations_lower_the_residual_by_less_than_half_a_per_cent() {
+        let after = |ratio: f64| {
+            let sets: Vec<[f64; 3]> = (0..11).map(|n| [f64::from(n), 0.0, ratio.powi(n)]).collect();
+            (counts(&sets).is_stuck(), counts(&sets[1..]).is_stuck())
+        };
+        assert_eq!(after(0.9999), (true, false));
+        assert_eq!([0.999, 0.5, f64::NAN].map(after), [(false, false); 3]);
+    }
+
     #[test]
     fn a_set_of_branches_that_recurs_after_others_has_a_period() {
-        let period = |sets: &[f64]| SolveCounts { sets: sets.to_vec(), ..SolveCounts::default() }.period();
+        let set = |derivatives: &f64| [*derivatives, 0.0, f64::NAN];
+        let period = |sets: &[f64]| counts(&sets.iter().map(set).collect::<Vec<_>>()).period(true);
         assert_eq!(period(&[]), None);
         assert_eq!(period(&[1.0]), None);
         assert_eq!(period(&[1.0, 2.0, 3.0]), None, "no set recurs");

@@ -34,6 +34,11 @@ pub(super) enum Search {
 }
 
 impl Search {
+    /// Whether each step leads to the solution of the linearised equations, or at first half of the way there.
+    pub(super) fn follows_branches(self) -> bool {
+        matches!(self, Self::FullSteps | Self::HalfSteps)
+    }
+
     /// Whether steps lower an energy.
     pub(super) fn minimises(self) -> bool {
         matches!(self, Self::Descent | Self::ShortDescent | Self::Yielding | Self::Falling)
@@ -55,6 +60,8 @@ pub(super) struct Properties {
     pub flows: bool,
     /// Whether there is friction.
     pub has_friction: bool,
+    /// Whether nothing but loads and obstacles moves the body, which has moved before.
+    pub may_rest: bool,
     /// Whether friction moves obstacles that forces drive.
     pub friction_moves_obstacles: bool,
     /// Whether forces of laws may fall with the motion.
@@ -73,7 +80,7 @@ impl Properties {
     /// ones beyond the yield stress overshoot. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
     /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge.
     ///
-    /// With friction, full steps may let points stick and slide in turn, most of all where little but friction holds a body: steps of half
+    /// With friction, full steps may let points stick and slide in turn, most of all where little but friction holds a body.: steps of half
     /// the length come second, then full steps with larger parameters, which fail or succeed soon, and friction points that yield less and
     /// less. For a light obstacle on a stiff body, which points that stick and slide in turn move to and fro, they yield after more full
     /// steps, and where laws soften at last: on the way they slide, while there may be another solution in which they stick. Where friction
@@ -83,22 +90,22 @@ impl Properties {
         use Search::{Backtracking, Descent, Equilibrated, Falling, FullSteps, HalfSteps, Yielding};
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
-        let rubs = self.has_friction && !self.friction_moves_obstacles;
+        let rubs = self.rubs();
         let turns = rubs && !self.softens;
         [
             (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
             (follows_bounds && rubs, HalfSteps, 1.0, Newton),
-            (turns && follows_bounds, FullSteps, 10.0, Newton),
-            (turns && follows_bounds, FullSteps, 100.0, Newton),
+            (rubs && follows_bounds, FullSteps, 10.0, Newton),
+            (rubs && follows_bounds, FullSteps, 100.0, Newton),
             (turns, Yielding, 1.0, FixedPoint),
             (follows_bounds && self.flows, Backtracking, 1.0, Newton),
             (follows_bounds, Equilibrated, 1.0, Newton),
             (follows_bounds, Equilibrated, 10.0, Newton),
-            (follows_bounds && !turns, FullSteps, 10.0, Newton),
+            (follows_bounds && !rubs, FullSteps, 10.0, Newton),
             (self.friction_moves_obstacles, Yielding, 1.0, FixedPoint),
             (follows_bounds && !self.flows, Backtracking, 1.0, Newton),
-            (follows_bounds && !turns, FullSteps, 100.0, Newton),
+            (follows_bounds && !rubs, FullSteps, 100.0, Newton),
             (follows_bounds, Backtracking, 1.0 / 30.0, Newton),
             (fixes_bounds, FullSteps, 1.0, FixedPoint),
             (fixes_bounds, Equilibrated, 1.0, FixedPoint),
@@ -119,13 +126,27 @@ impl Properties {
         })
     }
 
+    /// Whether friction acts, and moves no obstacles.
+    fn rubs(self) -> bool {
+        self.has_friction && !self.friction_moves_obstacles
+    }
+
+    /// Whether a body at rest is worth a try where full steps fail: where a load that came at once stays, the extrapolated velocity repeats
+    /// what the load did.
+    pub(super) fn may_be_solved_at_rest(self) -> bool {
+        self.may_rest
+            && self.rubs()
+            && self.fallbacks().next().is_some_and(|first| first.search == Search::FullSteps)
+    }
+
     /// Whether the equations can be solved by this search.
     fn allows(self, search: Search) -> bool {
         match search {
-            Search::FullSteps | Search::HalfSteps | Search::Yielding => !self.has_user_search,
             Search::Equilibrated => self.interior_is_linear,
             Search::Backtracking => true,
-            Search::Descent | Search::ShortDescent | Search::Falling => self.softens && !self.has_user_search,
+            _ if self.has_user_search => false,
+            Search::Descent | Search::ShortDescent | Search::Falling => self.softens,
+            _ => true,
         }
     }
 }
@@ -141,6 +162,7 @@ mod tests {
         interior_is_linear: true,
         flows: false,
         has_friction: false,
+        may_rest: false,
         friction_moves_obstacles: false,
         softens: false,
         has_bonds: false,
@@ -182,6 +204,10 @@ mod tests {
         let tresca = Properties { has_friction: true, ..FRICTIONLESS };
         let next = [Search::HalfSteps, Search::FullSteps, Search::FullSteps, Search::Yielding];
         assert!([coulomb, tresca].into_iter().all(|friction| searches(friction)[1..5] == next));
+        let resting = |properties: Properties| properties.may_be_solved_at_rest();
+        assert!(resting(Properties { may_rest: true, ..tresca }) && !resting(tresca));
+        assert!(!resting(Properties { may_rest: true, ..FRICTIONLESS }));
+        assert!(!resting(Properties { may_rest: true, has_bonds: true, softens: true, ..tresca }));
         let weakening = searches(Properties { softens: true, ..tresca });
         assert_eq!(weakening[1], Search::HalfSteps);
         assert_eq!(weakening.last(), Some(&Search::Falling));

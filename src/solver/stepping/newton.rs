@@ -51,6 +51,8 @@ pub(super) struct Newton {
     pub(super) counts: SolveCounts,
     /// The velocity from which the step was started.
     start: DistributedVector,
+    /// The velocity of the whole body from which the step was started, where it is tried at rest as well.
+    pub(super) extrapolated: Option<DistributedVector>,
     /// Whether the user has set a line search.
     has_user_search: bool,
     /// Work data for cells that flow, if there are any.
@@ -103,6 +105,7 @@ impl Newton {
             // Longer solutions enlarge the list.
             counts: SolveCounts { sets: Vec::with_capacity(128), ..SolveCounts::default() },
             start: like.like()?,
+            extrapolated: None,
             has_user_search: has_option("snes_linesearch_type")?,
             flow: None,
         })
@@ -124,7 +127,7 @@ impl Newton {
             return self.check_inclusion(problem, equations.velocity, inclusion);
         }
         self.start(problem, &mut equations)?;
-        let properties = self.properties(problem.body);
+        let properties = self.properties(problem);
         // With these parameters, whatever those of the last step were: a restarted run does not know them.
         if let Some(first) = properties.fallbacks().next() {
             self.set_graph_parameters(&mut problem.body.contacts, system.scales, first);
@@ -132,7 +135,7 @@ impl Newton {
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let mut failure = String::new();
         let is_yielding = |fallback: &Fallback| fallback.search == Search::Yielding;
-        let mut rest = properties.fallbacks().take(system.fallbacks);
+        let mut rest = properties.fallbacks().skip(system.fallbacks[0]).take(system.fallbacks[1]);
         let (mut next, mut has_yielded) = (rest.next(), false);
         while let Some(fallback) = next {
             loop {
@@ -287,8 +290,12 @@ impl Newton {
             .set_columns(problem.session, contacts, &self.start, |x, y| system.matrix.multiply(x, y))
     }
 
-    fn properties<const D: usize, const S: usize>(&self, body: &Body<D, S>) -> Properties {
-        let contacts = &body.contacts;
+    /// The properties of a step that determine its fallbacks.
+    pub(super) fn properties<const D: usize, const S: usize>(
+        &self,
+        problem: &StepProblem<'_, D, S>,
+    ) -> Properties {
+        let (body, contacts) = (&*problem.body, &problem.body.contacts);
         let follows =
             |contact: &Contact<D>| contact.friction.as_ref().is_some_and(|f| f.law.follows_pressure());
         let flows = self.flow.is_some();
@@ -304,6 +311,7 @@ impl Newton {
                     .any(|contact| contact.normal.needs_ghosts || contact.obstacle.is_driven()),
             flows,
             has_friction,
+            may_rest: problem.may_rest,
             friction_moves_obstacles: has_friction && !self.obstacles.is_empty(),
             softens: (flows && body.softens()) || contacts.iter().any(decreases),
             has_bonds: flows && body.softens_at_surface(),
@@ -384,7 +392,7 @@ impl Newton {
         sharpness: f64,
     ) -> Result<Option<&'static str>> {
         if !self.has_user_search {
-            self.snes.search_along_steps(!matches!(search, Search::FullSteps | Search::HalfSteps))?;
+            self.snes.search_along_steps(!search.follows_branches())?;
         }
         // A tolerance relative to the first residual of the step suffices: the right-hand side is almost zero where only an obstacle
         // moves the body.
@@ -418,7 +426,7 @@ impl Newton {
             scratch: &mut self.scratch,
             linear_solver: krylov,
             session: problem.session,
-            stop_at_cycles: search == Search::FullSteps,
+            stop_at_cycles: search.follows_branches(),
             halves: search == Search::HalfSteps,
             patience,
             equilibrated: is_equilibrated,
@@ -541,7 +549,7 @@ fn may_fall<const D: usize>(contact: &Contact<D>) -> bool {
 /// The reason why Newton's method failed, as a message.
 fn explain(reason: &str, counts: &SolveCounts) -> String {
     let reason = reason.to_owned();
-    counts.period().map_or(reason.clone(), |period| format!("{reason}; {}", cycle_message(period)))
+    counts.period(true).map_or(reason.clone(), |period| format!("{reason}; {}", cycle_message(period)))
 }
 
 /// Writes the steepest descent of each contact's friction at the pressures in its bounds, over all ranks. Collective.

@@ -36,6 +36,8 @@ pub(super) struct StepProblem<'a, const D: usize, const S: usize> {
     pub norm: f64,
     /// The residual norm in N due to rounding errors of the forces.
     pub rounding: f64,
+    /// Whether zero is a velocity that supports allow and inertia does not resist, and not the one from which the step starts.
+    pub may_rest: bool,
     /// The displacement from which the step starts.
     pub flow_start: FlowStart<'a>,
     /// The work done for the step.
@@ -55,8 +57,8 @@ pub(super) struct System<'a> {
     pub floor: Floor,
     /// The residual below which rounding errors may hide that nothing holds a body yet: equations are given up soon.
     pub hiding_floor: Floor,
-    /// The number of fallbacks that are tried.
-    pub fallbacks: usize,
+    /// The fallbacks that are tried: the number of those that are left out before, and theirs.
+    pub fallbacks: [usize; 2],
     /// The velocity of the converged state.
     pub converged: &'a DistributedVector,
     /// The parameters of each contact's graphs, along the normal and of friction: equal to the resistance of the body to motions of

@@ -342,8 +342,11 @@ impl Stepper {
                 scale = scale.max(open);
             }
         }
+        let may_rest =
+            step.previous_length > 0.0 && self.moving_supports.is_none() && !body.has_form(Form::Mass);
         let mut problem = StepProblem {
             session,
+            may_rest,
             body,
             state,
             converged,

@@ -417,7 +417,7 @@ impl<const D: usize> Friction<D> {
         self.points.iter().any(|p| p.tangent.coefficient > 0.0)
     }
 
-    /// Hash that differs between linearisations with different sets of branches.
+    /// Numbers that differ between linearisations with different sets of branches.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         // In 2D the direction of sliding is one of two.
         let sense = |p: &TangentialPoint<D>| {

@@ -192,13 +192,23 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Hash that differs between linearisations whose points are on different branches.
-    pub fn set_digest(&self) -> u64 {
+    /// Hashes of a linearisation. The first differs between different linearisations; the second stays the same while each point stays on
+    /// one branch, although its slope may change there.
+    pub fn set_digests(&self) -> [u64; 2] {
         let normal = self.normal.points.iter().flat_map(|p| [p.theta, p.slope]);
         let numbers = normal.chain(self.friction.iter().flat_map(Friction::numbers));
-        let mut digest = Xxh3::new();
-        numbers.for_each(|number| digest.update(&number.to_le_bytes()));
-        digest.digest()
+        let [mut digest, mut of_branches] = [Xxh3::new(), Xxh3::new()];
+        for number in numbers {
+            digest.update(&number.to_le_bytes());
+            // Shares of 0 and 1 are those of flat and of vertical branches.
+            let branch = if number.abs() < 1.0 {
+                2.0 * number.signum() * number.abs().ceil()
+            } else {
+                number.signum()
+            };
+            of_branches.update(&branch.to_le_bytes());
+        }
+        [digest.digest(), of_branches.digest()]
     }
 }
 

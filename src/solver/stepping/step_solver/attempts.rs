@@ -472,6 +472,7 @@ impl Accuracy {
         let [floor, hiding_floor] =
             if awaits_pressure { [Floor::default(), hiding(floor)] } else { [floor, Floor::default()] };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
+        let fallbacks = [0, fallbacks];
         System { matrix, right_hand_side, tolerance, floor, hiding_floor, fallbacks, converged, scales }
     }
 }
