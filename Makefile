@@ -38,7 +38,7 @@ help:
 	@echo 'make build     compile the solver: $(binary)'
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
-	@echo 'make reference  build, then write what is generated from the types of the keys: schema/ and docs/reference-*keys.md'
+	@echo 'make reference  build, then write what is generated from the types of the keys: schema/ and docs/reference-*.md'
 	@echo 'make test      deps, then every test, and random input for each reader of files; ARGS=--write puts the slowest into docs'
 	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
 	@echo 'make test64-lib  only the tests of the library there'
@@ -87,6 +87,8 @@ reference: build
 	$(binary) describe study --json > schema/study.schema.json
 	$(binary) describe --markdown > docs/reference-keys.md
 	$(binary) describe study --markdown > docs/reference-study-keys.md
+	$(binary) describe outputs --json > schema/outputs.json
+	$(binary) describe outputs --markdown > docs/reference-outputs.md
 
 # ARGS=--write puts the slowest tests into docs/tests.md.
 test: deps

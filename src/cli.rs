@@ -14,7 +14,7 @@ use crate::{
         agreement::Agreed,
         session::{Mpi, Session},
     },
-    postprocessing::{remesh, report, study},
+    postprocessing::{outputs, remesh, report, study},
     run::{self, Clock, Start},
 };
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -84,15 +84,17 @@ enum Command {
         #[arg(long)]
         trust: bool,
     },
-    /// Print the meaning, unit, range and default of the keys of a job file (describe study: of a study file).
+    /// Print the meaning, unit, range and default of the keys of a job file (describe study: of a study file; describe outputs: meaning
+    /// and unit of all that output files contain).
     Describe {
-        /// Table or key to print, such as material.elasticity or time.step; absent: all tables.
-        #[arg(num_args = 0..=2)]
+        /// Table or key to print, such as material.elasticity or time.step, or a word, such as the name of a column; absent: all tables.
+        #[arg(num_args = 0..=3)]
         table: Vec<String>,
-        /// Print the JSON Schema of the whole job, or of the whole study; editors complete and check keys with it.
+        /// Print the JSON Schema of the whole job, or of the whole study; editors complete and check keys with it. Of outputs: their names,
+        /// units and meanings.
         #[arg(long)]
         json: bool,
-        /// Print all keys of a job, or of a study, as a page in Markdown.
+        /// Print all keys of a job, or of a study, or all that output files contain, as a page in Markdown.
         #[arg(long, conflicts_with = "json")]
         markdown: bool,
     },
@@ -268,19 +270,25 @@ enum Form {
 }
 
 fn describe(table: Option<&str>, form: Option<Form>) -> Result<Exit> {
-    let of_study = table.and_then(|table| table.trim_matches(['[', ']']).strip_prefix("study"));
-    let of_study = of_study.filter(|rest| rest.is_empty() || rest.starts_with('.'));
-    match (of_study.map(|rest| rest.trim_start_matches('.')), form) {
-        (Some(table), None) => say(&study::describe(Some(table).filter(|table| !table.is_empty()))?),
-        (None, None) => say(&job::describe(table)?),
-        (Some(""), Some(Form::Json)) => say(&study::describe_json()),
-        (Some(""), Some(Form::Markdown)) => say(&study::describe_markdown()),
-        (None, Some(Form::Json)) if table.is_none() => say(&job::describe_json()),
-        (None, Some(Form::Markdown)) if table.is_none() => say(&job::describe_markdown()),
-        _ => Err(Error::Refused(
-            "--json and --markdown print all keys: solver describe --json, or describe study --json".into(),
-        )),
-    }
+    let table = table.map(|table| table.trim_matches(['[', ']']));
+    let (of, rest) = table.map_or(("", ""), |table| table.split_once('.').unwrap_or((table, "")));
+    let text = match (of, rest, form) {
+        ("study", rest, None) => study::describe(Some(rest).filter(|rest| !rest.is_empty()))?,
+        ("study", "", Some(Form::Json)) => study::describe_json(),
+        ("study", "", Some(Form::Markdown)) => study::describe_markdown(),
+        ("outputs", rest, None) => outputs::describe(rest)?,
+        ("outputs", "", Some(Form::Json)) => outputs::describe_json(),
+        ("outputs", "", Some(Form::Markdown)) => outputs::describe_markdown(),
+        (_, _, None) => job::describe_kind(job::Kind::job(), table, &outputs::named())?,
+        ("", "", Some(Form::Json)) => job::describe_json(),
+        ("", "", Some(Form::Markdown)) => job::describe_markdown(),
+        _ => {
+            return Err(Error::Refused(
+                "--json and --markdown print everything: solver describe --json, describe study --json or describe outputs --json".into(),
+            ));
+        }
+    };
+    say(&text)
 }
 
 fn completion(shell: Shell) -> Result<Exit> {

@@ -203,12 +203,17 @@ fn the_jobs_in_the_pages_are_valid() {
 
 #[test]
 fn generated_files_are_those_of_the_source() {
-    use clarke::{job, postprocessing::study};
+    use clarke::{
+        job,
+        postprocessing::{outputs, study},
+    };
     let files = [
         ("schema/job.schema.json", job::describe_json()),
         ("schema/study.schema.json", study::describe_json()),
         ("docs/reference-keys.md", job::describe_markdown()),
         ("docs/reference-study-keys.md", study::describe_markdown()),
+        ("schema/outputs.json", outputs::describe_json()),
+        ("docs/reference-outputs.md", outputs::describe_markdown()),
     ];
     for (file, text) in files {
         assert!(

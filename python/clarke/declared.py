@@ -1,46 +1,34 @@
-"""Units of columns, fields and numbers, as the program's page of output files (docs/reference-outputs.md) declares them.
-
-The tests of the program compare that page with the columns that it writes; there is no second list here.
-"""
+"""Units of columns, fields and numbers, as the program declares them (`solver describe outputs --json`)."""
 
 from __future__ import annotations
 
 import functools
+import json
 from pathlib import Path
 
-PAGE = Path(__file__).with_name("reference-outputs.md")
-# "In plane problems forces, moments and energies are per metre of thickness", and areas are lengths.
-IN_PLANE = {"N": "N/m", "N m": "N", "J": "J/m", "m²": "m"}
+FILE = Path(__file__).with_name("outputs.json")
 
 
 @functools.cache
-def units(section: str) -> dict[str, str]:
-    """The unit of each name in the tables of a section, such as `history.csv`, `Fields` or `summary.json`; empty without unit."""
-    found: dict[str, str] = {}
-    heading: list[str] = []
-    for line in _section(section).splitlines():
-        cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if line.startswith("| `") and len(cells) == len(heading) and "unit" in heading:
-            names = cells[0].split("`")[1::2]
-            entry = cells[heading.index("unit")]
-            several = [unit.strip() for unit in entry.split(",")]
-            matched = several if len(several) == len(names) else [entry] * len(names)
-            found.update(zip(names, matched, strict=True))
-        elif line.startswith("|") and not line.startswith("|--"):
-            heading = cells
-    return found
+def units(file: str) -> dict[str, tuple[str, str]]:
+    """The unit of each name in a file, such as `history.csv`, `fields.vtkhdf` or `summary.json`, in the plane and in space."""
+    for declared in json.loads(FILE.read_text(encoding="utf-8"))["files"]:
+        if declared["file"] == file:
+            names = declared.get("columns") or declared.get("fields") or declared["members"]
+            return {name["name"]: (name["unit_in_plane"], name["unit"]) for name in names}
+    return {}
 
 
-def unit(section: str, name: str, is_plane: bool) -> str:
-    """The unit of a name; that of 1 is empty, and so is that of a name that is not on the page."""
-    found = units(section).get(name, "")
-    found = "" if found == "1" else found
-    return IN_PLANE.get(found, found) if is_plane and section.endswith(".csv") else found
+def unit(file: str, name: str, is_plane: bool) -> str:
+    """The unit of a name; empty for a number without one, and for a name that is not declared."""
+    return units(file).get(name, ("", ""))[0 if is_plane else 1]
 
 
-def _section(title: str) -> str:
-    text = PAGE.read_text(encoding="utf-8")
-    for part in text.split("\n## ")[1:]:
-        if part.splitlines()[0].strip("` ") == title:
-            return part
-    return ""
+def unit_of_member(name: str, is_plane: bool) -> str:
+    """The unit of a number of `summary.json`, such as `wall_seconds.total`, whose name or position in its member depends on the run."""
+    found = unit("summary.json", name, is_plane)
+    member, _, part = name.rpartition(".")
+    if found or not member:
+        return found
+    several = unit("summary.json", member, is_plane).split(", ")
+    return several[int(part) if part.isdigit() and int(part) < len(several) else 0]

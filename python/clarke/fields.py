@@ -42,7 +42,7 @@ def grid(path: Path, time: float | None, nearest: bool) -> pyvista.UnstructuredG
                 data[name] = values[first : first + count]
         made.user_dict["time"] = _times(file)[step]
     made.user_dict["units"] = {
-        name: declared.unit("Fields", name, False) for name in (*made.point_data, *made.cell_data)
+        name: declared.unit("fields.vtkhdf", name, False) for name in (*made.point_data, *made.cell_data)
     }
     return made
 

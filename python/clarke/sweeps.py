@@ -159,7 +159,7 @@ def _numbers_or_words(entries: list[str]) -> list[Any]:
 def _unit(response: str, is_plane: bool) -> str:
     word, _, rest = WINDOW.sub("", response).partition(".")
     if word not in TABLES:
-        return declared.unit("summary.json", response.split(".")[-1], is_plane)
+        return declared.unit_of_member(WINDOW.sub("", response), is_plane)
     if ".period." in rest or ".arrival." in rest:
         return "s"
     file = "history.csv" if word == "history" else f"{word}s.csv"

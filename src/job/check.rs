@@ -67,13 +67,9 @@ pub(super) fn check(job: &Job, table: &mut Table<'_>) {
 /// The checks that need the dimension and the names of the mesh.
 pub(super) fn check_names(job: &Job, table: &mut Table<'_>, mesh: MeshNames<'_>) {
     check_hypothesis(job, table, mesh.dimension);
-    for (path, material) in job.materials() {
-        check_material_in_body(
-            material,
-            &mut table.table(&path),
-            (&job.mesh, mesh.dimension, job.material.hypothesis),
-        );
-    }
+    each_material(job, table, |material, table| {
+        check_material_in_body(material, table, (&job.mesh, mesh.dimension, job.material.hypothesis));
+    });
     check_regions(job, table, mesh);
     table.each("support", &job.support, |support, table| support.check_names(table, mesh));
     table.each("traction", &job.traction, |traction, table| traction.check_names(table, mesh));
@@ -106,6 +102,11 @@ fn check_hypothesis(job: &Job, table: &mut Table<'_>, dimension: usize) {
     }
 }
 
+/// Checks the table of each material.
+fn each_material(job: &Job, table: &mut Table<'_>, mut check: impl FnMut(&Material, &mut Table<'_>)) {
+    job.materials().for_each(|(path, material)| check(material, &mut table.table(&path)));
+}
+
 /// Whether this is 0 always and everywhere.
 fn is_zero(value: &Scalar) -> bool {
     !value.depends_on_time() && !value.depends_on_position() && value.evaluate(0.0, &[]) == 0.0
@@ -113,27 +114,25 @@ fn is_zero(value: &Scalar) -> bool {
 
 /// What acts on a body of revolution acts in its section, and all around alike.
 fn check_revolved(job: &Job, table: &mut Table<'_>) {
-    let mut refuse = |key: String, message: &str, help: &str| table.fault(&key, message, help);
     if job.gravity.as_ref().and_then(|gravity| gravity.acceleration.first()).is_some_and(|x| !is_zero(x)) {
         let message = "the weight of a body of revolution acts along its axis, y";
-        refuse("gravity.acceleration".into(), message, "give 0 as the first component");
+        table.fault("gravity.acceleration", message, "give 0 as the first component");
     }
-    for (number, contact) in job.contact.iter().enumerate() {
-        let path = |key: &str| format!("contact.{number}.{key}");
+    table.each("contact", &job.contact, |contact, table| {
         let turning = "an obstacle beside a body of revolution does not turn in its section";
         if let Some(key) = contact.obstacle.as_ref().and_then(Gap::rotation_key) {
-            refuse(path(&key), turning, "delete this key");
+            table.fault(&key, turning, "delete this key");
         }
-        let Some(load) = &contact.obstacle_load else { continue };
+        let Some(load) = &contact.obstacle_load else { return };
         if load.direction.first().is_some_and(|x| *x != 0.0) {
             let help = "give a direction along the axis, such as [0, -1]";
             let message = "an obstacle beside a body of revolution is moved along the axis, y";
-            refuse(path("obstacle_load.direction"), message, help);
+            table.fault("obstacle_load.direction", message, help);
         }
         if load.moment.is_some() {
-            refuse(path("obstacle_load.moment"), turning, "delete this key");
+            table.fault("obstacle_load.moment", turning, "delete this key");
         }
-    }
+    });
 }
 
 /// Regions are those of the mesh. Cells of others have the main material, which may be empty only if there are none.
@@ -283,25 +282,45 @@ fn check_formulas_of_strain(job: &Job, table: &mut Table<'_>, has_initial_stress
 
 /// Flow heats the body by what it dissipates, and is as fast as the temperature has it, where this is known.
 fn check_heat_of_flow(job: &Job, table: &mut Table<'_>) {
-    for (path, material) in job.materials() {
-        let Some(law) = &material.viscoplasticity else { continue };
+    let mut unbounded = Vec::new();
+    each_material(job, table, |material, table| {
+        let Some(law) = &material.viscoplasticity else { return };
         let heats = material.heat.is_some_and(|heat| heat.dissipation_share > 0.0);
         if heats && law.with_yield_stress(0.0).has_back_stress() {
             let message = "kinematic hardening stores part of the work of flow and gives it back, which is not told from heat";
-            let help = format!(
-                "set dissipation_share = 0 in {}, or delete `kinematic_modulus`",
-                header(&format!("{path}.heat"))
+            let heat = table.header("heat");
+            table.fault(
+                "heat",
+                message,
+                format!("set dissipation_share = 0 in {heat}, or delete `kinematic_modulus`"),
             );
-            table.fault(&format!("{path}.heat"), message, help);
         }
-        if law.sees_temperature() && !job.time.scheme.is_implicit() {
-            let message = format!(
-                "no bound of the step is known with scheme \"{}\" for {}, which depends on the temperature",
-                job.time.scheme.name(),
-                header(&format!("{path}.viscoplasticity.expression"))
-            );
-            table.fault("time.scheme", message, "use \"implicit_euler\", \"bdf2\" or \"midpoint\"");
-        }
+        unbounded.extend(law.sees_temperature().then(|| table.header("viscoplasticity.expression")));
+    });
+    for formula in unbounded.iter().filter(|_| !job.time.scheme.is_implicit()) {
+        let message = format!(
+            "no bound of the step is known with scheme \"{}\" for {formula}, which depends on the temperature",
+            job.time.scheme.name()
+        );
+        table.fault("time.scheme", message, "use \"implicit_euler\", \"bdf2\" or \"midpoint\"");
+    }
+}
+
+/// Friction that has to do with heat, in a body with heat or without.
+fn check_heat_of_contact(contact: &Contact, table: &mut Table<'_>, body_has_heat: bool) {
+    if let Some(law) = contact.friction.as_ref().filter(|law| law.sees_temperature() && !body_has_heat) {
+        let message = "the coefficient contains the temperature, which this body does not have";
+        let help = "add [material.heat], or delete `temperature` from the formula";
+        table.fault(law.table(), message, help);
+    }
+    let (lacks, needed) = match contact.friction {
+        _ if !body_has_heat => ("a material with heat", "[material.heat]"),
+        None => ("friction", "[contact.friction]"),
+        Some(_) => return,
+    };
+    if contact.friction_heat.is_some() {
+        let message = format!("a share of the heat of friction requires {lacks}");
+        table.fault_at_key("friction_heat", message, format!("add {needed}, or delete it"));
     }
 }
 
@@ -311,31 +330,17 @@ fn check_heat(job: &Job, table: &mut Table<'_>) {
     let has_heat = |material: &Material| material.heat.is_some();
     let initial = job.initial.as_ref();
     let temperature = initial.and_then(|initial| initial.temperature.as_ref());
-    let flows = job.materials().filter(|(_, material)| {
-        !has_heat(material) && material.viscoplasticity.as_ref().is_some_and(|law| law.sees_temperature())
+    each_material(job, table, |material, table| {
+        if !has_heat(material) && material.viscoplasticity.as_ref().is_some_and(|law| law.sees_temperature())
+        {
+            let message = "the rate contains the temperature, which this material does not have";
+            let help = format!("add {}, or delete `temperature` from the formula", table.header("heat"));
+            table.fault("viscoplasticity.expression.rate", message, help);
+        }
     });
-    for (path, _) in flows {
-        let message = "the rate contains the temperature, which this material does not have";
-        let help =
-            format!("add {}, or delete `temperature` from the formula", header(&format!("{path}.heat")));
-        table.fault(&format!("{path}.viscoplasticity.expression.rate"), message, help);
-    }
-    for (number, contact) in job.contact.iter().enumerate().filter(|_| !job.has_heat()) {
-        let friction = contact.friction.as_ref().filter(|law| law.sees_temperature());
-        if let Some(law) = friction {
-            let message = "the coefficient contains the temperature, which this body does not have";
-            let help = "add [material.heat], or delete `temperature` from the formula";
-            table.fault(&format!("contact.{number}.{}", law.table()), message, help);
-        }
-        if contact.friction_heat.is_some() {
-            let message = "a share of the heat of friction requires a material with heat";
-            table.fault_at_key(
-                &format!("contact.{number}.friction_heat"),
-                message,
-                "add [material.heat], or delete it",
-            );
-        }
-    }
+    table.each("contact", &job.contact, |contact, table| {
+        check_heat_of_contact(contact, table, job.has_heat());
+    });
     if !job.has_heat() {
         let help = "add [material.heat], or delete it";
         if !job.heat.is_empty() {
@@ -347,24 +352,14 @@ fn check_heat(job: &Job, table: &mut Table<'_>) {
         }
         return;
     }
-    for (number, contact) in job.contact.iter().enumerate() {
-        if contact.friction_heat.is_some() && contact.friction.is_none() {
-            let message = "a share of the heat of friction requires friction";
-            table.fault_at_key(
-                &format!("contact.{number}.friction_heat"),
-                message,
-                "add [contact.friction], or delete it",
-            );
-        }
-    }
     check_heat_of_flow(job, table);
-    let without = job.materials().filter(|(_, material)| material.resists() && !has_heat(material));
-    for (path, _) in without {
-        let message = format!("{} has no heat, which other materials have", header(&path));
-        let help =
-            format!("add {}: the temperature is a field of the whole body", header(&format!("{path}.heat")));
-        table.fault(&path, message, help);
-    }
+    each_material(job, table, |material, table| {
+        if material.resists() && !has_heat(material) {
+            let message = format!("{} has no heat, which other materials have", table.header(""));
+            let help = format!("add {}: the temperature is a field of the whole body", table.header("heat"));
+            table.fault("", message, help);
+        }
+    });
     if temperature.is_none() && initial.is_none_or(|initial| initial.from.is_none()) {
         let key = if initial.is_some() { "initial" } else { "material.heat" };
         table.fault(key, "a body with heat has no initial temperature", "add [initial] temperature = 293.0");
@@ -383,15 +378,15 @@ fn check_method(job: &Job, table: &mut Table<'_>) {
 
 /// Where boundaries meet, the bonds of a node break together: by one rule.
 fn check_strengths(job: &Job, table: &mut Table<'_>) {
-    let contacts = job.contact.iter().enumerate();
-    let mut bonded =
-        contacts.filter_map(|(number, contact)| Some((number, contact.adhesion?.strength.is_some())));
-    let Some((_, first)) = bonded.next() else { return };
-    for (number, _) in bonded.filter(|(_, has_strength)| *has_strength != first) {
-        let message = "either all adhesion tables of a job have a `strength` or none has";
-        let help = "give all of them a strength, or delete the key everywhere";
-        table.fault_at_key(&format!("contact.{number}.adhesion"), message, help);
-    }
+    let has_strength = |contact: &Contact| Some(contact.adhesion?.strength.is_some());
+    let first = job.contact.iter().find_map(has_strength);
+    table.each("contact", &job.contact, |contact, table| {
+        if has_strength(contact).is_some_and(|has_strength| Some(has_strength) != first) {
+            let message = "either all adhesion tables of a job have a `strength` or none has";
+            let help = "give all of them a strength, or delete the key everywhere";
+            table.fault_at_key("adhesion", message, help);
+        }
+    });
 }
 
 /// If the end of a step is extrapolated, what cannot be is refused: histories that change in one direction only, and velocities that jump.
@@ -400,29 +395,28 @@ fn check_extrapolation(job: &Job, table: &mut Table<'_>) {
     if !scheme.extrapolates() {
         return;
     }
-    let mut refuse = |path: &str, is_there: bool| {
+    let refuse = |table: &mut Table<'_>, key: &str, is_there: bool| {
         if is_there {
-            let message = format!("`{path}` is not available with scheme \"{}\"", scheme.name());
-            table.fault_at_key(path, message, "use [time] scheme = \"bdf2\", or delete the key");
+            let message = format!("`{}` is not available with scheme \"{}\"", table.path(key), scheme.name());
+            table.fault_at_key(key, message, "use [time] scheme = \"bdf2\", or delete the key");
         }
     };
-    job.materials().for_each(|(path, material)| refuse(&format!("{path}.damage"), material.damage.is_some()));
-    for (number, contact) in job.contact.iter().enumerate() {
-        refuse(&format!("contact.{number}.adhesion"), contact.adhesion.is_some());
-        refuse(&format!("contact.{number}.memory"), contact.memory.is_some());
-    }
-    for (number, support) in job.support.iter().enumerate() {
-        support.motions().for_each(|(key, _)| refuse(&format!("support.{number}.{key}"), true));
-    }
-    refuse("time.adaptive", job.time.adaptive.is_some());
-    for (number, _) in job.contact.iter().enumerate().filter(|(_, contact)| !contact.redistribute_mass) {
-        let message = format!(
-            "with scheme \"{}\" nodes with mass would rebound from the obstacle in each step",
-            scheme.name()
-        );
-        let help = "add redistribute_mass = true, or use another scheme";
-        table.fault_at_key(&format!("contact.{number}"), message, help);
-    }
+    each_material(job, table, |material, table| refuse(table, "damage", material.damage.is_some()));
+    table.each("contact", &job.contact, |contact, table| {
+        refuse(table, "adhesion", contact.adhesion.is_some());
+        refuse(table, "memory", contact.memory.is_some());
+        if !contact.redistribute_mass {
+            let scheme = scheme.name();
+            let message = format!(
+                "with scheme \"{scheme}\" nodes with mass would rebound from the obstacle in each step"
+            );
+            table.fault_at_key("", message, "add redistribute_mass = true, or use another scheme");
+        }
+    });
+    table.each("support", &job.support, |support, table| {
+        support.motions().for_each(|(key, _)| refuse(table, key, true));
+    });
+    refuse(table, "time.adaptive", job.time.adaptive.is_some());
 }
 
 /// An expected result has a tolerance.

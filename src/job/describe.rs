@@ -28,11 +28,21 @@ struct Key {
 /// Meaning, unit, range, default and example of all keys of `table` and the tables below it (of all tables if `None`, after a list of
 /// them), or of the single key that `table` names; where neither has this name, the tables and keys in which the word occurs.
 pub fn describe(table: Option<&str>) -> Result<String> {
-    describe_kind(Kind::job(), table)
+    describe_kind(Kind::job(), table, &[])
 }
 
-/// As [`describe`], of another kind of document.
-pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
+/// A name that is no key, for searches by a word.
+pub(crate) struct Named {
+    /// The name.
+    pub name: String,
+    /// How lists show it.
+    pub shown: String,
+    /// What it means.
+    pub meaning: String,
+}
+
+/// As [`describe`], of any kind of document; words are also searched among `others`.
+pub(crate) fn describe_kind(kind: Kind, table: Option<&str>, others: &[Named]) -> Result<String> {
     let all = tables(kind);
     let wanted = table.unwrap_or_default().trim_matches(['[', ']']);
     if let Some((path, key)) = wanted.rsplit_once('.') {
@@ -52,7 +62,7 @@ pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
         })
         .collect();
     if shown.is_empty() {
-        return occurrences(&all, wanted).ok_or_else(|| unknown_table(kind, wanted, &all));
+        return occurrences(&all, wanted, others).ok_or_else(|| unknown_table(kind, wanted, &all));
     }
     let mut opening = String::new();
     if wanted.is_empty() {
@@ -117,16 +127,15 @@ fn entry(path: &str, meaning: &str) -> String {
     lines(&format!("{path}: {sentence}."), 2)
 }
 
-/// The tables and keys whose name or meaning contains a word, those with the name first; `None` if there are none.
-fn occurrences(all: &[DescribedTable], word: &str) -> Option<String> {
+/// The tables, keys and other names that are a word or, if it has three letters, contain it or have it in their meanings, those with the
+/// name first; `None` if there are none.
+fn occurrences(all: &[DescribedTable], word: &str, others: &[Named]) -> Option<String> {
     let wanted = word.to_lowercase();
-    if wanted.len() < 3 {
-        return None;
-    }
     let mut found: Vec<(usize, String, String)> = Vec::new();
     let mut add = |name: &str, path: String, meaning: String| {
         let rank = match name.to_lowercase() {
             name if name == wanted => 0,
+            _ if wanted.len() < 3 => return,
             name if name.contains(&wanted) => 1,
             _ if meaning.to_lowercase().contains(&wanted) => 2,
             _ => return,
@@ -141,6 +150,9 @@ fn occurrences(all: &[DescribedTable], word: &str) -> Option<String> {
                 key.choices().iter().map(|(word, text)| format!(" \"{word}\": {text}")).collect();
             add(key.name, format!("{}.{}", table.path, key.name), key.meaning() + &choices);
         }
+    }
+    for Named { name, shown, meaning } in others {
+        add(name, shown.clone(), meaning.clone());
     }
     found.sort_by_key(|(rank, ..)| *rank);
     let list: String = found.iter().map(|(_, path, meaning)| entry(path, meaning)).collect();
@@ -337,7 +349,7 @@ impl Key {
 }
 
 /// Text of a table in Markdown; what is between backquotes stays as it is.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let plain = |part: &str| part.replace('*', "\\*").replace('<', "&lt;").replace('|', "\\|");
     let part = |(at, part): (usize, &str)| if at % 2 == 0 { plain(part) } else { part.replace('|', "\\|") };
     text.split('`').enumerate().map(part).collect::<Vec<_>>().join("`")
@@ -426,7 +438,7 @@ fn flat(text: &str) -> String {
 }
 
 /// The text in lines, each after `indent` blanks.
-fn lines(text: &str, indent: usize) -> String {
+pub(crate) fn lines(text: &str, indent: usize) -> String {
     if text.is_empty() {
         return String::new();
     }

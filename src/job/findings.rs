@@ -3,7 +3,7 @@
 use super::report::Fault;
 use super::source::{Node, Value};
 use crate::laws::expression::{Scalar, Variable};
-use crate::laws::law::LawFault;
+use crate::laws::law::{LawFault, header};
 use crate::laws::nearest::nearest;
 
 /// The dimension and the names of a mesh. For a mesh file they are known after reading only.
@@ -56,7 +56,7 @@ impl<'a> Table<'a> {
     }
 
     /// Checks each table of a list.
-    pub(super) fn each<T>(&mut self, list: &str, items: &[T], check: impl Fn(&T, &mut Table<'_>)) {
+    pub(super) fn each<T>(&mut self, list: &str, items: &[T], mut check: impl FnMut(&T, &mut Table<'_>)) {
         for (index, item) in items.iter().enumerate() {
             check(item, &mut self.table(&format!("{list}.{index}")));
         }
@@ -65,6 +65,11 @@ impl<'a> Table<'a> {
     /// The path of a key in the document.
     pub(super) fn path(&self, key: &str) -> String {
         [&*self.path, key].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(".")
+    }
+
+    /// The header of the table at this key, as a document has it.
+    pub(super) fn header(&self, key: &str) -> String {
+        header(&self.path(key))
     }
 
     /// Whether the document has this key.

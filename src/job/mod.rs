@@ -22,8 +22,8 @@ mod validate;
 mod written;
 
 pub use crate::laws::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
+pub(crate) use describe::{Named, describe_kind, escaped, lines, markdown_of};
 pub use describe::{describe, describe_json, describe_markdown};
-pub(crate) use describe::{describe_kind, markdown_of};
 pub use document::*;
 pub use effective::differing_keys;
 pub use findings::{MeshNames, number_of_group};

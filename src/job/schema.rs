@@ -30,7 +30,7 @@ impl Kind {
 
     /// The schema of the whole document.
     pub(crate) fn root(&self) -> Schema {
-        resolve(self.schema, self.schema)
+        Schema::of_root(self.schema)
     }
 }
 
@@ -70,6 +70,11 @@ pub(crate) struct Schema {
 }
 
 impl Schema {
+    /// The schema of a whole document.
+    pub(crate) fn of_root(root: &'static Value) -> Self {
+        resolve(root, root)
+    }
+
     /// The value of a keyword.
     pub(crate) fn get(&self, keyword: &str) -> &'static Value {
         match &self.own[keyword] {

@@ -1,6 +1,7 @@
 //! Studies of accuracy against cost, reports and their pictures, sizes for better meshes.
 
 pub mod drawing;
+pub mod outputs;
 pub mod remesh;
 pub mod study;
 pub mod report;

@@ -28,8 +28,6 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-use serde::Serialize;
-
 /// Safety factor.
 const SAFETY: f64 = 1.25;
 /// That of the error indicator.
@@ -61,23 +59,6 @@ pub struct ErrorOfSteps {
     pub order: f64,
     /// The norm of stress and velocity at the end in J^(1/2), in two dimensions (J/m)^(1/2); at least a twentieth of the largest in the run.
     pub norm: f64,
-}
-
-/// The estimated errors of the state at the end of a run, by their names in `summary.json`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub(super) struct Errors {
-    /// That of the stress by the mesh, or its least value where the body vibrates; absent where it is unknown.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub error_of_mesh: Option<f64>,
-    /// Whether the body vibrates.
-    #[serde(skip)]
-    pub vibrates: bool,
-    /// That of stress and velocity by the steps; absent where it is unknown.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub error_of_steps: Option<f64>,
-    /// The order of the latter.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub order_of_steps: Option<f64>,
 }
 
 /// Stress and velocity at the end of a run.

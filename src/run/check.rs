@@ -1,7 +1,6 @@
 //! `solver check`: what a job would simulate, on which mesh, how and at what cost.
 
 use super::{
-    Inventory,
     estimate::MemoryEstimate,
     folder::refuse_unwritable,
     header,
@@ -9,14 +8,13 @@ use super::{
     obstacles::{self, ContactGaps},
     setup::{Setup, setup},
     steps,
-    summary::PartitionQuality,
     trial::{self, TimeEstimate},
     units::{self, BodySize},
 };
 use crate::{
     error::{Error, Result},
     fem::{body::Body, effect::Form, state::State},
-    io::output::log::WORDS,
+    io::output::{inventory::Inventory, log::WORDS, summary::PartitionQuality},
     job::{Job, Loaded, Probe},
     laws::{digits::Digits, lines::wrapped},
     mesh::{Mesh, check::Quality},

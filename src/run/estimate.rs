@@ -1,9 +1,9 @@
 //! Estimates of the memory of a run: that of arrays is counted, that of the preconditioner is modelled. Expect a factor of two either
 //! way.
 
-use super::Inventory;
 use crate::{
     fem::body::Body,
+    io::output::inventory::Inventory,
     parallel::session::Session,
     solver::stepping::{Preconditioner, ProblemSize},
 };

@@ -1,12 +1,13 @@
 //! The output folder: its contents, and how a run locks and prepares it.
 
-use super::{Start, summary::SUMMARY};
+use super::Start;
 use crate::{
     error::{Error, Result},
     io::output::{
         checkpoint::{start_state_of, state_digest},
         checkpoint_folder::list,
         log::Log,
+        summary::SUMMARY,
     },
     job::{Job, differing_keys},
 };

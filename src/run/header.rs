@@ -1,9 +1,14 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{Summary, accuracy::Errors, setup::Setup, sides, steps};
+use super::{setup::Setup, sides, steps};
 use crate::{
     error::Result,
-    io::output::{field_list::FIELDS, log::Log, output_field::Figures},
+    io::output::{
+        field_list::FIELDS,
+        log::Log,
+        output_field::Figures,
+        summary::{Errors, Summary},
+    },
     job::{Job, Loaded, Method},
     laws::digits::Digits,
     parallel::session::Session,
@@ -108,8 +113,9 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         Digits(summary.peaks.von_mises),
         Digits(summary.final_von_mises)
     ));
-    for Figures { names, line, .. } in FIELDS.iter().filter_map(|field| field.figures) {
-        let found: Option<Vec<f64>> = names.iter().map(|name| summary.of_fields.get(name).copied()).collect();
+    for Figures { members, line } in FIELDS.iter().filter_map(|field| field.figures) {
+        let found: Option<Vec<f64>> =
+            members.iter().map(|figure| summary.of_fields.get(figure.name).copied()).collect();
         found.into_iter().for_each(|figures| log.line(line(&figures)));
     }
     errors(log, summary);

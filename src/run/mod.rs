@@ -10,7 +10,6 @@ mod estimate;
 mod folder;
 mod header;
 mod validate;
-mod inventory;
 mod loads;
 mod materials;
 mod memory;
@@ -28,7 +27,6 @@ mod simulation;
 mod start;
 mod step_line;
 mod steps;
-mod summary;
 mod time_loop;
 mod trial;
 mod units;
@@ -36,11 +34,9 @@ mod units;
 pub use accuracy::{EndState, error_of_mesh, error_of_steps, vibrates, with_steps};
 pub use build::normal_law;
 pub use check::Report;
-pub use inventory::Inventory;
 pub use scene::Scene;
 pub use simulation::Simulation;
 pub use start::{Clock, Start, state_source, version};
-pub use summary::Summary;
 
 use crate::{
     error::{Exit, Result},

@@ -1,7 +1,7 @@
 //! Sets a job up for a run or for `solver check`, without touching the output folder.
 
 use super::{
-    Inventory, bonds, build,
+    bonds, build,
     estimate::MemoryEstimate,
     memory::require_for_run,
     obstacles, pairs, parts,
@@ -13,7 +13,7 @@ use super::{
 use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
-    io::output::{probed, probes::Probes},
+    io::output::{inventory::Inventory, probed, probes::Probes},
     job::Loaded,
     linear_algebra::petsc::set_option,
     mesh::Mesh,

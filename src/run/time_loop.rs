@@ -1,8 +1,8 @@
 //! A run: set-up, steps, checkpoints, closing.
 
 use super::{
-    Clock, Inventory, Simulation, Start,
-    accuracy::{Errors, error_of_mesh, error_of_steps, vibrates},
+    Clock, Simulation, Start,
+    accuracy::{error_of_mesh, error_of_steps, vibrates},
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
     header, obstacles,
@@ -13,12 +13,17 @@ use super::{
     simulation::Prepared,
     step_line::{Short, ShownColumns, StepLine},
     steps,
-    summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
     error::{Error, Exit, Result},
     fem::effect::{Energy, Form},
-    io::output::{checkpoint::Identity, log::Log, output_field::Converged},
+    io::output::{
+        checkpoint::Identity,
+        inventory::Inventory,
+        log::Log,
+        output_field::Converged,
+        summary::{Errors, Guesses, PartitionQuality, Summary, peak_memory},
+    },
     job::{Accept, Job, Loaded},
     laws::digits::Digits,
     linear_algebra::{

@@ -11,11 +11,12 @@ use clarke::{
         },
         space::{Batch, Geometry},
     },
+    io::output::inventory::Inventory,
     job::Job,
     laws::material::{self, ByMaterial, Elastic, FlowLaw, Isotropic, Metric, Perzyna},
     linear_algebra::simd::LANES,
     parallel::session::Session,
-    run::{Inventory, Simulation},
+    run::Simulation,
 };
 use std::{cell::RefCell, collections::BTreeMap, path::Path, rc::Rc};
 

@@ -5,17 +5,20 @@ use crate::linear_algebra::{
     tensor::{dot, larger, von_mises_square},
 };
 use multiversion::multiversion;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The largest stress and strain of a body after a step, or after any step of a run, as files name them.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Peaks {
-    /// Largest von Mises norm of the total stress in Pa.
+    /// Largest von Mises norm of the total stress at the points of integration of cells over all steps; linear cells have one.
     #[serde(rename = "max_von_mises")]
+    #[schemars(title = "largest von Mises stress of the run", extend("unit" = "Pa"))]
     pub von_mises: f64,
-    /// Largest norm of the strain of the displacement, in plane stress of its part in the plane.
+    /// Largest norm of the strain of the displacement over all steps, in plane stress of its part in the plane.
     #[serde(rename = "max_strain")]
+    #[schemars(title = "largest strain of the run")]
     pub strain: f64,
 }
 

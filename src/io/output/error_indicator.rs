@@ -17,7 +17,7 @@
 
 use super::{
     field::{Place, Shape},
-    output_field::{Computed, Converged, FieldPicture, Figures, OutputField, Shading},
+    output_field::{Computed, Converged, FieldPicture, Figure, Figures, OutputField, Shading},
 };
 use crate::{
     error::Result,
@@ -41,6 +41,8 @@ pub(super) const FIELD: OutputField = OutputField {
     place: Place::Cell,
     shape: Shape::Scalar,
     units: ["√(J/m)", "√J"],
+    meaning: "estimated error of the stress",
+    written: "with `[output] error_indicator`",
     is_asked_for: Some(|output: &Output| output.error_indicator),
     picture: Some(FieldPicture {
         name: "error_indicator",
@@ -48,7 +50,20 @@ pub(super) const FIELD: OutputField = OutputField {
         shading: Shading::Errors,
     }),
     figures: Some(Figures {
-        names: &["error_indicator", "relative_error_indicator"],
+        members: &[
+            Figure {
+                name: "error_indicator",
+                units: ["√(J/m)", "√J"],
+                meaning: "norm over the body of the field of this name; only with this field",
+                words: None,
+            },
+            Figure {
+                name: "relative_error_indicator",
+                units: [""; 2],
+                meaning: "the same over the norm of the stress",
+                words: Some("error indicator over the norm of the stress at the end"),
+            },
+        ],
         line: |figures: &[f64]| {
             format!(
                 "indicator  error of the stress {:.4e} in the energy norm, {:.1} % of the norm of the stress",
@@ -56,7 +71,6 @@ pub(super) const FIELD: OutputField = OutputField {
                 100.0 * figures[1]
             )
         },
-        shown: &[("relative_error_indicator", "error indicator over the norm of the stress at the end", "")],
     }),
 };
 

@@ -50,29 +50,44 @@ macro_rules! fields {
 
 fields! {
     /// Displacement of the nodes.
-    DISPLACEMENT = OutputField::plain("displacement", Place::Node, Shape::Vector, "m"),
+    DISPLACEMENT = OutputField::plain("displacement", Place::Node, Shape::Vector, "m", "displacement"),
         |at| Computed::of(at.state.counted_displacement_of_owned()?);
     /// Velocity of the nodes.
-    VELOCITY = OutputField::plain("velocity", Place::Node, Shape::Vector, "m/s").with_picture("speed", "speed"),
+    VELOCITY = OutputField::plain("velocity", Place::Node, Shape::Vector, "m/s", "velocity").with_picture("speed", "speed"),
         |at| Computed::of(at.state.velocity.owned()?);
     /// Total stress of the cells.
-    STRESS = OutputField::plain("stress", Place::Cell, Shape::Tensor, "Pa"),
+    STRESS = OutputField::plain("stress", Place::Cell, Shape::Tensor, "Pa", "total stress, a tensor"),
         |at| Computed::of(at.stress.as_flattened());
     /// Von Mises norm of the total stress of the cells.
-    VON_MISES = OutputField::plain("von_mises", Place::Cell, Shape::Scalar, "Pa")
+    VON_MISES = OutputField::plain("von_mises", Place::Cell, Shape::Scalar, "Pa", "von Mises norm of the stress")
             .with_picture("von_mises", "von Mises stress"),
         |at| Computed::of(at.stress.iter().map(von_mises).collect::<Vec<_>>());
     /// See [`error_indicator`].
     ERROR_INDICATOR = error_indicator::FIELD,
         |at| error_indicator::compute(at)?;
     /// Temperature at the nodes, linear along the edges of cells, of bodies with heat.
-    TEMPERATURE = OutputField::plain("temperature", Place::Node, Shape::Scalar, "K").with_picture("temperature", "temperature"),
+    TEMPERATURE = OutputField::plain(
+            "temperature",
+            Place::Node,
+            Shape::Scalar,
+            "K",
+            "temperature; on the edges of quadratic cells the mean of the ends",
+        )
+        .written("with `[material.heat]`")
+        .with_picture("temperature", "temperature"),
         |at| match &at.body.heat {
             Some(heat) => Computed::of(heat.temperature_of_owned()),
             None => return Ok(None),
         };
     /// Contact traction at the nodes, where it is an unknown of steps.
-    CONTACT_TRACTION = OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa"),
+    CONTACT_TRACTION = OutputField::plain(
+            "contact_traction",
+            Place::Node,
+            Shape::Vector,
+            "Pa",
+            "traction of the body on the obstacle; on an edge the sum over its faces",
+        )
+        .written("with nodal contact"),
         |at| match further::contact_traction(at)? {
             Some(traction) => traction,
             None => return Ok(None),
@@ -101,20 +116,91 @@ fields! {
     SLIDING_VELOCITY = further::SLIDING_VELOCITY, |at| further::of_contacts(at, |point| point.sliding)?;
 }
 
+/// A scalar history of an effect.
+const fn history(
+    name: &'static str,
+    place: Place,
+    unit: &'static str,
+    written: &'static str,
+    meaning: &'static str,
+) -> OutputField {
+    OutputField::plain(name, place, Shape::Scalar, unit, meaning).written(written)
+}
+
+/// The histories of effects in field files, which effects append.
+static HISTORIES: [OutputField; 8] = [
+    OutputField {
+        shape: Shape::Tensor,
+        ..history(
+            "viscoplastic_history",
+            Place::Cell,
+            "Pa",
+            "with viscoplasticity",
+            "a tensor: the stress minus that of linear elasticity under the whole strain, that is minus the elastic stress of the \
+             viscoplastic strain",
+        )
+    },
+    history(
+        "equivalent_viscoplastic_strain",
+        Place::Cell,
+        "",
+        "with hardening",
+        "accumulated viscoplastic strain",
+    ),
+    history(
+        "damage",
+        Place::Cell,
+        "",
+        "with damage",
+        "from 0 (intact) to the key `largest`, by default 0.99",
+    ),
+    history("bonding", Place::Node, "", "with adhesion", "from 1 (intact) to 0 (broken); 0 at other nodes"),
+    history(
+        "memory_pressure",
+        Place::Node,
+        "Pa",
+        "with contact memory",
+        "pressure of the foundation's memory",
+    ),
+    history(
+        "slip",
+        Place::Node,
+        "m",
+        "with friction that depends on the slip",
+        "accumulated slip distance relative to the obstacle; 0 at other nodes",
+    ),
+    history("wear", Place::Node, "m", "with `[contact.wear]`", "depth of wear; 0 at other nodes"),
+    history(
+        "friction_state",
+        Place::Node,
+        "s",
+        "with `rate_and_state` friction",
+        "state of the friction law; 0 at other nodes",
+    ),
+];
+
+/// All fields and histories that field files may have.
+pub(crate) fn declared() -> impl Iterator<Item = &'static OutputField> {
+    FIELDS.iter().chain(&HISTORIES)
+}
+
+/// The unit of a field or a history; empty for one without a unit.
+pub(crate) fn unit(name: &str, dimension: usize) -> &'static str {
+    declared().find(|field| field.name == name).map_or("", |field| field.unit(dimension))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn fields_and_figures_have_names_of_their_own_and_the_report_shows_figures_that_are_there() {
+    fn fields_and_figures_have_names_of_their_own() {
         let figures: Vec<_> = FIELDS.iter().filter_map(|field| field.figures).collect();
-        let mut names: Vec<&str> = FIELDS.iter().map(|field| field.name).collect();
+        let mut names: Vec<&str> = declared().map(|field| field.name).collect();
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
-        let mut names: Vec<&str> = figures.iter().flat_map(|figures| figures.names).copied().collect();
-        for (shown, _, _) in figures.iter().flat_map(|figures| figures.shown) {
-            assert!(names.contains(shown), "{shown}");
-        }
+        let mut names: Vec<&str> =
+            figures.iter().flat_map(|figures| figures.members).map(|figure| figure.name).collect();
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
     }

@@ -119,7 +119,7 @@ impl<const D: usize> FieldOutput<D> {
     ) -> Result<BTreeMap<&'static str, f64>, Agreed> {
         let computed = self.computed(at, |field| field.figures.is_some())?;
         let named = |(field, computed): (&OutputField, Computed)| {
-            field.figures.into_iter().flat_map(|f| f.names).copied().zip(computed.figures)
+            field.figures.into_iter().flat_map(|f| f.members).map(|figure| figure.name).zip(computed.figures)
         };
         Ok(computed.into_iter().flat_map(named).collect())
     }

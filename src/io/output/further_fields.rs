@@ -14,32 +14,70 @@ use crate::{
 
 /// A field that is asked for by this name.
 macro_rules! asked_for {
-    ($field:ident, $name:literal, $place:ident, $shape:ident, $unit:literal) => {
+    ($field:ident, $name:literal, $place:ident, $shape:ident, $unit:literal, $meaning:literal) => {
         OutputField {
             is_asked_for: Some(|output| output.also.contains(&FurtherField::$field)),
-            ..OutputField::plain($name, Place::$place, Shape::$shape, $unit)
+            ..OutputField::plain($name, Place::$place, Shape::$shape, $unit, $meaning)
+                .written("with `[output] also`")
         }
     };
 }
 
-pub(super) const REGION: OutputField = asked_for!(Region, "region", Cell, Scalar, "");
-pub(super) const STRAIN: OutputField = asked_for!(Strain, "strain", Cell, Tensor, "");
+pub(super) const REGION: OutputField =
+    asked_for!(Region, "region", Cell, Scalar, "", "number of the region, from 0");
+pub(super) const STRAIN: OutputField =
+    asked_for!(Strain, "strain", Cell, Tensor, "", "strain of the displacement, a tensor");
 pub(super) const PRINCIPAL_STRESSES: [OutputField; 3] = [
-    asked_for!(PrincipalStress, "principal_stress_1", Cell, Scalar, "Pa")
+    asked_for!(PrincipalStress, "principal_stress_1", Cell, Scalar, "Pa", "largest principal stress")
         .with_picture("principal_stress_1", "largest principal stress"),
-    asked_for!(PrincipalStress, "principal_stress_2", Cell, Scalar, "Pa"),
-    asked_for!(PrincipalStress, "principal_stress_3", Cell, Scalar, "Pa")
+    asked_for!(PrincipalStress, "principal_stress_2", Cell, Scalar, "Pa", "middle principal stress"),
+    asked_for!(PrincipalStress, "principal_stress_3", Cell, Scalar, "Pa", "smallest principal stress")
         .with_picture("principal_stress_3", "smallest principal stress"),
 ];
 pub(super) const PRESSURE: OutputField =
-    asked_for!(Pressure, "pressure", Cell, Scalar, "Pa").with_picture("pressure", "pressure");
-pub(super) const CONTACT_PRESSURE: OutputField =
-    asked_for!(ContactPressure, "contact_pressure", Node, Scalar, "Pa");
-pub(super) const GAP: OutputField = asked_for!(Gap, "gap", Node, Scalar, "m");
-pub(super) const CONTACT_STATUS: OutputField = asked_for!(ContactStatus, "contact_status", Node, Scalar, "");
-pub(super) const BRANCH: OutputField = asked_for!(Branch, "branch", Node, Scalar, "");
-pub(super) const SLIDING_VELOCITY: OutputField =
-    asked_for!(SlidingVelocity, "sliding_velocity", Node, Vector, "m/s");
+    asked_for!(Pressure, "pressure", Cell, Scalar, "Pa", "minus the mean of the three normal stresses")
+        .with_picture("pressure", "pressure");
+pub(super) const CONTACT_PRESSURE: OutputField = asked_for!(
+    ContactPressure,
+    "contact_pressure",
+    Node,
+    Scalar,
+    "Pa",
+    "contact pressure at nodal contacts; 0 at other nodes"
+);
+pub(super) const GAP: OutputField = asked_for!(
+    Gap,
+    "gap",
+    Node,
+    Scalar,
+    "m",
+    "distance to the obstacle, negative in penetration; 0 at other nodes"
+);
+pub(super) const CONTACT_STATUS: OutputField = asked_for!(
+    ContactStatus,
+    "contact_status",
+    Node,
+    Scalar,
+    "",
+    "0 no contact point, 1 open, 2 under pressure without friction, 3 sticking, 4 slipping; 1 at t = 0, where the first step has yet to \
+     find the pressure"
+);
+pub(super) const BRANCH: OutputField = asked_for!(
+    Branch,
+    "branch",
+    Node,
+    Scalar,
+    "",
+    "branch of the normal law, from 0 in the order of the normal velocity"
+);
+pub(super) const SLIDING_VELOCITY: OutputField = asked_for!(
+    SlidingVelocity,
+    "sliding_velocity",
+    Node,
+    Vector,
+    "m/s",
+    "velocity relative to the obstacle, along the boundary"
+);
 
 /// The numbers of the regions.
 pub(super) fn region<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Computed<'a> {

@@ -1,7 +1,10 @@
 //! A field that runs write, as field files, restarts, the summary, the log, the report and studies use it, and the state it is
 //! computed from.
 
-use super::field::{Place, Shape, file_width};
+use super::{
+    declared::Declared,
+    field::{Place, Shape, file_width},
+};
 use crate::{
     fem::{body::Body, state::State},
     job::Output,
@@ -21,6 +24,10 @@ pub struct OutputField {
     pub shape: Shape,
     /// Its unit in the plane and in space.
     pub units: [&'static str; 2],
+    /// What it is, in Markdown.
+    pub meaning: &'static str,
+    /// When it is written, in Markdown.
+    pub written: &'static str,
     /// The condition under which a job requests it; absent: every run that has it writes it.
     pub is_asked_for: Option<fn(&Output) -> bool>,
     /// The report's picture of it.
@@ -52,18 +59,51 @@ pub enum Shading {
 /// Numbers that summarise a field at the end of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Figures {
-    /// Their names in `summary.json`.
-    pub names: &'static [&'static str],
+    /// What they are, in their order.
+    pub members: &'static [Figure],
     /// The line of the log about them.
     pub line: fn(&[f64]) -> String,
-    /// Those of them that the report shows: name, words and unit.
-    pub shown: &'static [(&'static str, &'static str, &'static str)],
+}
+
+/// A number that summarises a field.
+#[derive(Debug, Clone, Copy)]
+pub struct Figure {
+    /// Its name in `summary.json`.
+    pub name: &'static str,
+    /// Its unit in the plane and in space.
+    pub units: [&'static str; 2],
+    /// What it is, in Markdown.
+    pub meaning: &'static str,
+    /// What the report calls it, if it shows it.
+    pub words: Option<&'static str>,
 }
 
 impl OutputField {
     /// A field that every run writes, with the same unit in the plane and in space, no picture and no figures.
-    pub(super) const fn plain(name: &'static str, place: Place, shape: Shape, unit: &'static str) -> Self {
-        Self { name, place, shape, units: [unit; 2], is_asked_for: None, picture: None, figures: None }
+    pub(super) const fn plain(
+        name: &'static str,
+        place: Place,
+        shape: Shape,
+        unit: &'static str,
+        meaning: &'static str,
+    ) -> Self {
+        let (is_asked_for, picture, figures) = (None, None, None);
+        Self {
+            name,
+            place,
+            shape,
+            units: [unit; 2],
+            meaning,
+            written: "always",
+            is_asked_for,
+            picture,
+            figures,
+        }
+    }
+
+    /// The same, written under this condition.
+    pub(super) const fn written(self, written: &'static str) -> Self {
+        Self { written, ..self }
     }
 
     /// The same with a picture of this name, coloured linearly.
@@ -79,6 +119,16 @@ impl OutputField {
     /// Its unit in this dimension.
     pub fn unit(&self, dimension: usize) -> &'static str {
         self.units[usize::from(dimension == 3)]
+    }
+
+    /// Its declaration, for those who read field files.
+    pub(crate) fn declared(&self) -> Declared {
+        let place = match self.place {
+            Place::Node => "nodes",
+            Place::Cell => "cells",
+        };
+        let field = Some([place, self.written]);
+        Declared { units: self.units, field, ..Declared::new(vec![self.name.to_owned()], self.meaning) }
     }
 
     /// Whether a run with these keys writes it if it has it.

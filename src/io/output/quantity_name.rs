@@ -1,6 +1,10 @@
 //! Names of quantities of a run, as in `[check]` of a job and in responses of a study.
 
-use super::{columns::RunTable, field_list::FIELDS, resultants::source_names};
+use super::{
+    columns::{RunTable, TABLES},
+    resultants::source_names,
+    summary::{MEMBERS, MemberKind},
+};
 use crate::{job::Job, laws::nearest::nearest};
 
 /// What is formed of the values of a run.
@@ -42,61 +46,6 @@ impl<'a> TableQuantity<'a> {
         has_side && self.of != Some("")
     }
 }
-
-/// The numbers of `summary.json`, beside those in objects.
-const OF_SUMMARY: [&str; 29] = [
-    "ranks",
-    "dimension",
-    "cells",
-    "nodes",
-    "unknowns",
-    "steps",
-    "time",
-    "rejected_steps",
-    "unstable_steps",
-    "unresolved_steps",
-    "energy_of_scheme",
-    "indefinite_solves",
-    "set_ups",
-    "newton_iterations",
-    "linear_iterations",
-    "final_von_mises",
-    "max_von_mises",
-    "max_strain",
-    "error_of_mesh",
-    "error_of_steps",
-    "order_of_steps",
-    "max_inclusion_residual",
-    "max_residual",
-    "max_energy_imbalance",
-    "max_heat_imbalance",
-    "max_slip_pressure",
-    "max_friction_fall",
-    "max_rate_share",
-    "peak_memory_bytes",
-];
-
-/// The objects of `summary.json` with numbers, each with the names of those that do not depend on the job.
-const OBJECTS: [(&str, &[&str]); 6] = [
-    (
-        "certificates",
-        &[
-            "theta",
-            "theta_step",
-            "viscosity_modulus",
-            "monotonicity_constant",
-            "growth_constants",
-            "trace_norm_squared",
-            "slip_pressure_bound",
-            "explicit_step_bound",
-        ],
-    ),
-    ("guesses", &["steps", "steps_with_several", "most_solutions"]),
-    ("partition", &["edge_cut", "imbalance"]),
-    ("wall_seconds", &[]),
-    ("traffic_bytes", &[]),
-    ("inventory", &[]),
-];
 
 /// What names a quantity.
 const FORMS: &str = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
@@ -159,20 +108,28 @@ impl RunOf<'_> {
         if RunTable::of(first).is_some() || name.split('.').any(str::is_empty) {
             return Some(no_quantity(name));
         }
+        let numbers = || MEMBERS.iter().filter(|member| member.kind != MemberKind::Other);
+        let of_object = |object: &str| -> Vec<String> {
+            let names = numbers().filter_map(|member| member.name.strip_prefix(object)?.strip_prefix('.'));
+            names.map(str::to_owned).collect()
+        };
         let Some(rest) = rest else {
-            let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.names);
+            let known = numbers().filter(|member| member.kind == MemberKind::Number);
             let known: Vec<String> =
-                OF_SUMMARY.iter().chain(figures).map(|name| (*name).to_owned()).collect();
+                known.map(|member| member.name.clone()).filter(|name| !name.contains('.')).collect();
             return (!known.iter().any(|known| known == name)).then(|| unknown(name, name, &known));
         };
-        let Some((_, numbers)) = OBJECTS.iter().find(|(object, _)| *object == first) else {
-            let tables = ["history", "probe", "resultant", "profile"];
-            let known = tables.into_iter().chain(OBJECTS.map(|(object, _)| object));
-            return Some(unknown(name, first, &known.map(str::to_owned).collect::<Vec<_>>()));
-        };
+        let known = of_object(first);
+        if known.is_empty() {
+            let is_open = numbers().any(|member| member.name == first && member.kind == MemberKind::Numbers);
+            let objects =
+                MEMBERS.iter().map(|member| &*member.name).filter(|name| !of_object(name).is_empty());
+            let tables = TABLES.map(|table| table.word).into_iter();
+            let known = || tables.chain(objects).map(str::to_owned).collect::<Vec<_>>();
+            return (!is_open).then(|| unknown(name, first, &known()));
+        }
         let number = rest.split('.').next().unwrap_or(rest);
-        let known: Vec<String> = numbers.iter().map(|name| (*name).to_owned()).collect();
-        (!known.is_empty() && !numbers.contains(&number)).then(|| unknown(name, number, &known))
+        (!known.iter().any(|known| known == number)).then(|| unknown(name, number, &known))
     }
 
     /// What is wrong with the name of a probe, a source of resultants or a profile.

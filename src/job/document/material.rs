@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use super::mesh::Mesh;
 use crate::job::findings::Table;
-use crate::laws::law::header;
 use crate::laws::material::{Damping, Hypothesis, Material, Orthotropic};
 
 /// A part of the body with its own material. The region inherits no effect from the table `[material]`: its own table contains all
@@ -29,23 +28,22 @@ const LOCKING: f64 = 0.45;
 
 /// Checks a material of the job.
 pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>, may_be_empty: bool) {
-    let named = |table: &Table<'_>, key| header(&table.path(key));
     if !may_be_empty && !material.resists() {
-        let [whole, elasticity, viscosity] = ["", "elasticity", "viscosity"].map(|key| named(table, key));
+        let [whole, elasticity, viscosity] = ["", "elasticity", "viscosity"].map(|key| table.header(key));
         let message = format!("{whole} has no density, no elasticity and no viscosity");
         table.fault("", message, format!("add density, {elasticity} or {viscosity}"));
     }
     for (key, message) in material.laws_that_require_elasticity() {
         if material.orthotropic.is_some() {
-            let help = format!("delete it, or replace {} by elasticity", named(table, "orthotropic"));
+            let help = format!("delete it, or replace {} by elasticity", table.header("orthotropic"));
             table.fault(key, Orthotropic::NOT_ISOTROPIC, help);
         } else if material.elasticity.is_none() {
-            table.fault(key, message, format!("add {}", named(table, "elasticity")));
+            table.fault(key, message, format!("add {}", table.header("elasticity")));
         }
     }
     if material.orthotropic.is_some() && material.elasticity.is_some() {
         let message = "the material has two kinds of elasticity";
-        table.fault_at_key("orthotropic", message, format!("delete it, or {}", named(table, "elasticity")));
+        table.fault_at_key("orthotropic", message, format!("delete it, or {}", table.header("elasticity")));
     }
     check_elasticity_formula(material, table);
     if material.is_damped_by_mass() && material.density.is_none() {
@@ -64,12 +62,12 @@ fn check_elasticity_formula(material: &Material, table: &mut Table<'_>) {
     let Some(law) = material.elasticity.as_ref().filter(|law| law.expression.is_some()) else { return };
     table.refuse(law.fault().map(|fault| fault.within("elasticity")));
     for (key, _) in material.laws_that_require_elasticity() {
-        let formula = header(&table.path("elasticity.expression"));
+        let formula = table.header("elasticity.expression");
         let message = format!("`{key}` requires linear elasticity, but {formula} is a formula of the strain");
         table.fault(key, message, format!("delete it, or {formula}"));
     }
     if material.heat.is_some_and(|heat| heat.expansion.is_some()) {
-        let formula = header(&table.path("elasticity.expression"));
+        let formula = table.header("elasticity.expression");
         let message =
             format!("thermal strain requires linear elasticity, but {formula} is a formula of the strain");
         table.fault("heat.expansion", message, format!("delete it and `reference`, or {formula}"));

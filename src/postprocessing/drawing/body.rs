@@ -6,14 +6,14 @@ use super::{
     frame::{ColourKey, Frame, colour_bar},
     paint::{Style, Triangle, paint},
     picture::Picture,
-    scale::{Scale, extent, number, percentiles, unit_by_name},
+    scale::{Scale, extent, number, percentiles},
     svg::{open_svg, text},
     view::{Face, View, cross, dot, faces, minus, outline, unit},
 };
 use crate::{
     error::Result,
     io::output::{
-        field_list::{DISPLACEMENT, FIELDS, REGION},
+        field_list::{self, DISPLACEMENT, FIELDS, REGION},
         field_snapshot::{History, Snapshot},
         fields::{Place, Shape},
         output_field::{FieldPicture, OutputField, Shading},
@@ -127,7 +127,7 @@ fn of_history(history: &History) -> Quantity<'_> {
     Quantity {
         name: &history.name,
         words: history.name.replace('_', " ").into(),
-        unit: unit_by_name(&history.name),
+        unit: field_list::unit(&history.name, 3),
         place: history.place,
         shading: Shading::Linear,
         values: history.values.as_slice().into(),

@@ -110,21 +110,6 @@ pub(super) fn percentiles(values: &[f64]) -> Option<(f64, f64)> {
     Some((low, sorted[sorted.len() - 1 - left_out]))
 }
 
-/// The unit of a quantity, by the word for it in the name of a field or a column.
-pub fn unit_by_name(name: &str) -> &'static str {
-    let known = [
-        ("displacement", "m"),
-        ("velocity", "m/s"),
-        ("pressure", "Pa"),
-        ("traction", "Pa"),
-        ("gap", "m"),
-        ("slip", "m"),
-        ("wear", "m"),
-        ("friction_state", "s"),
-    ];
-    known.iter().find(|(word, _)| name.contains(word)).map_or("", |(_, unit)| unit)
-}
-
 /// The largest of 1, 2 and 5 times a power of ten that is at most `size`, which is positive.
 fn round_below(size: f64) -> f64 {
     let power = 10f64.powf(size.log10().floor());

@@ -10,14 +10,14 @@ use super::{
     markup::{capital, table},
     page::Pictures,
     picture::Picture,
-    scale::{extent, number, unit_by_name},
+    scale::{extent, number},
     table::Table,
 };
 use crate::{
     error::Result,
     io::output::{
         columns::PROFILES,
-        field_list::{CONTACT_STATUS, FIELDS},
+        field_list::{self, CONTACT_STATUS, FIELDS},
         field_snapshot::Snapshot,
         fields::{Place, Shape},
         output_field::OutputField,
@@ -177,10 +177,13 @@ impl<'a> Boundary<'a> {
         let first = ["normal_velocity", "contact_pressure", "normal_displacement"];
         let rest = columns.iter().copied().filter(|name| !first.contains(name));
         let columns = first.into_iter().filter(|name| columns.contains(name)).chain(rest);
-        let of_profile = columns.map(|name| (name, self.table.column(name).unwrap_or_default()));
+        let unit = |name| PROFILES.unit(name, self.dimension);
+        let of_profile = columns.map(|name| (name, unit(name), self.table.column(name).unwrap_or_default()));
+        let of_nodes = self.fields_of_nodes().into_iter();
+        let of_nodes = of_nodes.map(|(name, values)| (name, field_list::unit(name, self.dimension), values));
         let mut out = Pictures::default();
-        for (name, values) in of_profile.chain(self.fields_of_nodes()) {
-            let (quantity, unit) = (name.replace('_', " "), unit_by_name(name));
+        for (name, unit, values) in of_profile.chain(of_nodes) {
+            let quantity = name.replace('_', " ");
             match extent(values.iter().copied()) {
                 Some((low, high)) if number(low) == number(high) => {
                     out.constant.push(format!("{quantity}: {} {unit}", number(low)).trim_end().to_owned());
@@ -501,7 +504,7 @@ impl<'a> Boundary<'a> {
 }
 
 fn is_quantity(column: &str) -> bool {
-    !PROFILES.keys.contains(&column) && !["x", "y", "z"].contains(&column)
+    !PROFILES.is_key(column) && !["x", "y", "z"].contains(&column)
 }
 
 #[cfg(test)]

@@ -8,77 +8,29 @@ use super::{
     scale::{number, size},
     svg::{LETTERS, WIDTH, open_svg, text, text_width},
 };
-use crate::{io::output::field_list::FIELDS, job::Accept, solver::certificate::Certificates};
+use crate::{
+    io::output::summary::{MEMBERS, Member},
+    job::Accept,
+    solver::certificate::Certificates,
+};
 use serde_json::Value;
 use std::fmt::Write;
-
-/// Members of `summary.json` with their descriptions and units, in the order of the page: those before the figures of fields.
-const MEMBERS: [(&str, &str, &str); 13] = [
-    ("status", "status", ""),
-    ("error", "error", ""),
-    ("time", "time reached", "s"),
-    ("steps", "steps", ""),
-    ("rejected_steps", "rejected steps", ""),
-    ("unstable_steps", "steps that passed unstable states", ""),
-    ("unresolved_steps", "steps in which damage or bonds fail faster than they resolve", ""),
-    ("indefinite_solves", "indefinite linear systems", ""),
-    ("newton_iterations", "Newton iterations", ""),
-    ("linear_iterations", "linear iterations", ""),
-    ("final_von_mises", "largest von Mises stress at the end", "Pa"),
-    ("max_von_mises", "largest von Mises stress of the run", "Pa"),
-    ("max_strain", "largest strain of the run", ""),
-];
-
-/// Those after the figures of fields.
-const MORE_MEMBERS: [(&str, &str, &str); 19] = [
-    ("error_of_mesh", "estimated error of the stress at the end by the mesh, relative", ""),
-    ("error_of_steps", "estimated error of stress and velocity at the end by the steps, relative", ""),
-    ("max_inclusion_residual", "largest inclusion residual", ""),
-    ("max_residual", "largest residual of the equations, as a share of the forces", ""),
-    ("max_energy_imbalance", "largest energy imbalance", ""),
-    ("max_heat_imbalance", "largest imbalance of heat", ""),
-    ("max_slip_pressure", "largest contact pressure with weakening friction", "Pa"),
-    ("max_friction_fall", "largest share of the coefficient of friction lost in a step", ""),
-    ("max_rate_share", "largest strain or strain rate over the reference of its formula", ""),
-    ("effects", "effects simulated", ""),
-    ("scheme", "time scheme", ""),
-    ("preconditioner", "preconditioner", ""),
-    ("dimension", "dimensions", ""),
-    ("cells", "cells", ""),
-    ("nodes", "nodes", ""),
-    ("unknowns", "unknowns", ""),
-    ("ranks", "ranks", ""),
-    ("version", "version of the solver", ""),
-    ("petsc_version", "version of PETSc", ""),
-];
 
 /// A table of the contents of `summary.json`.
 pub(super) fn summary(summary: &Value) -> String {
     facts("The run", &rows(summary))
 }
 
-/// The members of `summary.json`: what each is, and its value.
+/// The members of `summary.json` that the report shows: what each is, and its value.
 pub(super) fn rows(summary: &Value) -> Vec<(String, String)> {
-    let mut rows: Vec<(String, String)> = Vec::new();
-    let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.shown);
-    for &(member, words, unit) in MEMBERS.iter().chain(figures).chain(&MORE_MEMBERS) {
-        match summary.get(member) {
-            None | Some(Value::Null) => {}
-            Some(value) => rows.push((words.into(), with_unit(value, unit))),
-        }
-    }
-    if let Some(Value::String(file)) = summary.get("restarted_from") {
-        rows.push(("restarted from".into(), file.clone()));
-    }
+    let row = |member: &Member| {
+        let value = summary.pointer(&format!("/{}", member.name.replace('.', "/")))?;
+        let words = member.words.filter(|_| !value.is_null())?;
+        Some((words.to_owned(), with_unit(value, member.units[0])))
+    };
+    let mut rows: Vec<(String, String)> = MEMBERS.iter().filter_map(row).collect();
     if let Some(bytes) = summary.get("peak_memory_bytes").and_then(Value::as_f64) {
         rows.push(("peak memory of all ranks".into(), format!("{:.0} MB", bytes / 1e6)));
-    }
-    let partition = summary.get("partition");
-    if let Some(cut) = partition.and_then(|p| p.get("edge_cut")) {
-        rows.push(("facets between ranks".into(), plain(cut)));
-    }
-    if let Some(most) = partition.and_then(|p| p.get("imbalance")).and_then(Value::as_f64) {
-        rows.push(("cells of the largest rank relative to the mean".into(), number(most)));
     }
     rows
 }

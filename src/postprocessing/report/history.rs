@@ -22,7 +22,7 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
     let names = table.names();
     let tables: Vec<Table> = names.iter().take(MOST_PROBES).map(|name| table.of(name)).collect();
     let mut out = Pictures::default();
-    for column in table.header().iter().filter(|name| !PROBES.keys.contains(&name.as_str())) {
+    for column in table.header().iter().filter(|name| !PROBES.is_key(name)) {
         let curves: Vec<Vec<[f64; 2]>> = tables.iter().map(|table| table.curve("time", column)).collect();
         let quantity = column.replace('_', " ");
         let unit = PROBES.unit(column, 3);

@@ -36,6 +36,7 @@ pub use part::Part;
 pub use plan::Plan;
 pub use quantity::quantity;
 pub use results::Results;
+pub(crate) use write::{COLUMNS, ROWS};
 
 use crate::{
     error::{Exit, Result},
@@ -53,7 +54,7 @@ use side_by_side::{Numbered, execute_all};
 
 /// The reference of the keys of studies: of all tables, or of one table or key.
 pub fn describe(table: Option<&str>) -> Result<String> {
-    describe_kind(document::kind(), table)
+    describe_kind(document::kind(), table, &[])
 }
 
 /// The JSON Schema (draft 2020-12) of a study.

@@ -12,14 +12,14 @@ use super::{
 };
 use crate::{
     error::Result,
-    io::output::{columns::RunTable, field_snapshot::Snapshot, quantity_name::TableQuantity},
+    io::output::{columns::RunTable, field_snapshot::Snapshot, quantity_name::TableQuantity, summary},
     job::Job,
     postprocessing::drawing::{
         body::{Coloured, DrawnBody},
         chart::{Axis, Chart, Look, Series},
         colour::{LINES, VIRIDIS},
         picture::Picture,
-        scale::{extent, number, size, unit_by_name},
+        scale::{extent, number, size},
     },
 };
 
@@ -230,9 +230,7 @@ pub(super) fn unit_of_response(name: &str, dimension: usize) -> &'static str {
     if let Some(table) = source.and_then(RunTable::of) {
         return table.unit(column, dimension);
     }
-    let known = [("time", "s"), ("von_mises", "Pa"), ("_seconds", "s"), ("_bytes", "bytes")];
-    let unit = known.iter().find(|(word, _)| column.contains(word)).map(|(_, unit)| *unit);
-    unit.unwrap_or_else(|| unit_by_name(column))
+    summary::unit(name, dimension)
 }
 
 /// The unit of a quantity whose norm is taken: that of the strain or the strain rate in V.

@@ -62,9 +62,9 @@ pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<R
         let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
         return summary.pointer(&format!("/{}", name.replace('.', "/")))?.as_f64().map(RunQuantity::Number);
     };
-    let filter = table.keys.last().copied().zip(of);
+    let filter = table.keys.last().map(|key| key.name).zip(of);
     let numbers = |name: &str| column(folder, table.file, filter, name);
-    if table.keys.first() == Some(&"time") {
+    if table.keys.first().is_some_and(|key| key.name == "time") {
         let times = numbers("time")?;
         let rows = times.iter().zip(numbers(field)?).filter(|(time, _)| Some(*time) == times.last());
         return extreme(side?, rows.map(|(_, value)| value)).map(RunQuantity::Number);

@@ -3,14 +3,50 @@
 use super::{map, orders::Refined, plan::Plan, plot, results::Results, table};
 use crate::{
     error::{Error, Result},
-    io::output::csv::entry,
+    io::output::{columns::Column, csv::entry},
     postprocessing::drawing::picture::Picture,
 };
 use std::path::Path;
 
-const HEADER: &str = "run,scheme,cells,step,adaptive,tolerance,status,warnings,norm,error,relative_error,error_of_steps,\
-    error_of_mesh,order_mesh,order_step,order_both,expected_order,published,ratio,published_order,unknowns,steps,\
-    rejected_steps,set_ups,unknowns_times_steps,seconds_total,seconds_computing,seconds_solve,digits_per_second";
+/// What has a row in `study.csv`.
+pub(crate) const ROWS: &str = "A row for each run and norm.";
+
+/// The columns of `study.csv`.
+pub(crate) const COLUMNS: [Column; 29] = [
+    Column::plain("run", "", "name of the run and of its folder"),
+    Column::plain("scheme", "", "time scheme"),
+    Column::plain("cells", "", "cells along the axes (`8x8`)"),
+    Column::plain("step", "s", "length of the steps, of the first one if they are adaptive"),
+    Column::plain("adaptive", "", "tolerance of adaptive steps"),
+    Column::plain("tolerance", "", "tolerance of the solver"),
+    Column::plain("status", "", "`completed` or `failed`"),
+    Column::plain("warnings", "", "number of warnings"),
+    Column::plain("norm", "", "name of the norm or probe; empty for a run without errors"),
+    Column::plain("error", "", "error, in the unit of the norm"),
+    Column::plain("relative_error", "", "error over the norm of the reference"),
+    Column::plain(
+        "error_of_steps",
+        "",
+        "the part of the steps, with `[compare] split`, in the unit of the norm",
+    ),
+    Column::plain("error_of_mesh", "", "the part of the mesh, likewise"),
+    Column::plain("order_mesh", "", "observed order against the coarser run that differs in the mesh"),
+    Column::plain("order_step", "", "the same against the run that differs in the step"),
+    Column::plain("order_both", "", "the same against the run that differs in both"),
+    Column::plain("expected_order", "", "theoretical order"),
+    Column::plain("published", "", "published error, in the unit of the norm"),
+    Column::plain("ratio", "", "computed over published error"),
+    Column::plain("published_order", "", "order of the published errors"),
+    Column::plain("unknowns", "", "as in `summary.json`"),
+    Column::plain("steps", "", "as in `summary.json`"),
+    Column::plain("rejected_steps", "", "as in `summary.json`"),
+    Column::plain("set_ups", "", "as in `summary.json`"),
+    Column::plain("unknowns_times_steps", "", "product of `unknowns` and `steps`"),
+    Column::plain("seconds_total", "s", "wall time"),
+    Column::plain("seconds_computing", "s", "wall time without writing files"),
+    Column::plain("seconds_solve", "s", "wall time of the solution of steps"),
+    Column::plain("digits_per_second", "1/s", "decimal digits gained per additional second"),
+];
 /// Columns of a norm.
 const MEASURED: usize = 12;
 
@@ -79,7 +115,7 @@ fn cell(value: &str) -> String {
 
 /// A row for each run and norm; a run without errors has one row.
 fn csv(results: &Results) -> String {
-    let mut out = format!("{HEADER}\n");
+    let mut out = line(COLUMNS.iter().map(|column| column.name.to_owned()));
     for run in &results.runs {
         let cells: Vec<String> = run.cells.iter().map(u32::to_string).collect();
         let named = [

@@ -5,13 +5,15 @@ use crate::{
     parallel::session::Session,
     solver::stepping::Stepper,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Sums over all ranks.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+/// What was allocated, summed over all ranks.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Inventory {
-    /// Bytes of each history that effects keep for cells or nodes, trial values included.
+    /// The size of each history that effects keep for cells or nodes, trial values included, by its name.
+    #[schemars(extend("unit" = "B"))]
     pub history_bytes: BTreeMap<String, u64>,
     /// Quadrature points of all contacts.
     pub contact_points: u64,
