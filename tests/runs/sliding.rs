@@ -63,3 +63,28 @@ fn a_rounded_pad_rubs_with_its_coefficient_on_any_number_of_ranks_and_restarts_i
         }
     }
 }
+
+/// Where nodes with mass meet other facets, their momentum is lost within one step, and adaptive steps become short there.
+#[test]
+fn adaptive_steps_make_no_peaks_of_the_force_of_a_corner_that_slides_without_mass_at_its_surface() {
+    let thrown = |redistributes: bool| {
+        let case = falling_on_a_corner(20.0, 2.0)
+            .set("time.adaptive", "{ tolerance = 1e-2, smallest_step = 1e-8, largest_step = 4e-4 }");
+        case.set("time.step", "1e-5")
+            .set("contact.0.redistribute_mass", if redistributes { "true" } else { "false" })
+    };
+    let largest = |case: &Case| {
+        let forces = forces_of(&case.results(), "contact skin");
+        forces.into_iter().map(|[_, across]| across).fold(0.0, f64::max)
+    };
+    let with_mass = thrown(false);
+    with_mass
+        .run_with(1, &["--force"])
+        .expect(0)
+        .says("set redistribute_mass = true, or a longer [time.adaptive] smallest_step");
+    let without = thrown(true);
+    without.run(1);
+    // That of fixed steps is 2.4e4 N.
+    let [peak, steady] = [largest(&with_mass), largest(&without)];
+    assert!(steady > 2e4 && steady < 4e4 && peak > 10.0 * steady, "{peak} N, without mass {steady} N");
+}
