@@ -429,6 +429,8 @@ fn gap_between_nodes<const D: usize>(
 struct Sum<const D: usize> {
     weight: f64,
     whole: f64,
+    /// The part of `whole` of facets that face the other side.
+    facing: f64,
     gap: f64,
     passed: f64,
     normal: Vector<D>,
@@ -439,11 +441,12 @@ struct Sum<const D: usize> {
 
 impl<const D: usize> Sum<D> {
     fn new() -> Self {
-        let [weight, whole, gap, passed] = [0.0; 4];
+        let [weight, whole, facing, gap, passed] = [0.0; 5];
         let (masters, neighbours) = (BTreeMap::new(), BTreeSet::new());
         Self {
             weight,
             whole,
+            facing,
             gap,
             passed,
             normal: [0.0; D],
@@ -463,14 +466,14 @@ impl<const D: usize> Sum<D> {
     /// that side turns there, or is inclined to it where it ends. Steep flanks of a corner see ends that are far away.
     fn sharpness(&self, distance: f64) -> f64 {
         let [own, faced] = &self.normals;
-        let is_near = self.gap / self.weight <= distance + own.size();
-        let ends = is_near && self.weight < COVERED * self.whole;
+        let is_near = self.gap / self.weight <= distance + 0.5 * own.size();
+        let ends = is_near && self.weight < COVERED * self.facing;
         let inclination = -dot(&own.mean(), &faced.mean());
         larger(faced.turn(), if ends { inclination.clamp(-1.0, 1.0).acos() } else { 0.0 })
     }
 }
 
-/// The share of the surface around a node from which on it faces the other side with all of it.
+/// The share of the facets around a node that face the other side from which on it faces it with all of them.
 const COVERED: f64 = 0.999;
 
 /// The sums of the contributions to the nodes of this rank, by global numbers, those of `lawless` left out, from those of the facets of each
@@ -509,6 +512,7 @@ fn sum_of_contributions<const D: usize>(
         let sum = sums.entry(*node as u32).or_insert_with(Sum::new);
         sum.weight += weight;
         sum.whole += whole;
+        sum.facing += if *weight == 0.0 { 0.0 } else { *whole };
         sum.gap += gap;
         sum.passed += passed;
         (0..D).for_each(|i| sum.normal[i] += after[i]);

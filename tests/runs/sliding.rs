@@ -1,7 +1,36 @@
 //! Corners, edges and fillets that slide along other bodies.
 
 use super::pairs::{falling_on_a_corner, forces_of, write_triangles};
-use crate::case::Case;
+use crate::{case::Case, results::Results};
+
+/// Forces of a contact on its body of which those along x are this share of those along y, in the sum over all steps.
+fn share_along(results: &Results, contact: &str) -> f64 {
+    let forces = forces_of(results, contact);
+    let [along, across] = [0, 1].map(|axis| forces.iter().map(|force| force[axis]).sum::<f64>());
+    assert!(across.abs() > 0.0, "{contact} never touched");
+    along / across
+}
+
+/// With the law at nodes of the plate the flanks beside the corner, which each of them meets, would push the square back: by 0.59 of the
+/// force across.
+#[test]
+fn a_corner_carries_the_law_whichever_side_the_job_names_first_and_however_fine_its_mesh_is() {
+    let thrown = || {
+        falling_on_a_corner(20.0, -2.0).set("contact.0.on", "['top']").set("contact.0.against", "['skin']")
+    };
+    let case = thrown();
+    let outcome = case.run_with(1, &["--force"]).expect(0);
+    outcome.says("nodes of skin carry the law, because its corners or edges lie over top");
+    let share = share_along(&case.results(), "contact top");
+    assert!(share.abs() < 0.01, "{share}");
+    let stated = thrown().set("contact.0.side", "'on'");
+    let outcome = stated.run_with(2, &["--force"]).expect(0);
+    outcome
+        .says("corners or edges of skin lie on faces of top, whose nodes carry the law")
+        .says("delete `side`");
+    let outcome = stated.run_with(1, &["--force"]).expect(0);
+    outcome.says("corners or edges of skin pressed on faces of top");
+}
 
 /// A pad with rounded ends of 60 mm, 0.3 m long, pressed on a plate by its own upper side and dragged along it by this way in m, in a
 /// body without mass.
