@@ -4,10 +4,10 @@ use super::coupling::MasterShare;
 use crate::{
     fem::space::{
         SurfacePoint, longest_side,
-        mortar::{Contribution, Facet, contributions},
+        mortar::{Contribution, Facet, Normals, contributions, direction},
         surface_points,
     },
-    linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, norm, outside},
+    linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, larger, norm, outside},
     mesh::Mesh,
     parallel::{
         agreement::Agreed,
@@ -39,6 +39,9 @@ pub struct PairedNode<const D: usize> {
     /// The ratio of its velocity relative to the surface that it faces to the mean over the part of the surface for which it stands, with
     /// that of neighbours without a law; 1 without such neighbours.
     pub stretch: f64,
+    /// The angle in rad of the edges of the other side over the part of the surface for which it stands: by how much the undeformed other
+    /// side turns there, on either side of its mean, or is inclined to the own side where it ends.
+    pub sharpness: f64,
 }
 
 impl<const D: usize> PairedNode<D> {
@@ -68,6 +71,8 @@ pub enum Exchange {
     Continued,
     /// Supports hold nodes on the side `on`.
     Held,
+    /// Corners or edges of the side `against` lie over the faces of the side `on`.
+    Sharper,
     /// The mesh of the side `on` is coarser.
     Coarser,
     /// Another contact has the side `on` on its other side.
@@ -140,10 +145,26 @@ impl<const D: usize> Pair<D> {
                 masters,
                 neighbours: Vec::new(),
                 stretch,
+                sharpness: 0.0,
             })
         });
         self.nodes = paired.collect();
         Ok(())
+    }
+
+    /// The largest angle in rad of edges of the other side where the undeformed surfaces are nearest to each other, up to one facet farther.
+    /// Collective.
+    pub fn sharpness(&self, session: &Session, mesh: &Mesh<D>) -> f64 {
+        let facing = || self.nodes.iter().filter(|node| !node.masters.is_empty());
+        let nearest = facing().map(|node| node.distance).fold(f64::INFINITY, f64::min);
+        let side = |facet: &u32| {
+            let corners = mesh.facet_corners(*facet);
+            norm(&add_scaled(&corners[1], -1.0, &corners[0]))
+        };
+        let [least, size] = session.largest([-nearest, self.on.iter().map(side).fold(0.0, larger)]);
+        let near = facing().filter(|node| node.distance <= size - least);
+        let [most] = session.largest([near.map(|node| node.sharpness).fold(0.0, larger)]);
+        most
     }
 
     /// The nodes that carry the law, and those on which their velocities depend or may depend as bodies slide, by global numbers on all
@@ -187,7 +208,8 @@ impl<const D: usize> Pair<D> {
         let node_at = |SurfacePoint { node, normal, weight }: SurfacePoint<D>| {
             facing.remove(&node).unwrap_or_else(|| {
                 let (distance, masters, neighbours, stretch) = (f64::INFINITY, Vec::new(), Vec::new(), 1.0);
-                PairedNode { node, normal, weight, distance, masters, neighbours, stretch }
+                let sharpness = 0.0;
+                PairedNode { node, normal, weight, distance, masters, neighbours, stretch, sharpness }
             })
         };
         self.nodes = all.into_values().map(node_at).collect();
@@ -404,43 +426,55 @@ fn gap_between_nodes<const D: usize>(
 }
 
 /// What the facets around a node contribute to it.
-#[derive(Default)]
-struct Sum {
+struct Sum<const D: usize> {
     weight: f64,
     whole: f64,
+    /// The part of `whole` of facets that face the other side.
+    facing: f64,
     gap: f64,
     passed: f64,
-    normal: [f64; 3],
-    covered: f64,
-    normals: [[f64; 3]; 2],
+    normal: Vector<D>,
+    normals: [Normals<D>; 2],
     masters: BTreeMap<u32, f64>,
     neighbours: BTreeSet<u32>,
 }
 
-impl Sum {
+impl<const D: usize> Sum<D> {
+    fn new() -> Self {
+        let [weight, whole, facing, gap, passed] = [0.0; 5];
+        let (masters, neighbours) = (BTreeMap::new(), BTreeSet::new());
+        Self {
+            weight,
+            whole,
+            facing,
+            gap,
+            passed,
+            normal: [0.0; D],
+            normals: [Normals::NONE; 2],
+            masters,
+            neighbours,
+        }
+    }
+
     /// Whether the part of the surface for which the node stands suffices for a law. Of a negative part the law would push where it pulls.
     fn carries_a_law(&self) -> bool {
         let Self { weight, whole, passed, .. } = *self;
         weight > LEAST_SHARE * whole && weight + passed > LEAST_STRETCH * weight
     }
 
-    /// The direction in which a node of a surface that slides touches the other side: at right angles to the one of the two surfaces that is
-    /// flat there in the undeformed bodies. Thus a corner or a rounded edge touches a plate along the normal of the plate, whichever of them has the law. Between
-    /// curved surfaces the normal of each has the more weight the more that of the other one varies; of two flat ones that are inclined, an
-    /// edge beside them touches first, and the node has the normal of what it faces.
-    fn direction<const D: usize>(&self) -> Vector<D> {
-        let [own, faced] = self.normals.map(|sum| std::array::from_fn::<f64, D, _>(|i| sum[i]));
-        let [sizes, others] = [norm(&own), norm(&faced)];
-        let spread = |size: f64| (1.0 - size / self.covered).max(0.0);
-        let sum =
-            add_scaled(&own.map(|n| spread(others) / sizes * n), -(spread(sizes) + FLAT) / others, &faced);
-        let length = norm(&sum);
-        sum.map(|n| n / length)
+    /// The angle in rad of the edges of the other side over the part of the surface for which a node at this distance in m stands: by how much
+    /// that side turns there, or is inclined to it where it ends. Steep flanks of a corner see ends that are far away.
+    fn sharpness(&self, distance: f64) -> f64 {
+        let [own, faced] = &self.normals;
+        let is_near = self.gap / self.weight <= distance + 0.5 * own.size();
+        let ends = is_near && self.weight < COVERED * self.facing;
+        let inclination = -dot(&own.mean(), &faced.mean());
+        larger(faced.turn(), if ends { inclination.clamp(-1.0, 1.0).acos() } else { 0.0 })
     }
 }
 
-/// How much the unit normals of a surface may vary, as one less the length of their mean, for it to count as flat (1.6 degrees).
-const FLAT: f64 = 1e-4;
+/// The share of the facets around a node that face the other side from which on it faces it with all of them.
+const COVERED: f64 = 0.999;
 
 /// The sums of the contributions to the nodes of this rank, by global numbers, those of `lawless` left out, from those of the facets of each
 /// rank with the nodes of these facets. Collective.
@@ -449,7 +483,7 @@ fn sum_of_contributions<const D: usize>(
     mesh: &Mesh<D>,
     (all, own): (&[Contribution<D>], &BTreeSet<u32>),
     lawless: &BTreeSet<u32>,
-) -> Result<BTreeMap<u32, Sum>, Agreed> {
+) -> Result<BTreeMap<u32, Sum<D>>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
     // Of linear segments both corners carry a law, of all other facets three nodes.
     let per_facet = if D == 2 && mesh.order() == 1 { 2 } else { 3 };
@@ -460,8 +494,10 @@ fn sum_of_contributions<const D: usize>(
             let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*node)];
             list.extend([f64::from(*node), *weight, *whole, *gap, passed + corners]);
             list.extend(normal.map(|n| weight * n));
-            list.push(norm(&normals[0]));
-            list.extend(normals.as_flattened());
+            for normals in normals {
+                list.extend(normals.sum);
+                list.extend(normals.products.as_flattened());
+            }
             list.push(masters.len() as f64);
             let is_own = |master: &u32| f64::from(u8::from(own.contains(master)));
             list.extend(
@@ -470,20 +506,21 @@ fn sum_of_contributions<const D: usize>(
         }
     }
     let records = exchange_lists(session.world(), &outgoing)?;
-    let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
+    let mut sums: BTreeMap<u32, Sum<D>> = BTreeMap::new();
     let mut rest = &records[..];
     while let [node, weight, whole, gap, passed, after @ ..] = rest {
-        let sum = sums.entry(*node as u32).or_default();
+        let sum = sums.entry(*node as u32).or_insert_with(Sum::new);
         sum.weight += weight;
         sum.whole += whole;
+        sum.facing += if *weight == 0.0 { 0.0 } else { *whole };
         sum.gap += gap;
         sum.passed += passed;
         (0..D).for_each(|i| sum.normal[i] += after[i]);
-        sum.covered += after[D];
-        for (sum, normal) in sum.normals.iter_mut().zip(after[D + 1..].chunks_exact(D)) {
-            (0..D).for_each(|i| sum[i] += normal[i]);
+        let (of_sides, after) = after[D..].split_at(2 * (D + 1) * D);
+        for (sum, given) in sum.normals.iter_mut().zip(of_sides.as_chunks::<D>().0.chunks_exact(D + 1)) {
+            let products = std::array::from_fn(|i| given[1 + i]);
+            sum.add_all(&Normals { sum: given[0], products });
         }
-        let after = &after[3 * D + 1..];
         let count = after[0] as usize;
         let (masters, next) = after[1..].split_at(3 * count);
         for &[master, value, is_own] in masters.as_chunks().0 {
@@ -498,7 +535,7 @@ fn sum_of_contributions<const D: usize>(
 /// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m, and whether they slide.
 fn paired<const D: usize>(
     mesh: &Mesh<D>,
-    sums: BTreeMap<u32, Sum>,
+    sums: BTreeMap<u32, Sum<D>>,
     places: &BTreeMap<u32, Vector<D>>,
     slides: bool,
 ) -> Vec<PairedNode<D>> {
@@ -506,11 +543,10 @@ fn paired<const D: usize>(
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
         .filter(|(_, sum)| sum.whole > 0.0 && sum.carries_a_law())
         .map(|(node, sum)| {
-            let normal: Vector<D> = std::array::from_fn(|i| sum.normal[i]);
-            let length = norm(&normal);
-            let normal = if slides { sum.direction() } else { normal.map(|n| n / length) };
+            let length = norm(&sum.normal);
+            let normal = if slides { direction(&sum.normals) } else { sum.normal.map(|n| n / length) };
             let mut distance = sum.gap / sum.weight;
-            let shares = sum.masters.into_iter().map(|(master, value)| (master, value / sum.weight));
+            let shares = sum.masters.iter().map(|(master, value)| (*master, value / sum.weight));
             let mut masters: Vec<(u32, f64)> = shares.collect();
             face_along_normal(&mut masters, &sum.neighbours, (&places[&node], &normal), places);
             if slides {
@@ -519,6 +555,7 @@ fn paired<const D: usize>(
                     .map(|(master, share)| (share, add_scaled(&places[master], -1.0, &places[&node])));
                 distance = ways.map(|(share, way)| share * dot(&way, &normal)).sum();
             }
+            let sharpness = sum.sharpness(distance);
             PairedNode {
                 node: mesh.owned_node(node) as u32,
                 normal,
@@ -527,6 +564,7 @@ fn paired<const D: usize>(
                 masters,
                 neighbours: sum.neighbours.into_iter().collect(),
                 stretch: 1.0 + sum.passed / sum.weight,
+                sharpness,
             }
         })
         .collect()
@@ -580,25 +618,6 @@ fn face_along_normal<const D: usize>(
 mod tests {
     use super::*;
 
-    /// A corner of 90 degrees, which is turned by 20 degrees, on a plate, and a plate on the corner.
-    #[test]
-    fn a_node_touches_at_right_angles_to_the_flat_one_of_two_surfaces() {
-        let (sine, cosine) = 20.0f64.to_radians().sin_cos();
-        let of = |own: Vector<2>, faced: Vector<2>| {
-            let normals = [own, faced].map(|[x, y]| [x, y, 0.0]);
-            Sum { covered: 2.0, normals, ..Sum::default() }.direction::<2>()
-        };
-        let [corner, plate] = [[sine - cosine, -sine - cosine], [0.0, -2.0]];
-        let opposite = |[x, y]: Vector<2>| [-x, -y];
-        for [own, faced] in [[corner, opposite(plate)], [plate, opposite(corner)], [plate, opposite(plate)]] {
-            let [x, y] = of(own, faced);
-            assert!(x.abs() < 1e-3 && (y + 1.0).abs() < 1e-6, "{own:?} on {faced:?}: {x}, {y}");
-        }
-        // Flat ones that are inclined: a corner beside them touches.
-        let [x, y] = of([2.0 * sine, -2.0 * cosine], opposite(plate));
-        assert!(x.abs() < 1e-12 && (y + 1.0).abs() < 1e-12, "{x}, {y}");
-    }
-
     /// What a segment of 1 m between two slave nodes has that faces the whole of another one at a distance of 3 m.
     fn segment() -> [Contribution<2>; 2] {
         let of = |node: u32, master: u32| Contribution {
@@ -608,7 +627,7 @@ mod tests {
             whole: 0.5,
             gap: 1.5,
             corners: 0.0,
-            normals: [[0.0, 1.0], [0.0, -1.0]],
+            normals: [Normals::NONE; 2],
             masters: vec![(master, 0.5)],
         };
         [of(0, 10), of(1, 11)]

@@ -1,11 +1,13 @@
 //! The position of a body relative to its obstacles: warnings about that at the start and about contacts that are not as they seem, and
 //! the gaps of all contacts.
 
+use super::sides::{EDGE, pressed_by_edge};
 use crate::{
     error::Result,
     fem::{
         body::Body,
         effect::{Closeness, Contact, Gaps, OVERRUN},
+        pairs::pair_of,
         space::{longest_side, surface_means},
         state::State,
     },
@@ -246,7 +248,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
-        let Closeness { penetration, held, slip } = contact.closeness.of_all(session);
+        let Closeness { penetration, held, slip, sharpness } = contact.closeness.of_all(session);
         let on = table.on.join(", ");
         if slip > LARGEST_SLIP && table.sliding == Sliding::Small {
             out.push(format!(
@@ -254,6 +256,9 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                  still act on the surface that they faced at the start; use sliding = \"finite\"",
                 table.against.join(", ")
             ));
+        }
+        if let Some(pair) = pair_of(&body.pairs, number).filter(|pair| pair.slides && sharpness > EDGE) {
+            out.push(pressed_by_edge(job, pair));
         }
         if !contact.normal.law.depends_on_displacement() {
             continue;

@@ -6,7 +6,7 @@ use super::{
     memory::require_for_run,
     obstacles, pairs, parts,
     restored::{StartState, sides_before, start_file, transfer},
-    sides::Circumstances,
+    sides::{self, Circumstances},
     steps,
     validate::refuse_free_bodies,
 };
@@ -64,6 +64,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     warnings.extend(parts::warnings(session, job, &body.mesh));
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);
     warnings.extend(circumstances.warnings(&body.pairs));
+    warnings.extend(sides::warnings_of_edges(session, job, &body.mesh, &body.pairs)?);
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };

@@ -24,6 +24,10 @@ const ALONG: f64 = 0.1;
 const ROUNDING: f64 = 1e-6;
 /// Length of the free part of a unit direction below which a node is held nearly along it.
 const NEARLY_HELD: f64 = 0.5;
+/// The angle in rad (3 degrees) of edges over faces whose nodes carry the law from which on the other side may have to carry it.
+const SHARP: f64 = 0.052;
+/// The same (10 degrees) from which on the user is warned: forces along an inclined face are 18 % of those across.
+pub(super) const EDGE: f64 = 0.175;
 
 /// What the choice of a side depends on besides the meshes of both.
 #[derive(Debug)]
@@ -100,9 +104,21 @@ impl<const D: usize> Circumstances<D> {
             let other = formed(first.clone().exchanged(Exchange::Held))?;
             return Ok(if is_held(&other) { first } else { other });
         }
-        if earlier.is_none() && is_coarser(session, &first)? && !meets_another(session, mesh, job, &first)? {
+        if earlier.is_some() {
+            return Ok(first);
+        }
+        let sharpness = first.sharpness(session, mesh);
+        if first.slides && sharpness > SHARP {
+            let other = formed(first.clone().exchanged(Exchange::Sharper))?;
+            if !is_held(&other) && is_blunter((session, mesh), &other, sharpness) {
+                return Ok(other);
+            }
+        }
+        if is_coarser(session, &first)? && !meets_another(session, mesh, job, &first)? {
             let other = formed(first.clone().exchanged(Exchange::Coarser))?;
-            return Ok(if is_held(&other) { first } else { other });
+            let is_sharp =
+                || first.slides && is_blunter((session, mesh), &first, other.sharpness(session, mesh));
+            return Ok(if is_held(&other) || is_sharp() { first } else { other });
         }
         Ok(first)
     }
@@ -205,6 +221,67 @@ pub(super) fn conflict<const D: usize>(
     })
 }
 
+/// Whether nodes of a pair face the other side, and edges that are less than half as sharp as these, given by their angle in rad.
+/// Collective.
+fn is_blunter<const D: usize>((session, mesh): (&Session, &Mesh<D>), pair: &Pair<D>, sharpness: f64) -> bool {
+    let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
+    session.total(facing) > 0 && sharpness > SHARP && 2.0 * pair.sharpness(session, mesh) < sharpness
+}
+
+/// Warnings about corners and edges that lie over faces whose nodes carry the law. Collective, with the same warnings on all ranks.
+pub(super) fn warnings_of_edges<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &[Pair<D>],
+) -> Result<Vec<String>, Agreed> {
+    let mut out = Vec::new();
+    for pair in pairs.iter().filter(|pair| pair.slides) {
+        let sharpness = pair.sharpness(session, mesh);
+        if sharpness <= EDGE {
+            continue;
+        }
+        let mut other = pair.clone().exchanged(Exchange::Requested);
+        other.form(session, mesh, &mesh.nodes)?;
+        let remedy = match (is_blunter((session, mesh), &other, sharpness), job.contact[pair.contact].side) {
+            (false, _) => None,
+            (true, Side::Auto) => {
+                Some("let no support and no other contact hold their nodes, so that these carry the law")
+            }
+            (true, _) => Some("delete `side`"),
+        };
+        out.push(words_of_edges(job, pair, ("lie", remedy)));
+    }
+    Ok(out)
+}
+
+/// The warning about a pair whose nodes were pressed by corners and edges of the other side in a run.
+pub(super) fn pressed_by_edge<const D: usize>(job: &Job, pair: &Pair<D>) -> String {
+    words_of_edges(job, pair, ("pressed", None))
+}
+
+/// A warning about corners and edges over faces, with what they do there and what to do about it.
+fn words_of_edges<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<&str>)) -> String {
+    let job::Contact { on, against, .. } = &job.contact[pair.contact];
+    let [own, other] =
+        if pair.exchange.is_some() { [against, on] } else { [on, against] }.map(|names| names.join(", "));
+    let side = if pair.exchange.is_some() { "on" } else { "against" };
+    let remedy = remedy.map_or_else(
+        || {
+            format!(
+                "if {own} is flat there, state side = \"{side}\"; of two surfaces with corners, round those of {other} with a radius of more than \
+                 two facets of {own}"
+            )
+        },
+        Into::into,
+    );
+    format!(
+        "contact.{}: corners or edges of {other} {lie} on faces of {own}, whose nodes carry the law: as they slide, forces along these faces may \
+         be wrong by a part of the pressure; {remedy}",
+        pair.contact
+    )
+}
+
 /// Whether the nodes of a pair face more than twice as many nodes as they are, in space more than four times as many. Collective.
 fn is_coarser<const D: usize>(session: &Session, pair: &Pair<D>) -> Result<bool, Agreed> {
     let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty());
@@ -274,6 +351,7 @@ pub(super) fn lines<const D: usize>(job: &Job, pairs: &[Pair<D>]) -> Vec<String>
             Exchange::Requested => "as `side` states".into(),
             Exchange::Continued => "as in the run from which this one starts".into(),
             Exchange::Held => format!("because supports hold nodes of {on}"),
+            Exchange::Sharper => format!("because its corners or edges lie over {on}"),
             Exchange::Coarser => format!("because the mesh of {on} is coarser"),
             Exchange::Faced => format!("because {on} is faced in another contact"),
         };
@@ -307,6 +385,7 @@ mod tests {
             masters,
             neighbours: Vec::new(),
             stretch: 1.0,
+            sharpness: 0.0,
         };
         conflict(&node, &held, rubs, |direction| vec![(1.0, norm(&held.free_part(1, direction)))])
     }

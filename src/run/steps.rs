@@ -1,7 +1,8 @@
 //! The steps of a job.
 
 use crate::{
-    job::{Every, Job, Scalar},
+    job::{Contact, Every, Job, Scalar, Sliding},
+    laws::contact::NormalLaw,
     solver::stepping::{Adaptive, Breakpoint, Forgets, Landings, StepRange, TIME_TOLERANCE},
 };
 use std::borrow::Cow;
@@ -153,7 +154,7 @@ fn kinks(job: &Job, value: &Scalar) -> Result<Vec<f64>, usize> {
 /// Warnings about tables whose kinks the steps pass over. Adaptive steps follow a table up to their tolerance.
 pub(super) fn warnings(job: &Job) -> Vec<String> {
     if job.time.adaptive.is_some() {
-        return Vec::new();
+        return impacts_of_nodes(job);
     }
     let length = job.time.step;
     let dense = |found: TimeDependent<'_>| {
@@ -168,6 +169,25 @@ pub(super) fn warnings(job: &Job) -> Vec<String> {
     let mut warnings: Vec<String> = time_dependent(job).into_iter().filter_map(dense).collect();
     warnings.dedup();
     warnings
+}
+
+/// Warnings about contacts whose forces grow as adaptive steps become shorter.
+fn impacts_of_nodes(job: &Job) -> Vec<String> {
+    let has_mass = job.materials().any(|(_, material)| material.density.is_some());
+    let strikes = |contact: &Contact| {
+        let is_constraint = matches!(contact.normal, NormalLaw::Unilateral(_));
+        is_constraint && contact.sliding == Sliding::Finite && !contact.redistribute_mass
+    };
+    let found = job.contact.iter().enumerate().filter(|(_, contact)| has_mass && strikes(contact));
+    let words = |(number, contact): (usize, &Contact)| {
+        format!(
+            "contact.{number}: where a node of {} that slides meets another facet, its mass is stopped within one step: the force of this \
+             step is the mass times the change of velocity over the step, and adaptive steps become short there; set redistribute_mass = \
+             true, or a longer [time.adaptive] smallest_step",
+            contact.on.join(", ")
+        )
+    };
+    found.map(words).collect()
 }
 
 /// The times at which loads and motions of a job have kinks or jumps, if steps end there, and the end of its last step: where they jump at

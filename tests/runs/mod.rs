@@ -35,6 +35,7 @@ mod report;
 mod restart;
 mod schemes;
 mod signals;
+mod sliding;
 mod stages;
 mod surfaces;
 mod viscosity;

@@ -179,7 +179,12 @@ fn a_block_that_slides_over_the_end_of_a_plate_gains_no_energy_by_short_steps() 
 }
 
 /// Writes triangles of several bodies, with the sides of these names on their boundaries.
-fn write_triangles(path: &Path, nodes: &[[f64; 2]], sides: &[(&str, Vec<[usize; 2]>)], cells: &[[usize; 3]]) {
+pub(super) fn write_triangles(
+    path: &Path,
+    nodes: &[[f64; 2]],
+    sides: &[(&str, Vec<[usize; 2]>)],
+    cells: &[[usize; 3]],
+) {
     let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n", sides.len() + 1);
     let mut elements = Vec::new();
     for (number, (name, facets)) in sides.iter().enumerate() {
@@ -198,7 +203,7 @@ fn write_triangles(path: &Path, nodes: &[[f64; 2]], sides: &[(&str, Vec<[usize; 
 }
 
 /// A square with its lower corner 1 mm above a plate, turned by this angle, which falls on it at 1 m/s and moves along it at this speed.
-fn falling_on_a_corner(degrees: f64, speed: f64) -> Case {
+pub(super) fn falling_on_a_corner(degrees: f64, speed: f64) -> Case {
     let case = Case::written_as(&format!(
         "mesh.file = 'corner.msh'
          material = {{ hypothesis = 'plane_strain', density = 1000.0, elasticity = {{ youngs_modulus = 1e8, poisson_ratio = 0.3 }} }}
@@ -235,7 +240,7 @@ fn falling_on_a_corner(degrees: f64, speed: f64) -> Case {
 }
 
 /// The forces of a contact on its body in each step, along x and y.
-fn forces_of(results: &Results, contact: &str) -> Vec<[f64; 2]> {
+pub(super) fn forces_of(results: &Results, contact: &str) -> Vec<[f64; 2]> {
     let table = results.table("resultants.csv").only("source", contact);
     let [along, across] = ["force_x", "force_y"].map(|column| table.numbers(column));
     along.into_iter().zip(across).map(|(along, across)| [along, across]).collect()

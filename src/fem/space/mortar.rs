@@ -37,10 +37,12 @@ use parry3d_f64::{
 
 mod facet;
 mod geometry;
+mod normals;
 #[cfg(test)]
 mod tests;
 
 pub use facet::Facet;
+pub use normals::{Normals, direction};
 
 /// A master facet faces a slave facet if its normal has a component along the slave normal below this.
 const FACING: f64 = -0.2;
@@ -77,9 +79,8 @@ pub struct Contribution<const D: usize> {
     /// covered. With `weight` it is int psi_a: the part of the surface for which the node stands, which may be negative where the facet is
     /// covered in part.
     pub corners: f64,
-    /// The integrals over the covered part of the facet of its outward unit normal and of those of the master facets, in the undeformed
-    /// bodies, in m^(D-1).
-    pub normals: [Vector<D>; 2],
+    /// Over the covered part of the facet: its outward unit normal and those of the master facets, in the undeformed bodies.
+    pub normals: [Normals<D>; 2],
     /// For each master node b, in ascending order, int psi_a phi_b in m^(D-1), with phi_b at the place on the
     /// master facet that is projected. The corners c of quadratic triangles that are covered in part, which carry no law, are included
     /// with -int psi_a phi_c. All sum to `weight`.
@@ -380,7 +381,7 @@ impl<'a, const D: usize> Slave<'a, D> {
             whole: self.measure * facet.share(i),
             gap: 0.0,
             corners: 0.0,
-            normals: [[0.0; D]; 2],
+            normals: [Normals::NONE; 2],
             masters: Vec::new(),
         }));
         let mut covered: f64 = parts.iter().map(|part| part.measure).sum();
@@ -404,10 +405,9 @@ impl<'a, const D: usize> Slave<'a, D> {
         let is_negligible = |c: usize| part_of_corner(c).abs() <= SMALLEST_PART * self.measure;
         let is_whole = covered > 0.5 * self.measure && (0..law.start).all(is_negligible);
         let measure: f64 = parts.iter().map(|part| part.measure).sum();
-        let of_masters = parts.iter().fold([0.0; D], |sum, part| {
-            std::array::from_fn(|i| sum[i] + part.measure * part.master.undeformed[i])
-        });
-        let normals = [facet.undeformed.map(|n| measure * n), of_masters];
+        let mut normals = [Normals::NONE; 2];
+        normals[0].add(measure, &facet.undeformed);
+        parts.iter().for_each(|part| normals[1].add(part.measure, &part.master.undeformed));
         let result = &mut result[first..];
         result.iter_mut().for_each(|contribution| contribution.normals = normals);
         for (contribution, ((dual, m), &(i, j))) in

@@ -73,7 +73,7 @@ pub struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_state: Option<String>,
     /// For each contact: the largest penetration in m so far of points that are free to move, and of points that supports hold; the largest
-    /// slip along another body as a share of a facet.
+    /// slip along another body as a share of a facet, and the largest angle in rad of edges of it over points with contact pressure.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub closeness: Vec<Vec<Option<f64>>>,
     /// The contacts between bodies whose law acts at nodes of `against`, by their positions in the job.

@@ -33,7 +33,8 @@ pub enum Sliding {
     #[default]
     Small,
     /// Any distance: what nodes face is found anew from the displacements, whenever some node has slid by a quarter of a facet since the
-    /// last time, and so is the direction of the pressure: at right angles to a flat surface on which a corner or a rounded edge slides.
+    /// last time, and so is the direction of the pressure: at right angles to a flat surface on which a corner or a rounded edge slides, and to both of two edges.
+    /// Corners and edges must be on the side that carries the law (`side`).
     /// Requires a normal law with a gap, without adhesion and memory.
     Finite,
 }
@@ -48,7 +49,8 @@ impl Sliding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
-    /// Those in `on`, unless supports hold nodes there and not what they face, or their mesh is clearly coarser: they face more than twice
+    /// Those in `on`, unless supports hold nodes there and not what they face, or, with `sliding = "finite"`, corners or edges of `against` lie
+    /// over them where the bodies are nearest to each other, or their mesh is clearly coarser: they face more than twice
     /// as many nodes of `against` as they have themselves, in 3D more than four times as many. Then those in `against`, if supports do not
     /// hold nodes there in the same way and, for a coarser mesh, no other contact has nodes of either side. The log names the choice. A run
     /// that starts from another one (`[initial] from`) prefers the choice of that run.

@@ -11,12 +11,13 @@ pub struct Closeness {
     pub held: f64,
     /// Largest distance by which a point with contact pressure had slid along another body, as a share of the size of the facets there.
     pub slip: f64,
+    /// Largest angle in rad of edges of another body over points with contact pressure.
+    pub sharpness: f64,
 }
 
 impl Default for Closeness {
     fn default() -> Self {
-        let [penetration, held, slip] = [f64::NEG_INFINITY; 3];
-        Self { penetration, held, slip }
+        Self::of([f64::NEG_INFINITY; 4])
     }
 }
 
@@ -27,8 +28,8 @@ impl Closeness {
     }
 
     /// All of them.
-    fn numbers(self) -> [f64; 3] {
-        [self.penetration, self.held, self.slip]
+    fn numbers(self) -> [f64; 4] {
+        [self.penetration, self.held, self.slip, self.sharpness]
     }
 
     /// The one over all ranks. Collective.
@@ -37,8 +38,8 @@ impl Closeness {
     }
 
     /// The one with these numbers.
-    fn of([penetration, held, slip]: [f64; 3]) -> Self {
-        Self { penetration, held, slip }
+    fn of([penetration, held, slip, sharpness]: [f64; 4]) -> Self {
+        Self { penetration, held, slip, sharpness }
     }
 
     /// From the numbers of a checkpoint.

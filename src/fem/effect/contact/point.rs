@@ -86,6 +86,8 @@ pub(super) struct Point<const D: usize> {
     pub facet_size: f64,
     /// The ratio of its velocity relative to that body to the mean over the part of the surface for which it stands.
     pub stretch: f64,
+    /// The angle in rad of the edges of that body over the point.
+    pub sharpness: f64,
     /// Whether its normal follows what it faces: no other contact acts at the node.
     pub turns: bool,
     /// Displacement in m relative to the body that it faces when it began to face it.
@@ -143,6 +145,7 @@ impl<const D: usize> Point<D> {
             distance: 0.0,
             facet_size: f64::INFINITY,
             stretch: 1.0,
+            sharpness: 0.0,
             faced_at: [0.0; D],
             turns: false,
             reach: 0.0,
@@ -220,7 +223,8 @@ impl<const D: usize> Point<D> {
 
     /// A point at a node that faces another body, whose values are relative to that body.
     pub(super) fn paired(node: &PairedNode<D>, held: &Held<D>) -> Self {
-        Self { distance: node.distance, stretch: node.stretch, ..Self::nodal(held.whole(node.point()), held) }
+        let PairedNode { distance, stretch, sharpness, .. } = *node;
+        Self { distance, stretch, sharpness, ..Self::nodal(held.whole(node.point()), held) }
     }
 
     /// The part of the surface for which it stands in m^(D-1).

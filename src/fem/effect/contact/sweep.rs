@@ -2,7 +2,7 @@
 
 use super::{
     Contact,
-    closeness::Gaps,
+    closeness::{Closeness, Gaps},
     normal::NormalContact,
     point::{Point, Unknown, Vectors::Body},
     tangential_point::tangents,
@@ -166,14 +166,16 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Keeps how far points with pressure have slid along another body in the step just committed, at displacements and velocities that
-    /// are relative to it.
+    /// are relative to it, and how sharp its edges over them are.
     pub fn keep_slip(&mut self, [displacement, velocity]: [&[f64]; 2]) {
         if !self.is_paired {
             return;
         }
         for point in &self.normal.points {
             if point.pressure_at(&self.normal.law, Body, velocity) != 0.0 {
-                self.closeness.slip = larger(self.closeness.slip, slip(point, displacement));
+                let Closeness { slip: most, sharpness, .. } = &mut self.closeness;
+                *most = larger(*most, slip(point, displacement));
+                *sharpness = larger(*sharpness, point.sharpness);
             }
         }
     }
@@ -203,7 +205,7 @@ impl<const D: usize> Contact<D> {
     ) -> Result<()> {
         for (at, node) in nodes.iter().enumerate() {
             let point = &mut self.normal.points[at];
-            point.stretch = node.stretch;
+            (point.stretch, point.sharpness) = (node.stretch, node.sharpness);
             point.faced_at = std::array::from_fn(|i| displacement[point.node() * D + i]);
             point.turn(&node.normal, held);
             // Along a normal that is not that of the plane.

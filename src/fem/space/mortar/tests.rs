@@ -170,7 +170,7 @@ fn by_node<const D: usize>(contributions: &[Contribution<D>]) -> BTreeMap<u32, C
             whole: 0.0,
             gap: 0.0,
             corners: 0.0,
-            normals: [[0.0; D]; 2],
+            normals: [Normals::NONE; 2],
             masters: Vec::new(),
         };
         let sum = sums.entry(one.node).or_insert(empty);

@@ -1,0 +1,119 @@
+//! Corners, edges and fillets that slide along other bodies.
+
+use super::pairs::{falling_on_a_corner, forces_of, write_triangles};
+use crate::{case::Case, results::Results};
+
+/// Forces of a contact on its body of which those along x are this share of those along y, in the sum over all steps.
+fn share_along(results: &Results, contact: &str) -> f64 {
+    let forces = forces_of(results, contact);
+    let [along, across] = [0, 1].map(|axis| forces.iter().map(|force| force[axis]).sum::<f64>());
+    assert!(across.abs() > 0.0, "{contact} never touched");
+    along / across
+}
+
+/// With the law at nodes of the plate the flanks beside the corner, which each of them meets, would push the square back: by 0.59 of the
+/// force across.
+#[test]
+fn a_corner_carries_the_law_whichever_side_the_job_names_first_and_however_fine_its_mesh_is() {
+    let thrown = || {
+        falling_on_a_corner(20.0, -2.0).set("contact.0.on", "['top']").set("contact.0.against", "['skin']")
+    };
+    let case = thrown();
+    let outcome = case.run_with(1, &["--force"]).expect(0);
+    outcome.says("nodes of skin carry the law, because its corners or edges lie over top");
+    let share = share_along(&case.results(), "contact top");
+    assert!(share.abs() < 0.01, "{share}");
+    let stated = thrown().set("contact.0.side", "'on'");
+    let outcome = stated.run_with(2, &["--force"]).expect(0);
+    outcome
+        .says("corners or edges of skin lie on faces of top, whose nodes carry the law")
+        .says("delete `side`");
+    let outcome = stated.run_with(1, &["--force"]).expect(0);
+    outcome.says("corners or edges of skin pressed on faces of top");
+}
+
+/// A pad with rounded ends of 60 mm, 0.3 m long, pressed on a plate by its own upper side and dragged along it by this way in m, in a
+/// body without mass.
+fn dragged_pad(way: f64) -> Case {
+    let case = Case::written_as(&format!(
+        "mesh.file = 'pad.msh'
+         material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e8, poisson_ratio = 0.3 }} }}
+         support = [{{ on = ['base'], fix = 'all' }}, {{ on = ['grip'], fix = 'all', displacement = ['{way}*max(t-0.1,0)', '-0.02*min(t,0.1)'] }}]
+         contact = [{{ on = ['skin'], against = ['top'], sliding = 'finite', normal.unilateral = {{}}, friction.coulomb.coefficient = 0.3 }}]
+         time = {{ end = 1.1, step = 0.02, scheme = 'implicit_euler' }}"
+    ));
+    let (mut nodes, mut cells) = (Vec::new(), Vec::new());
+    let mut sides =
+        vec![("skin", Vec::new()), ("top", Vec::new()), ("base", Vec::new()), ("grip", Vec::new())];
+    for (nx, ny, is_plate) in [(16, 3, false), (17, 2, true)] {
+        let first = nodes.len();
+        let at = |i: usize, j: usize| first + i + (nx + 1) * j;
+        for (j, i) in (0..=ny).flat_map(|j| (0..=nx).map(move |i| (j, i))) {
+            let [x, y] = [(i, nx), (j, ny)].map(|(at, of)| at as f64 / of as f64);
+            let beyond = ((0.3 * x - 0.15).abs() - 0.09).max(0.0);
+            let bottom = 0.06 - (0.06f64.powi(2) - beyond * beyond).max(0.0).sqrt();
+            let place = if is_plate {
+                [0.8 * x - 0.3, 0.1 * y - 0.1]
+            } else {
+                [0.3 * x - 0.15, bottom + y * (0.12 - bottom)]
+            };
+            nodes.push(place);
+        }
+        for (i, j) in (0..nx).flat_map(|i| (0..ny).map(move |j| (i, j))) {
+            cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        for i in 0..nx {
+            sides[if is_plate { 2 } else { 0 }].1.push([at(i, 0), at(i + 1, 0)]);
+            sides[if is_plate { 1 } else { 3 }].1.push([at(i, ny), at(i + 1, ny)]);
+        }
+    }
+    write_triangles(&case.folder().join("pad.msh"), &nodes, &sides, &cells);
+    case
+}
+
+#[test]
+fn a_rounded_pad_rubs_with_its_coefficient_on_any_number_of_ranks_and_restarts_in_the_middle_of_its_way() {
+    let straight = dragged_pad(0.2).set("checkpoint.at", "[0.62]");
+    let alone = forces_of(&straight.run(1), "contact skin");
+    // After the pad has begun to slide everywhere.
+    for [along, across] in alone.iter().skip(15) {
+        assert!((along / across + 0.3).abs() < 1e-6 && *across > 1e4, "{along} N/m beside {across} N/m");
+    }
+    let history = straight.results().text("history.csv");
+    let checkpoint = straight.folder().join("out/checkpoint-31.h5");
+    straight.run_with(1, &["--restart", &checkpoint.display().to_string()]).expect(0);
+    assert!(straight.results().text("history.csv") == history, "from the middle of its way");
+    for ranks in [2, 3] {
+        let forces = forces_of(&dragged_pad(0.2).run(ranks), "contact skin");
+        for (step, (one, other)) in alone.iter().zip(&forces).enumerate() {
+            let difference = (one[0] - other[0]).hypot(one[1] - other[1]) / alone[step][1];
+            assert!(difference < 1e-8, "{ranks} ranks, step {step}: {difference:e}");
+        }
+    }
+}
+
+/// Where nodes with mass meet other facets, their momentum is lost within one step, and adaptive steps become short there.
+#[test]
+fn adaptive_steps_make_no_peaks_of_the_force_of_a_corner_that_slides_without_mass_at_its_surface() {
+    let thrown = |redistributes: bool| {
+        let case = falling_on_a_corner(20.0, 2.0)
+            .set("time.adaptive", "{ tolerance = 1e-2, smallest_step = 1e-8, largest_step = 4e-4 }");
+        case.set("time.step", "1e-5")
+            .set("contact.0.redistribute_mass", if redistributes { "true" } else { "false" })
+    };
+    let largest = |case: &Case| {
+        let forces = forces_of(&case.results(), "contact skin");
+        forces.into_iter().map(|[_, across]| across).fold(0.0, f64::max)
+    };
+    let with_mass = thrown(false);
+    with_mass
+        .run_with(1, &["--force"])
+        .expect(0)
+        .says("set redistribute_mass = true, or a longer [time.adaptive] smallest_step");
+    let without = thrown(true);
+    without.run(1);
+    // That of fixed steps is 2.4e4 N.
+    let [peak, steady] = [largest(&with_mass), largest(&without)];
+    assert!(steady > 2e4 && steady < 4e4 && peak > 10.0 * steady, "{peak} N, without mass {steady} N");
+}
