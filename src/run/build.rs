@@ -121,7 +121,7 @@ fn contacts<const D: usize>(
         let paired = nodes_of(pairs, number).map(<[_]>::to_vec);
         let conditions = ContactConditions { quadrature: contact.quadrature, law, gap, paired };
         let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
-        laws.turn_edges(session, mesh, held, job.time.end)?;
+        laws.turn_edges(session, mesh, held)?;
         if let Some(motion) = motion {
             let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired {
                 laws.normal.boundary().surface_points().collect()

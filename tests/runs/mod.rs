@@ -8,6 +8,7 @@ mod certificates;
 mod compression;
 mod check_values;
 mod contact;
+mod edges;
 mod effects;
 mod elasticity;
 mod errors;

@@ -144,22 +144,16 @@ impl Gap {
         each_obstacle!(self, _ => None, obstacle => Some(obstacle.depth(time, place)))
     }
 
-    /// The direction from a place to the obstacle, a unit vector against the normal of its surface, at that of the times at which it is
-    /// nearest; none where it has none there, as in the middle of a sphere, or where two parts of it are equally near.
-    pub fn direction_of_nearest<const D: usize>(
-        &self,
-        place: &Vector<D>,
-        times: &[f64],
-    ) -> Option<Vector<D>> {
-        let depth = |time: f64, place: &Vector<D>| self.depth(time, place).filter(|depth| depth.is_finite());
-        let depths = times.iter().filter_map(|time| Some((*time, depth(*time, place)?)));
-        let (time, nearest) = depths.reduce(|best, next| if next.1 > best.1 { next } else { best })?;
+    /// The direction from a place to the obstacle at `time`, a unit vector against the normal of its surface where it is nearest; none
+    /// where it has none there, as in the middle of a sphere, or where two parts of it are equally near.
+    pub fn direction_of_nearest<const D: usize>(&self, place: &Vector<D>, time: f64) -> Option<Vector<D>> {
+        let depth = |place: &Vector<D>| self.depth(time, place).filter(|depth| depth.is_finite());
+        let nearest = depth(place)?;
         let width = WIDTH * place.iter().fold(nearest.abs(), |most, x| most.max(x.abs()));
         let mut direction = [0.0; D];
         for (i, component) in direction.iter_mut().enumerate() {
-            let at = |length: f64| {
-                depth(time, &std::array::from_fn(|j| place[j] + if i == j { length } else { 0.0 }))
-            };
+            let at =
+                |length: f64| depth(&std::array::from_fn(|j| place[j] + if i == j { length } else { 0.0 }));
             *component = (at(width)? - at(-width)?) / (2.0 * width);
         }
         let length = norm(&direction);
@@ -186,6 +180,18 @@ impl Gap {
     pub fn is_driven(&self) -> bool {
         let Prescribed { centre, facing, .. } = self.prescribed();
         centre.iter().chain(facing).any(Scalar::depends_on_time)
+    }
+
+    /// Whether its prescribed motion may change the direction in which a place sees it.
+    pub fn turns_as_seen(&self) -> bool {
+        let Prescribed { centre, facing, .. } = self.prescribed();
+        let moves = if matches!(self, Self::Plane(_)) { facing } else { centre };
+        moves.iter().any(Scalar::depends_on_time)
+    }
+
+    /// Whether it is known to be convex, so that an edge touches it along one direction.
+    pub fn is_convex(&self) -> bool {
+        matches!(self, Self::Plane(_) | Self::Sphere(Sphere { hollow: false, .. }))
     }
 
     /// The centre in m at `time` of a sphere or shape, the point of a plane; the origin without an obstacle.
@@ -355,16 +361,16 @@ pub(super) mod tests {
             let found = found.expect("a direction");
             assert!((0..2).all(|i| (found[i] - expected[i]).abs() < 1e-9), "{found:?}, not {expected:?}");
         };
-        close(floor(-0.5).direction_of_nearest(&[1.0, 0.25], &[0.0]), [0.0, -1.0]);
-        close(disc([3.0, -4.0], false).direction_of_nearest(&[0.0, 0.0], &[0.0]), [0.6, -0.8]);
-        close(disc([0.3, -0.4], true).direction_of_nearest(&[0.0, 0.0], &[0.0]), [-0.6, 0.8]);
-        // It passes below at t = 3 s.
+        close(floor(-0.5).direction_of_nearest(&[1.0, 0.25], 0.0), [0.0, -1.0]);
+        close(disc([3.0, -4.0], false).direction_of_nearest(&[0.0, 0.0], 0.0), [0.6, -0.8]);
+        close(disc([0.3, -0.4], true).direction_of_nearest(&[0.0, 0.0], 0.0), [-0.6, 0.8]);
         let rolling = sphere(vec![expression("t - 3"), Scalar::Number(-4.0)], 2.0, false);
-        close(rolling.direction_of_nearest(&[0.0, 0.0], &[0.0, 1.0, 2.0, 3.0, 4.0]), [0.0, -1.0]);
+        close(rolling.direction_of_nearest(&[0.0, 0.0], 0.0), [-0.6, -0.8]);
+        close(rolling.direction_of_nearest(&[0.0, 0.0], 3.0), [0.0, -1.0]);
         let channel = shape("min(x, y)", vec![]);
-        assert_eq!(channel.direction_of_nearest(&[1.0, 1.0], &[0.0]), None);
-        close(channel.direction_of_nearest(&[1.0, 0.5], &[0.0]), [0.0, -1.0]);
-        assert_eq!(disc([0.0, 0.0], true).direction_of_nearest(&[0.0, 0.0], &[0.0]), None);
+        assert_eq!(channel.direction_of_nearest(&[1.0, 1.0], 0.0), None);
+        close(channel.direction_of_nearest(&[1.0, 0.5], 0.0), [0.0, -1.0]);
+        assert_eq!(disc([0.0, 0.0], true).direction_of_nearest(&[0.0, 0.0], 0.0), None);
     }
 
     proptest! {

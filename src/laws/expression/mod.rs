@@ -51,6 +51,17 @@ impl Scalar {
         }
     }
 
+    /// Contains its value at `time` and `point` without rounding, and what rounding in the evaluation makes of it.
+    pub fn enclose(&self, time: f64, point: &[f64]) -> Interval {
+        match self {
+            Self::Number(number) => Interval::from(*number),
+            Self::Expression(expression) => {
+                let ranges = arguments(time, point).map(Interval::from);
+                expression.program.enclose(&ranges, Variable::T).value
+            }
+        }
+    }
+
     /// Whether it contains t.
     pub fn depends_on_time(&self) -> bool {
         self.uses(Variable::T)

@@ -2,6 +2,7 @@
 
 use super::point::{Point, Vectors::Body};
 use crate::{fem::space::SurfacePoint, linear_algebra::tensor::Vector};
+use std::borrow::Cow;
 
 /// The boundary of a contact on this rank, as its points divide it.
 #[derive(Debug, Clone, Copy)]
@@ -29,12 +30,12 @@ impl<'a, const D: usize> ContactBoundary<'a, D> {
 
     /// Size in m^(D-1).
     pub fn area(self) -> f64 {
-        self.0.iter().map(Point::area).sum()
+        self.0.iter().map(|point| point.at_all_times().area()).sum()
     }
 
     /// The points at nodes that can move along the normal; other points may have nodes that this rank does not own.
-    fn free_points(self) -> impl Iterator<Item = &'a Point<D>> {
-        self.0.iter().filter(|point| point.free_length > 0.0)
+    fn free_points(self) -> impl Iterator<Item = Cow<'a, Point<D>>> {
+        self.0.iter().filter(|point| point.free_length > 0.0).map(Point::at_all_times)
     }
 
     /// Adds the free parts of the normals at nodal points to nodal values.

@@ -29,6 +29,7 @@ pub fn contact_nodes<const D: usize>(
     for contact in contacts {
         for point in &contact.normal.points {
             let active = match point.unknown {
+                Unknown::Parameter if point.edge.is_some() => None,
                 Unknown::Parameter => Some(point.direction),
                 Unknown::Velocity => None,
                 Unknown::Held | Unknown::Stop => Some([0.0; D]),

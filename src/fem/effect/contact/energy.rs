@@ -63,12 +63,13 @@ impl<const D: usize> Contact<D> {
             };
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let energies = law.energy(after).zip(law.energy(point.penetration_before));
-            let (stored, lost) = match energies {
-                Some(energies) => {
-                    (energies.0 - energies.1, lost_at_wall(law, pressure, [point.penetration_before, after]))
-                }
-                None => (0.0, times(pressure, after - before)),
+            let lost = match energies {
+                Some(_) => lost_at_wall(law, pressure, [point.penetration_before, after]),
+                None => times(pressure, after - before),
             };
+            let stored = energies.map_or(0.0, |energies| {
+                point.weight * (energies.0 - energies.1) + (point.weight - point.weight_before) * energies.1
+            });
             // The growth of the wear that this step has seen, which is no longer stored.
             let worn = if self.wear.is_some() {
                 (change + point.blend_offset) - point.growth - (after - before)
@@ -81,7 +82,7 @@ impl<const D: usize> Contact<D> {
             sum.work += length * of_supports - point.weight * given;
             let damped = damping_power(law, point, [after, (after - before) / length], is_of_two_steps);
             sum.dissipated_power += point.weight * damped;
-            sum.numerical += point.weight * (stored + dissipated + given + length * (damped - pressure * v));
+            sum.numerical += stored + point.weight * (dissipated + given + length * (damped - pressure * v));
         }
         if let Some(friction) = &self.friction {
             sum.dissipated_power += friction.power(velocity);
@@ -96,7 +97,8 @@ impl<const D: usize> Contact<D> {
             return Ok(0.0);
         }
         let energy = |point: &Point<D>| {
-            let [along, gap] = self.obstacle.position_at(time, displacement, point)?;
+            let point = point.facing(&self.obstacle.gap, time);
+            let [along, gap] = self.obstacle.position_at(time, displacement, &point)?;
             let stored = self.normal.law.energy(along - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };

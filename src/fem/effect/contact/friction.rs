@@ -84,7 +84,7 @@ impl<const D: usize> Friction<D> {
                     "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, on which this friction law depends; free the normal component there, or use tresca"
                 )));
             }
-            let (tangents, count, all) = tangents_of(point, held);
+            let (tangents, count, all) = tangents_of(point, held.frame(node));
             let (held_normal, size) = held_part_of_normal(point);
             if obstacle_moves && count > 0 && size > 0.0 {
                 let tangent: Vector<D> =

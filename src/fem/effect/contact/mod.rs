@@ -34,6 +34,7 @@ mod corners;
 mod count;
 mod directions;
 mod driven;
+mod edge;
 mod energy;
 mod friction;
 mod inclusion;

@@ -2,15 +2,17 @@
 //!
 //! A point reads the values of its nodes from two kinds of vectors, [`Vectors`]. It stores the numbers of its nodes in both.
 
+use super::edge::Edge;
 use crate::{
     fem::{
         pairs::PairedNode,
         space::{Held, SurfacePoint, facet_points},
     },
-    laws::contact::{NodeContext, NormalResponse, Resolved},
+    laws::contact::{Gap, NodeContext, NormalResponse, Resolved},
     linear_algebra::tensor::{Vector, norm},
     mesh::Mesh,
 };
+use std::{borrow::Cow, rc::Rc};
 
 /// Share of the terms of a sum below which it consists of rounding errors.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
@@ -62,8 +64,9 @@ pub(super) struct Point<const D: usize> {
     /// Weight of each node in the mean.
     shares: [f64; D],
     pub normal: Vector<D>,
-    /// Quadrature weight in m^(D-1).
+    /// Quadrature weight in m^(D-1), and that at the start of the step.
     pub weight: f64,
+    pub weight_before: f64,
     /// Force on each node per pressure, without prescribed components, in m^(D-1).
     force: [Vector<D>; D],
     /// The nodes on the edges of a quadratic facet.
@@ -90,6 +93,8 @@ pub(super) struct Point<const D: usize> {
     pub sharpness: f64,
     /// Whether its normal follows what it faces: no other contact acts at the node.
     pub turns: bool,
+    /// On an edge of the body: the directions along which it may touch an obstacle that moves; no other contact acts at the node.
+    pub edge: Option<Rc<Edge<D>>>,
     /// Displacement in m relative to the body that it faces when it began to face it.
     pub faced_at: Vector<D>,
     /// The gap in m at the end of the step of the undeformed surface without wear.
@@ -134,6 +139,7 @@ impl<const D: usize> Point<D> {
             shares: [0.0; D],
             normal,
             weight,
+            weight_before: weight,
             force: [[0.0; D]; D],
             others: Box::default(),
             direction: [0.0; D],
@@ -148,6 +154,7 @@ impl<const D: usize> Point<D> {
             sharpness: 0.0,
             faced_at: [0.0; D],
             turns: false,
+            edge: None,
             reach: 0.0,
             moved: 0.0,
             follows: 0.0,
@@ -180,6 +187,7 @@ impl<const D: usize> Point<D> {
     /// Multiplies its weight.
     pub(super) fn scale_weight(&mut self, factor: f64) {
         self.weight *= factor;
+        self.edge.iter_mut().for_each(|edge| Rc::make_mut(edge).scale(factor));
         self.force.as_flattened_mut().iter_mut().for_each(|force| *force *= factor);
     }
 
@@ -202,6 +210,38 @@ impl<const D: usize> Point<D> {
             (self.dual, self.wall) = (turned.dual, turned.wall);
             (self.free_length, self.force) = (turned.free_length, turned.force);
         }
+    }
+
+    /// Turns a point on an edge to the direction in which it sees the obstacle at `time`.
+    pub(super) fn face_obstacle(&mut self, gap: &Gap, time: f64) {
+        if let Some(direction) = self.edge.as_ref().map(|edge| edge.toward(gap, &self.place, time)) {
+            self.turn_freely(direction);
+        }
+    }
+
+    /// The point as it is at `time`.
+    pub(super) fn facing(&self, gap: &Gap, time: f64) -> Cow<'_, Self> {
+        self.or_turned(|edge| edge.toward(gap, &self.place, time))
+    }
+
+    /// The point for reference values, which do not depend on when they are computed: on an edge along the direction between its faces.
+    pub(super) fn at_all_times(&self) -> Cow<'_, Self> {
+        self.or_turned(Edge::whole)
+    }
+
+    fn or_turned(&self, direction: impl Fn(&Edge<D>) -> (Vector<D>, f64)) -> Cow<'_, Self> {
+        let mut point = Cow::Borrowed(self);
+        if let Some(edge) = &self.edge {
+            point.to_mut().turn_freely(direction(edge));
+        }
+        point
+    }
+
+    /// Gives a point that no other contact shares another normal, which supports leave free, and weight.
+    fn turn_freely(&mut self, (normal, weight): (Vector<D>, f64)) {
+        (self.normal, self.direction, self.dual, self.wall) = (normal, normal, normal, normal);
+        self.free_length = 1.0;
+        self.set_weight(weight);
     }
 
     /// A point at a node, whose unknown is the parameter of the law.

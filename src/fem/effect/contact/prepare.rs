@@ -23,17 +23,23 @@ impl<const D: usize> Contact<D> {
         let (time, time_before) = (step.time, step.start());
         let step_length = blend.way();
         for at in 0..self.normal.points.len() {
+            self.normal.points[at].face_obstacle(&self.obstacle.gap, time_before);
             let point = &self.normal.points[at];
-            let [after, before] =
-                [self.obstacle.seen_after(&point.place), self.obstacle.seen_before(&point.place)];
-            let along = point.normal_component(Body, converged);
             let [worn, worn_before] = point.worn;
+            let along_before = point.normal_component(Body, converged);
+            let before = self.obstacle.seen_before(&point.place);
+            let before = self.obstacle.gap_of(point, time_before, &before, along_before - worn)?;
+            let weight_before = point.weight;
+            self.normal.points[at].face_obstacle(&self.obstacle.gap, time);
+            let point = &self.normal.points[at];
+            let along = point.normal_component(Body, converged);
+            let after = self.obstacle.seen_after(&point.place);
             let gap = self.obstacle.gap_of(point, time, &after, along - worn)?;
-            let before = self.obstacle.gap_of(point, time_before, &before, along - worn)?;
             let point = &mut self.normal.points[at];
             point.reach = gap;
             point.moved = along - worn;
-            point.penetration_before = along - before - worn;
+            point.penetration_before = along_before - before - worn;
+            point.weight_before = weight_before;
             [point.blend_offset, point.continued_wear] = if blend.earlier == 0.0 {
                 [0.0; 2]
             } else {
@@ -48,8 +54,11 @@ impl<const D: usize> Contact<D> {
                 depth_before: 0.0,
             };
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
-            point.growth = if before.is_finite() { gap - before } else { gap - along };
+            // By a normal that turns, the point that has moved is nearer to the obstacle or farther from it.
+            let turned = along - along_before;
+            point.growth = if before.is_finite() { gap - before - turned } else { gap - along };
         }
+        self.turn_tangents_of_edges();
         for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
             point.context.is_bare = !self.normal.points[point.at].can_touch();
         }

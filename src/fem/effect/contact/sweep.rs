@@ -270,7 +270,8 @@ impl<const D: usize> Contact<D> {
     pub fn gaps(&self, time: f64, displacement: &[f64]) -> Gaps {
         let mut gaps = Gaps { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, without: 0 };
         for point in &self.normal.points {
-            let Ok([along, gap]) = self.obstacle.position_at(time, displacement, point) else { continue };
+            let point = point.facing(&self.obstacle.gap, time);
+            let Ok([along, gap]) = self.obstacle.position_at(time, displacement, &point) else { continue };
             if gap == f64::INFINITY {
                 gaps.without += 1;
             } else {

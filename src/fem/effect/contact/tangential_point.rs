@@ -96,7 +96,7 @@ impl<const D: usize> TangentialPoint<D> {
         let is_turned =
             self.tangents[..self.count].iter().any(|tangent| dot(tangent, &point.direction).abs() > ROUNDING);
         if is_turned {
-            (self.tangents, self.count, self.all) = tangents_of(point, held);
+            (self.tangents, self.count, self.all) = tangents_of(point, held.frame(point.node()));
         }
     }
 
@@ -232,12 +232,12 @@ impl<const D: usize> TangentialPoint<D> {
     }
 }
 
-/// The tangents of a point: those that are free, and then those that supports hold, with the numbers of the former and of all.
+/// The tangents of a point: those that are free, and then those that supports hold, with the numbers of the former and of all, from an
+/// orthonormal basis at its node of which so many directions are free; these come first.
 pub(super) fn tangents_of<const D: usize>(
     point: &Point<D>,
-    held: &Held<D>,
+    (frame, free): ([Vector<D>; D], usize),
 ) -> ([Vector<D>; D], usize, usize) {
-    let (frame, free) = held.frame(point.node());
     let (mut tangents, count) = span_without(&frame[..free], &[point.direction]);
     let (held_tangents, held_count) = span_without(&frame[free..], &[held_part_of_normal(point).0]);
     let all = count + held_count;

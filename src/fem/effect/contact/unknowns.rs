@@ -56,6 +56,9 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
     for &(number, at) in around.values().filter(|places| places.len() == 1).flatten() {
         contacts[number].normal.points[at].turns = contacts[number].is_paired;
     }
+    for &(number, at) in around.values().filter(|places| places.len() > 1).flatten() {
+        contacts[number].normal.points[at].edge = None;
+    }
     keep_tangents_free_of_normals(contacts, &around);
     let with_friction = give_edges_to_one_friction(contacts);
     for (node, places) in around.into_iter().filter(|(_, places)| places.len() > 1) {

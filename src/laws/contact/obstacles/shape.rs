@@ -114,8 +114,29 @@ impl Obstacle for Shape {
         vec![fault]
     }
 
+    /// A ray along an edge of the obstacle meets it.
     fn ray<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
-        self.along(&add_scaled(place, -1.0, &vector(&self.centre, time)), normal)
+        let centre = vector(&self.centre, time);
+        let offset = &add_scaled(place, -1.0, &centre);
+        let largest = |start: f64, of: &Vector<D>| of.iter().fold(start, |most, x| larger(most, x.abs()));
+        let near = largest(self.extent(), offset);
+        // Where body and obstacle nearly meet at the centre, rounding is that of the coordinates from which the place is computed.
+        let size = largest(largest(near, place), &centre);
+        let slack = larger(self.slack([near, size]), self.rounding(offset));
+        let Search { length, nearest } = self.search(offset, normal, [size, 0.0]);
+        if length.is_nan() || nearest > slack {
+            return length;
+        }
+        let touches = self.distance_at(offset).abs() <= slack;
+        let slope = if touches { self.slope(offset, normal, slack) } else { 0.0 };
+        // The ray meets a surface across it, or leads away from one.
+        if slope > PARALLEL || length.is_finite() && (!touches || slope < -PARALLEL) {
+            return length;
+        }
+        let Search { length: found, .. } = self.search(offset, normal, [size, slack]);
+        // A wall beside the body is not in front of it.
+        let deepest = larger(DEEPEST * near, 2.0 * slack);
+        if touches && found < -deepest { f64::INFINITY } else { found + slack }
     }
 
     fn depth<const D: usize>(&self, time: f64, place: &Vector<D>) -> f64 {
@@ -160,30 +181,17 @@ impl Shape {
         Some(self.surface.as_ref()?.triangles.as_ref()?.digest())
     }
 
-    /// The distance from the surface in m by which a ray may miss it, for a body of this size in m.
-    fn slack(&self, size: f64) -> f64 {
-        SLACK[usize::from(self.surface.is_some())] * size
+    /// The distance from the surface in m by which a ray may miss it, for places of this size in m relative to the centre and for any.
+    fn slack(&self, [near, size]: [f64; 2]) -> f64 {
+        larger(SLACK[usize::from(self.surface.is_some())] * near, SLACK[0] * size)
     }
 
-    /// The length in m of the ray from a place relative to the centre, along the unit normal, to the surface; negative from inside.
-    /// Infinite if the ray does not meet the obstacle, NaN if the expression is no number or no distance there. A ray along an edge
-    /// of the obstacle meets it.
-    fn along<const D: usize>(&self, offset: &Vector<D>, normal: &Vector<D>) -> f64 {
-        let size = offset.iter().fold(self.extent(), |most, x| larger(most, x.abs()));
-        let slack = self.slack(size);
-        let Search { length, nearest } = self.search(offset, normal, [size, 0.0]);
-        if length.is_nan() || nearest > slack {
-            return length;
-        }
-        let touches = self.distance_at(offset).abs() <= slack;
-        let slope = if touches { self.slope(offset, normal, slack) } else { 0.0 };
-        // The ray meets a surface across it, or leads away from one.
-        if slope > PARALLEL || length.is_finite() && (!touches || slope < -PARALLEL) {
-            return length;
-        }
-        let Search { length: found, .. } = self.search(offset, normal, [size, slack]);
-        // A wall beside the body is not in front of it.
-        if touches && found < -DEEPEST * size { f64::INFINITY } else { found + slack }
+    /// By how much two evaluations of the expression at a place may differ from each other through rounding, in m.
+    fn rounding<const D: usize>(&self, offset: &Vector<D>) -> f64 {
+        let values = self.distance.as_ref().map(|distance| distance.enclose(0.0, offset));
+        let width = values.map_or(0.0, |values| values.high - values.low);
+        // Infinite where it is not known to be defined.
+        if width.is_finite() { width } else { 0.0 }
     }
 
     /// The cosine between a ray from a place at the surface and the normal of the surface.
@@ -211,13 +219,17 @@ impl Shape {
         }
         // From inside, the search goes the other way, through distances of the other sign.
         let side = first.signum();
-        let at = |length: f64| side * (self.distance_at(&add_scaled(offset, side * length, normal)) - slack);
+        let place = |length: f64| add_scaled(offset, side * length, normal);
+        let at = |length: f64| side * (self.distance_at(&place(length)) - slack);
         let (mut here, mut value, mut step) = (0.0, first.abs(), first.abs());
         for _ in 0..MOST_STEPS {
             let next = here + step;
             let there = at(next);
             let most = step * (1.0 + ROUNDING[0]) + ROUNDING[1] * (size + next);
-            let is_distance = (there - value).abs() <= most;
+            let change = (there - value).abs();
+            // What rounds more than coordinates, as hypot(x, y + 1000) - 1000, is found where it matters.
+            let is_distance =
+                change <= most || change <= most + self.rounding(&place(here)) + self.rounding(&place(next));
             if !is_distance {
                 return Search { length: f64::NAN, nearest };
             }
@@ -271,7 +283,7 @@ impl Shape {
 /// What a search has found.
 #[derive(Debug, Clone, Copy)]
 struct Search {
-    /// Length of the ray in m, as that of [`Shape::along`].
+    /// Length of the ray in m, as that of [`Obstacle::ray`].
     length: f64,
     /// The smallest distance in m from the surface at the places of the search before its end.
     nearest: f64,
@@ -321,13 +333,13 @@ mod tests {
     #[test]
     fn rays_meet_the_surface_they_reach_first() {
         let two = shape("min(y + 2, sqrt((x - 1)^2 + (y + 1)^2) - 0.5)");
-        let reach = |x: f64, y: f64| two.along(&[x, y], &DOWN);
+        let reach = |x: f64, y: f64| two.ray(0.0, &[x, y], &DOWN);
         assert!((reach(0.0, 1.0) - 3.0).abs() < 1e-15, "{}", reach(0.0, 1.0));
         assert!((reach(1.0, 1.0) - 1.5).abs() < 1e-15, "{}", reach(1.0, 1.0));
         // Past the disc, at a hundredth of its radius.
         assert!((reach(0.495, 1.0) - 3.0).abs() < 1e-14, "{}", reach(0.495, 1.0));
-        assert_eq!(two.along(&[0.0, 1.0], &[0.0, 1.0]), f64::INFINITY);
-        assert_eq!(two.along(&[-3.0, 1.0], &[-1.0, 0.0]), f64::INFINITY, "parallel");
+        assert_eq!(two.ray(0.0, &[0.0, 1.0], &[0.0, 1.0]), f64::INFINITY);
+        assert_eq!(two.ray(0.0, &[-3.0, 1.0], &[-1.0, 0.0]), f64::INFINITY, "parallel");
         assert!((reach(0.0, -2.25) + 0.25).abs() < 1e-15, "inside");
         assert_eq!(reach(0.0, -2.0), 0.0, "touching");
     }
@@ -337,9 +349,9 @@ mod tests {
         let floor = shape("y");
         for degrees in [0.0f64, 30.0, 60.0, 85.0, 89.0] {
             let (sine, cosine) = degrees.to_radians().sin_cos();
-            let found = floor.along(&[3.0, 0.25], &[sine, -cosine]);
+            let found = floor.ray(0.0, &[3.0, 0.25], &[sine, -cosine]);
             assert!((found * cosine / 0.25 - 1.0).abs() < 1e-13, "{degrees}: {found}");
-            let inside = floor.along(&[3.0, -0.25], &[sine, -cosine]);
+            let inside = floor.ray(0.0, &[3.0, -0.25], &[sine, -cosine]);
             assert!((inside * cosine / 0.25 + 1.0).abs() < 1e-13, "{degrees}: {inside}");
         }
     }
@@ -367,7 +379,7 @@ mod tests {
                         let toward = [slant * top[2], 0.0, 0.0];
                         let normal: Vector<3> = std::array::from_fn(|i| toward[i] - top[i]);
                         let length = crate::linear_algebra::tensor::norm(&normal);
-                        let found = shape.along(&place, &normal.map(|x| x / length));
+                        let found = shape.ray(0.0, &place, &normal.map(|x| x / length));
                         let wanted = height * length;
                         assert!((found - wanted).abs() <= 1e-11, "{found} for {wanted} at {place:?}");
                     }
@@ -402,28 +414,71 @@ mod tests {
                 [[0.15, 0.15], [-0.15, 0.15], [0.15, 0.02], [0.0, -0.15], [0.07, 0.0], [0.15 - 1e-10, 0.0]]
             {
                 for height in [0.2, 1e-3, 0.0, -1e-8, -1e-4, -0.01] {
-                    let found = punch.along(&[x, y, -0.5 - height], &up);
+                    let found = punch.ray(0.0, &[x, y, -0.5 - height], &up);
                     assert!((found - height).abs() <= 3e-7, "{found} for {height} at {x}, {y}: {punch:?}");
                 }
             }
             for x in [0.1501, 0.151, 0.2] {
-                assert_eq!(punch.along(&[x, 0.0, -0.6], &up), f64::INFINITY, "beside it: {punch:?}");
-                assert_eq!(punch.along(&[x, 0.0, -0.4], &up), f64::INFINITY, "beside it: {punch:?}");
+                assert_eq!(punch.ray(0.0, &[x, 0.0, -0.6], &up), f64::INFINITY, "beside it: {punch:?}");
+                assert_eq!(punch.ray(0.0, &[x, 0.0, -0.4], &up), f64::INFINITY, "beside it: {punch:?}");
             }
-            let beside = punch.along(&[0.15, 0.0, 0.2], &up);
+            let beside = punch.ray(0.0, &[0.15, 0.0, 0.2], &up);
             assert_eq!(beside, f64::INFINITY, "a wall: {punch:?}");
-            assert!((punch.along(&[0.15 - 1e-6, 0.0, -0.3], &up) + 0.2).abs() < 3e-8, "deep inside");
+            assert!((punch.ray(0.0, &[0.15 - 1e-6, 0.0, -0.3], &up) + 0.2).abs() < 3e-8, "deep inside");
         }
-        assert_eq!(shape("x").along(&[0.0, 1.0], &DOWN), f64::INFINITY, "an endless wall");
+        assert_eq!(shape("x").ray(0.0, &[0.0, 1.0], &DOWN), f64::INFINITY, "an endless wall");
     }
 
     #[test]
     fn what_is_no_distance_has_no_gap() {
-        assert!(shape("x^2 + (y + 3)^2 - 1").along(&[0.0, 0.0], &DOWN).is_nan(), "a square");
-        assert!(shape("10*y").along(&[0.0, 1.0], &DOWN).is_nan());
-        assert!(shape("sqrt(x - 1)").along(&[0.0, 1.0], &DOWN).is_nan());
-        assert!(shape("-1/(0*x)").along(&[0.0, 1.0], &DOWN).is_nan());
-        assert!((shape("0.1*y").along(&[0.0, 1.0], &DOWN) - 1.0).abs() < 1e-14, "less than the distance");
+        assert!(shape("x^2 + (y + 3)^2 - 1").ray(0.0, &[0.0, 0.0], &DOWN).is_nan(), "a square");
+        assert!(shape("10*y").ray(0.0, &[0.0, 1.0], &DOWN).is_nan());
+        assert!(shape("sqrt(x - 1)").ray(0.0, &[0.0, 1.0], &DOWN).is_nan());
+        assert!(shape("-1/(0*x)").ray(0.0, &[0.0, 1.0], &DOWN).is_nan());
+        assert!((shape("0.1*y").ray(0.0, &[0.0, 1.0], &DOWN) - 1.0).abs() < 1e-14, "less than the distance");
+    }
+
+    #[test]
+    fn exact_distances_that_round_have_gaps_until_the_obstacle_touches_and_beyond() {
+        let corner = "sqrt(max(abs(x) - 0.1, 0)^2 + max(abs(y - 0.3) - 0.2, 0)^2)";
+        let inside = "min(max(abs(x) - 0.1, abs(y - 0.3) - 0.2), 0)";
+        let space = "hypot(hypot(max(abs(x) - 0.1, 0), max(abs(y - 0.3) - 0.2, 0)), max(abs(z) - 0.7, 0))";
+        let beside = "hypot(x - 0.3, y - 0.3) - 0.3";
+        // All of them with their lowest place at y = 0, from below.
+        let distances = [
+            "-(y - 0.3) - 0.2 - 0.1".to_owned(),
+            "abs(y - 0.3) - 0.2 - 0.1".into(),
+            format!("{corner} + {inside} - 0.1"),
+            format!("{space} + min(max({}, abs(z) - 0.7), 0) - 0.1", "abs(x) - 0.1, abs(y - 0.3) - 0.2"),
+            "hypot(x - min(max(x, -0.2), 0.2), y - 0.3) - 0.3".into(),
+            "hypot(x, y - 1000) - 1000".into(),
+            "hypot(x, y - 1e6) - 1e6".into(),
+            "sqrt(x^2 + z^2 + (y - 0.1)^2) - 0.1".into(),
+            format!("min({corner} + {inside} - 0.1, {beside})"),
+            format!("-ln(exp(-32*({corner} + {inside} - 0.1)) + exp(-32*({beside} + 9)))/32 + 0*z"),
+            "-max(y, -1) - 0.25*max(0.1 - abs(y + 1), 0)^2/0.1".into(),
+        ];
+        for text in &distances {
+            let [body, twice] = [text.clone(), format!("2*({text})")].map(|text| shape(&text));
+            for height in (-60..=60).map(|number| f64::from(number) * 0.000_715_34 / 60.0) {
+                for share in [1.0, 1e-3, 1e-7, 1e-11, 1e-15] {
+                    for centre in [0.0, 0.500_715_34] {
+                        let at = centre + share * height;
+                        let low = at - share * height;
+                        let centre = vec![Scalar::Number(0.5), Scalar::Number(at)];
+                        let gap = |shape: &Shape, y: f64| {
+                            let moved = Shape { centre: centre.clone(), ..shape.clone() };
+                            moved.ray(0.0, &[0.5, y, 0.0], &[0.0, 1.0, 0.0])
+                        };
+                        let (wanted, found) = (at - low, gap(&body, low));
+                        let rounding = 4.0 * body.rounding(&[0.0, low - at, 0.0]) + 1e-12;
+                        assert!((found - wanted).abs() <= rounding, "{found:e} for {wanted:e}: {text}");
+                        let found = gap(&twice, low - 0.01);
+                        assert!(found.is_nan(), "{found:e}: twice {text}");
+                    }
+                }
+            }
+        }
     }
 
     proptest! {
@@ -439,7 +494,7 @@ mod tests {
                 "max(sqrt(max(abs(x) - 1, 0)^2 + max(abs(y) - 0.5, 0)^2 + max(abs(z) - 0.7, 0)^2) - 0.2, 0.6*x + 0.8*y - 0.3)",
             );
             let first = body.distance_at(&place);
-            let reach = body.along(&place, &normal);
+            let reach = body.ray(0.0, &place, &normal);
             prop_assert!(!reach.is_nan());
             let at = |t: f64| body.distance_at(&add_scaled(&place, t, &normal));
             if reach.is_finite() {
