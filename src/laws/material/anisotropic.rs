@@ -32,6 +32,13 @@ fn in_space<const S: usize>(c: usize) -> usize {
     }
 }
 
+/// The component of a tensor that the product of two axes has, and its value.
+const PLACES: [[(usize, f64); 3]; 3] = [
+    [(0, 1.0), (5, FRAC_1_SQRT_2), (4, FRAC_1_SQRT_2)],
+    [(5, FRAC_1_SQRT_2), (1, 1.0), (3, FRAC_1_SQRT_2)],
+    [(4, FRAC_1_SQRT_2), (3, FRAC_1_SQRT_2), (2, 1.0)],
+];
+
 /// A symmetric tensor as a matrix.
 fn as_matrix(mandel: &Mandel<6>) -> [Vector<3>; 3] {
     let mut out = [[0.0; 3]; 3];
@@ -128,25 +135,27 @@ impl LinearTensor for Anisotropic {
         [g, h]: [&(Vector<D>, f64); 2],
         block: &mut [[f64; D]; D],
     ) {
-        for j in 0..D {
-            let strain = product(j, h);
-            let stress = self.matrix.map(|row| dot(&row, &strain));
-            (0..D).for_each(|i| block[i][j] += factor * volume * dot(&product(i, g), &stress));
+        // Few components of `sym(a_j h^T)` are not zero.
+        for (j, places) in PLACES.iter().enumerate().take(D) {
+            let mut stress = [0.0; 6];
+            let mut add = |component: usize, strain: f64| {
+                stress.iter_mut().zip(&self.matrix).for_each(|(sum, row)| *sum += strain * row[component]);
+            };
+            for (&(component, weight), slope) in places.iter().zip(&h.0) {
+                add(component, weight * slope);
+            }
+            if j == 0 && h.1 != 0.0 {
+                add(ACROSS, h.1);
+            }
+            for (i, places) in PLACES.iter().enumerate().take(D) {
+                let mut product = if i == 0 { g.1 * stress[ACROSS] } else { 0.0 };
+                for (&(component, weight), slope) in places.iter().zip(&g.0) {
+                    product += weight * slope * stress[component];
+                }
+                block[i][j] += factor * volume * product;
+            }
         }
     }
-}
-
-/// `sym(a_i g^T)`, with the hoop strain of the first axis.
-#[inline]
-fn product<const D: usize>(i: usize, (g, hoop): &(Vector<D>, f64)) -> Mandel<6> {
-    let mut strain = AXES.map(|[a, b]| {
-        let part = |own: usize, other: usize| if own == i && other < D { g[other] } else { 0.0 };
-        if a == b { part(a, a) } else { FRAC_1_SQRT_2 * (part(a, b) + part(b, a)) }
-    });
-    if i == 0 {
-        strain[ACROSS] += hoop;
-    }
-    strain
 }
 
 #[cfg(test)]
