@@ -38,6 +38,9 @@ use std::cell::RefCell;
 const SLOW: f64 = 0.2;
 /// The same with derivatives of the flow in the factor, in 2D and 3D: new ones cost as much as a few corrections, and as more of them in 3D.
 const SLOW_WITH_TANGENTS: [f64; 2] = [0.1, 0.3];
+/// They are not slow if no more than this many corrections are left at the rate of the last one: what the assembly and the factor with new
+/// derivatives cost, and the two corrections with them.
+const CHEAPER_THAN_TANGENTS: [f64; 2] = [8.0, 12.0];
 /// Fallbacks of Newton's method for the contact in a correction: where a plastic body hardly resists, others are in vain.
 const MOST_FALLBACKS: usize = 4;
 /// A correction is shortened until this share of the power along it is left, at most so often, each time by at least this share of the range.
@@ -124,6 +127,7 @@ impl FlowCorrections {
         let system = System { matrix: other.unwrap_or(of_step), ..system };
         let has_tangents = other.is_some();
         let share = if has_tangents { SLOW_WITH_TANGENTS[usize::from(D == 3)] } else { SLOW };
+        let most_left = CHEAPER_THAN_TANGENTS[usize::from(D == 3)];
         self.earlier.restart();
         self.start.copy_from(trial)?;
         self.evaluate(problem, of_step, other, trial)?;
@@ -157,7 +161,8 @@ impl FlowCorrections {
             self.evaluate(problem, of_step, other, trial)?;
             let left = self.residual()?;
             let last = std::mem::replace(&mut self.left, left);
-            let (is_better, is_slow) = (left <= last, left.is_nan() || left > share * last);
+            let is_cheaper = has_tangents && corrections_left([last, left], system.tolerance) <= most_left;
+            let (is_better, is_slow) = (left <= last, left.is_nan() || left > share * last && !is_cheaper);
             // Rounding errors do not fall from one correction to the next.
             if left <= (1.0 - CONTACT_SHARE) * system.tolerance
                 || is_slow && system.floor.is_reached(left, trial.norm()?)
@@ -324,6 +329,12 @@ impl FlowCorrections {
         trial.copy_from(&self.start)?;
         restore_pressures(problem.body, problem.state)
     }
+}
+
+/// The corrections to this residual norm after one that has changed the norm so, if all change it as much.
+fn corrections_left([last, left]: [f64; 2], tolerance: f64) -> f64 {
+    let digits = (last / left).ln();
+    if digits > 0.0 { (left / tolerance).ln() / digits } else { f64::INFINITY }
 }
 
 impl WholeBody {
