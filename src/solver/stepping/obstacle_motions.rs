@@ -498,8 +498,8 @@ const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 const NO_BALANCE: &str = "no motion of the obstacles balances their forces and moments";
 const NO_CONTACT: &str = "no motion of the obstacles balances their forces and moments: an obstacle without mass touches nothing that holds \
-     it; let the forces press the obstacles against the body, or give them a mass; an obstacle that a moment turns may need a \
-     moment_of_inertia";
+     it, or the body yields to its force; let the forces press the obstacles against the body, move the obstacles by their keys in place \
+     of a force, or give them a mass and take a smaller [time] step; an obstacle that a moment turns may need a moment_of_inertia";
 
 /// The change of the velocity of a motion that nothing holds with which it touches a point in the step and its unbalanced force in N presses
 /// it on; `None` if the force does not move it so far. Velocities are those of Newton's method. Collective.
