@@ -207,3 +207,13 @@ fn bodies_without_mass_stick_after_a_jump_or_kink_of_their_loads_under_a_two_ste
         assert!((found / one - 1.0).abs() < 2e-3, "{pressure}: {found} m in adaptive steps, not {one} m");
     }
 }
+
+/// The strip tears off in the first step, in which its bonds lose all strength at once.
+#[test]
+fn a_body_without_mass_whose_scheme_generates_energy_is_told_of_its_steps_and_not_of_vibrations() {
+    let case = Case::of("peeled_strip").set("time.step", "0.05").set("time.scheme", "'bdf2'");
+    case.run_with(1, &[]).expect(0);
+    let warnings = case.results().summary()["warnings"].to_string();
+    assert!(warnings.contains("change much within a step: use a smaller [time] step"), "{warnings}");
+    assert!(!warnings.contains("vibrations") && !warnings.contains("midpoint"), "{warnings}");
+}

@@ -346,9 +346,14 @@ impl Summary {
         // Explicit stresses have a limit of their own.
         let is_implicit = self.certificates.explicit_step_bound.is_none();
         let generated = (is_implicit && self.energy_of_scheme > LARGEST_GENERATION && self.unresolved_steps == 0).then(|| {
+            let cause = if self.effects.contains(&"inertia") {
+                "vibrations and impacts without damping can cause: implicit_euler and [material.damping] stiffness damp them, and midpoint \
+                 conserves energy"
+            } else {
+                "laws can cause that change much within a step: use a smaller [time] step"
+            };
             format!(
-                "the time scheme {} has generated {:.1} % of the energy that was supplied, which vibrations and impacts without damping \
-                 can cause: implicit_euler and [material.damping] stiffness damp them, and midpoint conserves energy",
+                "the time scheme {} has generated {:.1} % of the energy that was supplied, which {cause}",
                 self.scheme,
                 100.0 * self.energy_of_scheme
             )
