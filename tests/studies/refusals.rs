@@ -14,6 +14,26 @@ fn refused(study: &str) -> String {
 }
 
 #[test]
+fn a_probe_is_compared_in_what_the_base_job_writes_and_the_reference_gives() {
+    let job = SQUARE.replace("probe = ", "probe_also = [\"stress\", \"von_mises\"]\nprobe = ");
+    let load = |value: &str, reference: &str| {
+        let probe = format!("[[probe]]\nname = \"middle\"\nvalue = \"{value}\"\nover = \"end\"\n");
+        let scene = Scene::new(&job, &format!("[[run]]\n{probe}{reference}"));
+        Plan::load(&scene.path("study.toml"), &[], false).map(|_| ()).map_err(|error| error.to_string())
+    };
+    for value in ["displacement_x", "stress_xy"] {
+        [SOLUTION, "[reference.run]\n"]
+            .iter()
+            .for_each(|reference| assert_eq!(load(value, reference), Ok(())));
+    }
+    assert_eq!(load("von_mises", "[reference.run]\n"), Ok(()));
+    let fault = load("von_mises", SOLUTION).expect_err("no such expression");
+    assert!(fault.contains("[reference.exact] gives no von_mises"), "{fault}");
+    let fault = load("strain_xx", "[reference.run]\n").expect_err("not written");
+    assert!(fault.contains("add \"strain\" to `probe_also`"), "{fault}");
+}
+
+#[test]
 fn all_faults_of_a_study_come_at_once_with_line_and_nearest_name() {
     let text = refused(
         "[[run]]\ncels = [4, 4]\nstep = -1\n[refrence.run]\n[[norm]]\nof = \"velocty\"\nin = \"H\"\nover = \"max\"\n",
@@ -65,7 +85,13 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
             format!(
                 "{run}[reference.run]\n[[probe]]\nname = \"middle\"\nvalue = \"velocity_z\"\nover = \"end\"\n"
             ),
-            "probes.csv has no column `velocity_z`",
+            "there is no quantity `velocity_z`",
+        ),
+        (
+            format!(
+                "{run}[reference.run]\n[[probe]]\nname = \"middle\"\nvalue = \"stress_yy\"\nover = \"end\"\n"
+            ),
+            "or add \"stress\" to `probe_also` in its table [output]",
         ),
         (
             "[sweep]\n\"time.step\" = { from = 1, to = 1, draws = 2 }\n".into(),

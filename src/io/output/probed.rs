@@ -1,6 +1,7 @@
 //! Further quantities of probes: fields and histories at their points.
 
 use super::{
+    columns::PROBES,
     contact_points::{fill_corners, fill_faced},
     field::{Place, Shape, plain_components},
     field_list::{FIELDS, Position, computations},
@@ -63,6 +64,17 @@ enum Source {
 pub(super) fn groups(wanted: &[ProbedQuantity]) -> Vec<bool> {
     let of_quantities = QUANTITIES.iter().map(|(quantity, _)| wanted.contains(quantity));
     std::iter::once(true).chain(of_quantities).collect()
+}
+
+/// The quantity that has this column of `probes.csv`, as a job names it.
+pub(super) fn quantity_of(column: &str, dimension: usize) -> Option<String> {
+    let has_column = |quantity: ProbedQuantity| {
+        let with = groups(&[quantity]).into_iter().skip(1);
+        let with: Vec<bool> = std::iter::once(false).chain(with).collect();
+        PROBES.columns_of_groups(dimension, &with).iter().any(|name| name == column)
+    };
+    let quantity = QUANTITIES.iter().map(|(quantity, _)| *quantity).find(|quantity| has_column(*quantity))?;
+    serde_json::to_string(&quantity).ok()
 }
 
 /// What these quantities are made of.
@@ -264,7 +276,6 @@ fn add_value<const D: usize, const S: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::output::columns::PROBES;
 
     #[test]
     fn each_quantity_has_its_columns() {

@@ -1,7 +1,7 @@
 //! Names of quantities of a run, as in `[check]` of a job and in responses of a study.
 
 use super::{
-    columns::{RunTable, TABLES},
+    columns::{PROBES, RunTable, TABLES},
     resultants::source_names,
     summary::{MEMBERS, MemberKind},
 };
@@ -73,19 +73,29 @@ impl RunOf<'_> {
             return vec![no_quantity(name)];
         }
         let of = quantity.of.and_then(|of| self.fault_of_place(quantity.table.word, of));
-        let with = self.groups(quantity.table.word);
-        let all: Vec<String> = quantity.table.columns(self.dimension).map(|(name, _)| name).collect();
-        let there: Vec<String> = quantity.table.columns_of_groups(self.dimension, &with);
-        let column = quantity.column;
-        let fault = if there.iter().any(|known| known == column) {
-            None
-        } else if all.iter().any(|known| known == column) {
-            let help = format!("it may be {}", there.join(", "));
-            Some([format!("{} has nothing that gives `{name}` a value", self.called), help])
-        } else {
-            Some(unknown(name, column, &there))
-        };
-        of.into_iter().chain(fault).collect()
+        of.into_iter().chain(self.fault_of_column(quantity.table, quantity.column, name)).collect()
+    }
+
+    /// What is wrong with a column of a table in the name of a quantity.
+    fn fault_of_column(&self, table: &RunTable, column: &str, name: &str) -> Option<[String; 2]> {
+        let there = table.columns_of_groups(self.dimension, &self.groups(table.word));
+        if there.iter().any(|known| known == column) {
+            return None;
+        }
+        if table.columns(self.dimension).all(|(known, _)| known != column) {
+            return Some(unknown(name, column, &there));
+        }
+        let asked = (table.word == "probe").then(|| super::probed::quantity_of(column, self.dimension));
+        let ask = asked.flatten().map_or(String::new(), |quantity| {
+            format!("; or add {quantity} to `probe_also` in its table [output]")
+        });
+        let help = format!("it may be {}{ask}", there.join(", "));
+        Some([format!("{} has nothing that gives `{name}` a value", self.called), help])
+    }
+
+    /// What is wrong with the name of a probe, and with a column of `probes.csv`.
+    pub(crate) fn faults_of_probe(&self, probe: &str, column: &str) -> [Option<[String; 2]>; 2] {
+        [self.fault_of_place(PROBES.word, probe), self.fault_of_column(&PROBES, column, column)]
     }
 
     /// The groups of columns of a table that a run has, as far as the job says.
@@ -245,6 +255,7 @@ on = 'bottom'
                 "did you mean `middle`? the job has: middle",
             ),
             ("probe.middle.velocity_z", "there is no quantity", "it may be displacement_x"),
+            ("probe.middle.stress_yy", "has nothing that gives", "or add \"stress\" to `probe_also`"),
             ("probe.middle.median.velocity_y", "no probe is called `middle.median`", "the job has: middle"),
             ("resultant.suport left.force_x", "no source of resultants", "did you mean `support left`?"),
             ("resultant.support left.forcex", "there is no quantity", "did you mean `force_x`?"),

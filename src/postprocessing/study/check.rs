@@ -1,6 +1,9 @@
 //! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
-use super::document::{Exact, ProbeError, Quantity, Reference, Response, Run, Space, Study, Values};
+use super::{
+    document::{Exact, ProbeError, Quantity, Reference, Response, Run, Space, Study, Values},
+    exact::quantity_of_column,
+};
 use crate::{
     io::output::quantity_name::{RunOf, TableQuantity},
     job::{Document, Job},
@@ -166,8 +169,7 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
     let response = &study.response[index];
     let name = &response.of;
     let path = format!("response.{index}.of");
-    let run = RunOf { job: base, called: "the base job", dimension: base.dimension().unwrap_or(3) };
-    let faults = run.faults_of_name(name);
+    let faults = run_of(base).faults_of_name(name);
     let is_known = faults.is_empty();
     faults.into_iter().for_each(|[message, help]| document.fault(&path, message, help));
     if study.response[..index].iter().any(|other| other.name() == response.name()) {
@@ -195,33 +197,29 @@ fn check_window(response: &Response, base: &Job, path: &str, document: &mut Docu
     }
 }
 
-fn check_probe_name(base: &Job, name: &str, path: &str, document: &mut Document) {
-    let names: Vec<&str> = base.output.probe.iter().map(|probe| probe.name.as_str()).collect();
-    if !names.contains(&name) {
-        let help = listed(&names, "probes: add [[output.probe]] to it");
-        document.fault(path, format!("no probe is called `{name}`"), help);
-    }
-}
-
-/// The names, or what the base job lacks.
-fn listed(names: &[&str], lacks: &str) -> String {
-    if names.is_empty() {
-        return format!("the base job has no {lacks}");
-    }
-    format!("the base job has: {}", names.join(", "))
-}
-
+/// Checks that the base job has the probe and the column of `probes.csv`, and that an exact solution gives the latter.
 fn check_probe(study: &Study, base: &Job, index: usize, document: &mut Document) {
     let ProbeError { name, value, .. } = &study.probe[index];
-    check_probe_name(base, name, &format!("probe.{index}.name"), document);
-    let axes = &["x", "y", "z"][..base.dimension().unwrap_or(3)];
-    let column = |field: &str| value.strip_prefix(field).is_some_and(|axis| axes.contains(&axis));
     let path = format!("probe.{index}.value");
-    if !column("displacement_") && !column("velocity_") {
-        let message = format!("probes.csv has no column `{value}`");
-        document.fault(&path, message, "such as displacement_x or velocity_y");
-    } else if let Some(Reference::Exact(exact)) = &study.reference {
-        let of = if column("velocity_") { Quantity::Velocity } else { Quantity::Displacement };
-        check_exact(exact, of, base, &path, document);
+    let [of_name, of_value] = run_of(base).faults_of_probe(name, value);
+    if let Some([message, help]) = of_name {
+        document.fault(&format!("probe.{index}.name"), message, help);
     }
+    match (of_value, &study.reference) {
+        (Some([message, help]), _) => document.fault(&path, message, help),
+        (None, Some(Reference::Exact(exact))) => match quantity_of_column(value) {
+            Some(of) => check_exact(exact, of, base, &path, document),
+            None => {
+                let help =
+                    "it may give displacements, velocities and stresses; compare others with [reference.run]";
+                document.fault(&path, format!("[reference.exact] gives no {value}"), help);
+            }
+        },
+        _ => {}
+    }
+}
+
+/// The base job, whose runs have quantities.
+fn run_of(base: &Job) -> RunOf<'_> {
+    RunOf { job: base, called: "the base job", dimension: base.dimension().unwrap_or(3) }
 }

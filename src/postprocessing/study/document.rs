@@ -282,8 +282,9 @@ pub struct Norm {
     pub space: Space,
     /// The norm in time.
     pub over: Over,
-    /// The order of convergence that theory predicts. Absent: the order for smooth solutions, which is 1 in V and Q and 2 in H for
-    /// the mesh size, the order of the scheme for the step, and the lower of the two if both change.
+    /// The order of convergence that theory predicts. Absent: the order for smooth solutions, which is for the mesh size 1 in V and Q and
+    /// 2 in H, with quadratic cells 2 in V and 3 in H; for the step that of the scheme, but 1 where motion depends on the temperature;
+    /// the lower of the two if both change.
     #[schemars(extend("exclusiveMinimum" = 0), example = 1.0)]
     pub expected_order: Option<f64>,
     /// Published errors, one for each [[run]] in the same order. Tables show them beside the computed errors, with their ratio and
@@ -350,8 +351,9 @@ pub struct ProbeError {
     /// The name of an [[output.probe]] of the base job.
     #[schemars(example = &"tip")]
     pub name: String,
-    /// A column of probes.csv.
-    #[schemars(example = &"velocity_y")]
+    /// A column of probes.csv, also one that [output] probe_also of the base job adds. [reference.exact] gives displacements, velocities
+    /// and stresses.
+    #[schemars(example = &"velocity_y", example = &"temperature")]
     pub value: String,
     /// The norm in time of the difference.
     pub over: Over,

@@ -25,6 +25,16 @@ const LINE: [(f64, f64); 4] = [
 /// Step of the differences as a fraction of the cell size.
 const NEARBY: f64 = 1e-3;
 
+/// The components of a stress as stored in files.
+const STORED_AXES: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
+
+/// The quantity of an exact solution that gives a column of `probes.csv`; `None` where none does.
+pub(super) fn quantity_of_column(column: &str) -> Option<Quantity> {
+    [Quantity::Displacement, Quantity::Velocity, Quantity::Stress]
+        .into_iter()
+        .find(|quantity| column.rsplit_once('_').is_some_and(|(field, _)| field == quantity.field().name))
+}
+
 /// An exact solution, given by expressions.
 #[derive(Debug, Clone)]
 pub struct ExactFields {
@@ -45,11 +55,18 @@ impl ExactFields {
 
     /// A column of probes.csv at a point, such as `velocity_y`.
     pub fn column(&self, column: &str, time: f64, point: &[f64]) -> Option<f64> {
-        let (field, axis) = column.rsplit_once('_')?;
-        let components = match field {
-            "displacement" => &self.displacement,
-            "velocity" => &self.velocity,
-            _ => return None,
+        let (_, axis) = column.rsplit_once('_')?;
+        let components = match quantity_of_column(column)? {
+            Quantity::Displacement => &self.displacement,
+            Quantity::Velocity => &self.velocity,
+            Quantity::Stress => {
+                let stress = if point.len() == 2 {
+                    self.stress_at::<2>(time, point)
+                } else {
+                    self.stress_at::<3>(time, point)
+                };
+                return STORED_AXES.iter().position(|name| *name == axis).map(|at| stress[at]);
+            }
         };
         let axis = ["x", "y", "z"].iter().position(|name| *name == axis)?;
         components.get(axis).map(|component| component.evaluate(time, point))
@@ -103,7 +120,7 @@ impl ExactFields {
         Ok(())
     }
 
-    /// The stress as stored in files: xx, xy, xz, yy, yz, zz.
+    /// The stress as stored in files, [`STORED_AXES`].
     fn stress_at<const D: usize>(&self, time: f64, point: &[f64]) -> [f64; 6] {
         let value = |at: usize| self.stress.get(at).map_or(0.0, |c| c.evaluate(time, point));
         if D == 2 {
@@ -216,6 +233,11 @@ mod tests {
         assert!((stress.error - (1.0 + 4.0 + 2.0 / 3.0)).abs() < 1e-13);
         assert_eq!(exact.column("velocity_y", 0.0, &[3.0, 0.0]), Some(9.0));
         assert_eq!(exact.column("pressure_y", 0.0, &[3.0, 0.0]), None);
+        let stresses = ["stress_xx", "stress_yy", "stress_xy", "stress_zz"];
+        assert_eq!(
+            stresses.map(|column| exact.column(column, 0.0, &[3.0, 0.0])),
+            [Some(1.0), Some(2.0), Some(3.0), Some(0.0)]
+        );
     }
 
     #[test]
