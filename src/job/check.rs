@@ -22,6 +22,24 @@ impl Job {
         self.materials().any(|(_, material)| material.heat.is_some())
     }
 
+    /// Whether the motion depends on the temperature, by thermal strain or by a law.
+    pub fn sees_temperature(&self) -> bool {
+        let expands = |material: &Material| {
+            material.heat.as_ref().and_then(|heat| heat.expansion).is_some_and(|expansion| expansion != 0.0)
+        };
+        let flows =
+            |material: &Material| material.viscoplasticity.as_ref().is_some_and(|law| law.sees_temperature());
+        let slides = |contact: &Contact| contact.friction.as_ref().is_some_and(|law| law.sees_temperature());
+        self.materials().any(|(_, material)| expands(material) || flows(material))
+            || self.contact.iter().any(slides)
+    }
+
+    /// The order at which displacements, velocities and stresses converge with the step, where they are smooth: that of the scheme, but 1
+    /// where they depend on the temperature, whose steps are those of implicit Euler under every scheme.
+    pub fn order_in_time(&self) -> u32 {
+        if self.sees_temperature() { 1 } else { self.time.scheme.order() }
+    }
+
     /// The material of the cells of a region of the mesh.
     pub fn material_of(&self, region: &str) -> &Material {
         self.region.iter().find(|named| named.name == region).map_or(&self.material, |named| &named.material)

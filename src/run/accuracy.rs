@@ -55,7 +55,7 @@ const LEAST_SHARE: f64 = 0.05;
 pub struct ErrorOfSteps {
     /// The error of stress and velocity at the end over `norm`.
     pub relative: f64,
-    /// The order that the repetitions show, at most that of the scheme; 1 where they show none.
+    /// The order that the repetitions show, at most that of the job; 1 where they show none.
     pub order: f64,
     /// The norm of stress and velocity at the end in J^(1/2), in two dimensions (J/m)^(1/2); at least a twentieth of the largest in the run.
     pub norm: f64,
@@ -182,7 +182,7 @@ pub fn error_of_steps<const D: usize, const S: usize>(
             ),
             Err(_) => 1.0,
         };
-        let order = order.clamp(LEAST_ORDER, f64::from(loaded.job.time.scheme.order()));
+        let order = order.clamp(LEAST_ORDER, f64::from(loaded.job.order_in_time()));
         (order, 1.0 / (first.powf(order) - 1.0))
     };
     let error = if distance > 0.0 { SAFETY * share * distance / norm } else { 0.0 };

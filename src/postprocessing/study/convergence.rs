@@ -49,12 +49,13 @@ pub(super) fn error_of(results: &Results, run: usize, norm: usize) -> Option<f64
 
 fn order(plan: &Plan, results: &Results, run: usize, norm: usize, refined: &Refinement) -> Option<Order> {
     let (coarse, fine) = (error_of(results, refined.of, norm)?, error_of(results, run, norm)?);
-    let theory = plan.study.norm.get(norm);
+    let (theory, job) = (plan.study.norm.get(norm), &plan.runs[run].loaded.job);
+    let of_job = (job.mesh.order, job.order_in_time());
     Some(Order {
         refined: refined.what,
         against: results.runs[refined.of].name.clone(),
         observed: observed(coarse, fine, refined.factor)?,
-        expected: theory.map(|norm| expected(norm, refined.what, plan.runs[run].scheme)),
+        expected: theory.map(|norm| expected(norm, refined.what, of_job)),
     })
 }
 

@@ -1,7 +1,6 @@
 //! Observed and theoretical orders of convergence.
 
 use super::document::{Norm, Space};
-use crate::job::Scheme;
 use serde::{Deserialize, Serialize};
 
 /// The quantity that is refined between two runs.
@@ -88,10 +87,15 @@ pub(super) fn observed(coarse: f64, fine: f64, factor: f64) -> Option<f64> {
     order.is_finite().then_some(order)
 }
 
-/// The theoretical order: that given in the study, or that for smooth solutions.
-pub(super) fn expected(norm: &Norm, what: Refined, scheme: Scheme) -> f64 {
-    let mesh: f64 = if norm.space == Space::H { 2.0 } else { 1.0 };
-    let step = f64::from(scheme.order());
+/// The theoretical order: that given in the study, or that for smooth solutions of a job with cells of this order and steps of that one.
+/// Of the stress the mean of each cell is compared, also where it is linear in the cell.
+pub(super) fn expected(norm: &Norm, what: Refined, (of_cells, of_steps): (u8, u32)) -> f64 {
+    let mesh = match norm.space {
+        Space::H => f64::from(of_cells) + 1.0,
+        Space::V => f64::from(of_cells),
+        Space::Q => 1.0,
+    };
+    let step = f64::from(of_steps);
     norm.expected_order.unwrap_or(match what {
         Refined::Mesh => mesh,
         Refined::Step => step,
@@ -102,10 +106,7 @@ pub(super) fn expected(norm: &Norm, what: Refined, scheme: Scheme) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        job::Scheme::{Bdf2, LaggedEuler},
-        postprocessing::study::document::{Over, Quantity},
-    };
+    use crate::postprocessing::study::document::{Over, Quantity};
 
     fn size(family: &str, cells: f64, step: f64) -> Option<Size> {
         Some(Size { family: family.into(), mesh: 1.0 / cells, step })
@@ -159,10 +160,12 @@ mod tests {
             published: Vec::new(),
             targets: Vec::new(),
         };
-        assert_eq!(expected(&norm(Space::H, None), Refined::Mesh, Bdf2), 2.0);
-        assert_eq!(expected(&norm(Space::H, None), Refined::Both, LaggedEuler), 1.0);
-        assert_eq!(expected(&norm(Space::V, None), Refined::Step, Bdf2), 2.0);
-        assert_eq!(expected(&norm(Space::V, None), Refined::Both, Bdf2), 1.0);
-        assert_eq!(expected(&norm(Space::V, Some(1.5)), Refined::Both, Bdf2), 1.5);
+        assert_eq!(expected(&norm(Space::H, None), Refined::Mesh, (1, 2)), 2.0);
+        assert_eq!(expected(&norm(Space::H, None), Refined::Both, (1, 1)), 1.0);
+        assert_eq!(expected(&norm(Space::V, None), Refined::Step, (1, 2)), 2.0);
+        assert_eq!(expected(&norm(Space::V, None), Refined::Both, (1, 2)), 1.0);
+        assert_eq!(expected(&norm(Space::V, Some(1.5)), Refined::Both, (1, 2)), 1.5);
+        let of_mesh = |space| expected(&norm(space, None), Refined::Mesh, (2, 1));
+        assert_eq!([Space::H, Space::V, Space::Q].map(of_mesh), [3.0, 2.0, 1.0]);
     }
 }
