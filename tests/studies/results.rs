@@ -157,6 +157,63 @@ fn ablation_tells_what_each_effect_costs_and_changes() {
     assert!((of("traction.0")["change"][0].as_f64().expect("change") - 1.0).abs() < 1e-9);
 }
 
+/// A slab whose lower side is warmed smoothly; it expands, which its foot hinders.
+const WARMED: &str = r#"
+[mesh.rectangle]
+size = [1, 1]
+cells = [4, 4]
+[material]
+hypothesis = "plane_strain"
+elasticity = { youngs_modulus = 1e5, poisson_ratio = 0.3 }
+heat = { conductivity = 1, volumetric_capacity = 1, expansion = 1e-4, reference = 300 }
+[initial]
+temperature = 300
+[[support]]
+on = ["bottom"]
+fix = "all"
+[[heat]]
+on = ["bottom"]
+temperature = "300 + 50*(1 - cos(3*t))"
+[time]
+end = 1
+step = 0.1
+scheme = "bdf2"
+[output]
+probe = [{ name = "middle", point = [0.5, 0.5] }]
+probe_also = ["temperature", "stress"]
+[check]
+"probe.middle.temperature" = { value = 340, absolute = 40 }
+"#;
+
+#[test]
+fn a_warmed_body_is_of_first_order_and_is_compared_without_its_heat() {
+    let norm = "[[norm]]\nof = \"stress\"\nin = \"Q\"\nover = \"end\"\n";
+    let probe = |value: &str| format!("[[probe]]\nname = \"middle\"\nvalue = \"{value}\"\nover = \"end\"\n");
+    let study = format!(
+        "[product]\nsteps = [0.04, 0.02]\n[reference.run]\nstep = 0.0025\n{norm}{}{}",
+        probe("temperature"),
+        probe("stress_yy")
+    );
+    let scene = Scene::new(WARMED, &study);
+    scene.study(1, &["--ablate"]).expect(0);
+    let results = scene.results();
+    assert_eq!(number(&results, "/runs/1/errors/0/orders/0/expected"), 1.0);
+    // The reference is an eighth of the step: 15/16 of an error over 7/16 of its half.
+    let ideal = (15f64 / 7.0).log2();
+    for error in 0..3 {
+        let observed = number(&results, &format!("/runs/1/errors/{error}/orders/0/observed"));
+        assert!((observed - ideal).abs() < 0.15, "{error}: {observed} against {ideal}");
+    }
+    let effects = results["ablation"]["effects"].as_array().expect("effects");
+    let of = |name: &str| effects.iter().find(|e| e["without"] == name).unwrap_or_else(|| panic!("{name}"));
+    // What is cold and has no other load does not move.
+    for name in ["material.heat", "material.heat.expansion"] {
+        assert_eq!(of(name)["status"], "completed");
+        assert!((of(name)["change"][2].as_f64().expect("change") - 1.0).abs() < 1e-9, "{name}");
+    }
+    assert_eq!(of("heat.0")["status"], "completed");
+}
+
 #[test]
 fn studies_of_the_repository_load() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/studies");

@@ -1,6 +1,7 @@
 //! Ablation: the base job without one of its effects at a time, and what each effect costs and changes.
 //!
-//! Effects are found by the schema: every table of the job's physics that is optional, and the density.
+//! Effects are found by the schema: every table of the job's physics that is optional, and some keys. What has no meaning without an effect
+//! is left out with it.
 
 use super::{
     compare::Compared,
@@ -21,15 +22,21 @@ use std::path::{Path, PathBuf};
 use toml::Value;
 
 /// Tables that are physics.
-const PHYSICS: [&str; 8] =
-    ["material", "region", "support", "traction", "body_force", "gravity", "contact", "initial"];
-/// Keys that are effects without being tables.
-const PLAIN_EFFECTS: [&str; 1] = ["density"];
+const PHYSICS: [&str; 9] =
+    ["material", "region", "support", "traction", "body_force", "gravity", "heat", "contact", "initial"];
+/// Tables that are not, and of which the results at the end do not depend.
+const NO_PHYSICS: [&str; 3] = ["output", "checkpoint", "check"];
+/// Keys that are effects without being tables, by the ends of their paths.
+const PLAIN_EFFECTS: [&str; 5] =
+    ["density", "heat.expansion", "heat.dissipation_share", "initial.displacement", "initial.velocity"];
+/// Where heat is in a job; `*` stands for any number.
+const HEAT: [&str; 5] =
+    ["material.heat", "region.*.material.heat", "heat", "initial.temperature", "contact.*.friction_heat"];
 /// What is compared at the end.
 const COMPARED: [(Quantity, Space); 3] =
     [(Quantity::Displacement, Space::V), (Quantity::Velocity, Space::H), (Quantity::Stress, Space::Q)];
 
-/// Paths of the effects in an effective job, such as `material.viscosity` and `contact.0`.
+/// Paths of the effects in an effective job, such as `material.viscosity` and `contact.0`; heat is one effect of the whole body.
 pub(super) fn effects(job: &Job) -> Result<Vec<String>> {
     let document = document(job)?;
     let mut found = Vec::new();
@@ -39,7 +46,29 @@ pub(super) fn effects(job: &Job) -> Result<Vec<String>> {
             collect(key, value, schema, optional, &mut found);
         }
     }
+    let mut has_heat = false;
+    found.retain(|path| !is_heat(path) || !std::mem::replace(&mut has_heat, true));
     Ok(found)
+}
+
+/// Whether the path is that of the heat of a material.
+fn is_heat(path: &str) -> bool {
+    path.ends_with("material.heat")
+}
+
+/// The paths of what is left out without an effect.
+fn parts(path: &str) -> Vec<String> {
+    if is_heat(path) {
+        return HEAT.map(str::to_owned).to_vec();
+    }
+    let (table, key) = path.rsplit_once('.').unwrap_or(("", path));
+    let along: &[&str] = match key {
+        "friction" => &["friction_heat", "wear"],
+        "expansion" => &["reference"],
+        _ => &[],
+    };
+    let along = along.iter().map(|key| format!("{table}.{key}"));
+    std::iter::once(path.to_owned()).chain(along).collect()
 }
 
 fn collect(path: &str, value: &Value, schema: Schema, optional: bool, found: &mut Vec<String>) {
@@ -58,7 +87,8 @@ fn collect(path: &str, value: &Value, schema: Schema, optional: bool, found: &mu
                 let Some(property) = schema.property(key) else { continue };
                 let optional = !schema.required().any(|required| required == key);
                 let path = format!("{path}.{key}");
-                if optional && PLAIN_EFFECTS.contains(&key.as_str()) {
+                let is_effect = |end: &&str| path == **end || path.ends_with(&format!(".{end}"));
+                if PLAIN_EFFECTS.iter().any(is_effect) {
                     found.push(path.clone());
                 }
                 collect(&path, inner, property, optional, found);
@@ -70,16 +100,19 @@ fn collect(path: &str, value: &Value, schema: Schema, optional: bool, found: &mu
 
 fn document(job: &Job) -> Result<Value> {
     let text = job.to_toml()?;
-    toml::from_str::<toml::Table>(&text).map(Value::Table).map_err(|error| {
+    let mut table = toml::from_str::<toml::Table>(&text).map_err(|error| {
         Error::Internal(format!("the effective job can't be read back: {}", error.message()))
-    })
+    })?;
+    table.retain(|key, _| !NO_PHYSICS.contains(&key));
+    Ok(Value::Table(table))
 }
 
-/// The job without the table or key `path`; refused if the job is not valid without it.
+/// The job without the effect `path`; refused if the job is not valid without it.
 pub(super) fn without(job: &Job, path: &str, folder: &Path) -> Result<Loaded> {
     let mut document = document(job)?;
-    let parts: Vec<&str> = path.split('.').collect();
-    remove(&mut document, &parts);
+    for path in parts(path) {
+        remove(&mut document, &path.split('.').collect::<Vec<_>>());
+    }
     let text = toml::to_string(&document)
         .map_err(|error| Error::Internal(format!("a job without {path} can't be written: {error}")))?;
     Job::from_text(&text, &format!("the job without {path}"), folder, &[])
@@ -100,6 +133,7 @@ fn remove(value: &mut Value, parts: &[&str]) {
                 }
             }
         }
+        Value::Array(items) if *part == "*" => items.iter_mut().for_each(|item| remove(item, rest)),
         Value::Array(items) => match part.parse::<usize>() {
             Ok(index) if index < items.len() && rest.is_empty() => {
                 items.remove(index);
@@ -252,6 +286,79 @@ mod tests {
         for kept in ["material", "time", "solver", "output", "about", "contact.0.normal", "check"] {
             assert!(!found.iter().any(|name| name == kept), "{kept} is in {found:?}");
         }
+    }
+
+    #[test]
+    fn heat_and_friction_are_left_out_with_what_has_no_meaning_without_them() {
+        let text = "\
+[mesh.rectangle]
+size = [1, 1]
+cells = [2, 2]
+[material]
+hypothesis = 'plane_strain'
+density = 1
+elasticity = { youngs_modulus = 1e5, poisson_ratio = 0.3 }
+viscosity = { volumetric = 1, shear = 1 }
+heat = { conductivity = 1, capacity = 1, expansion = 1e-5, reference = 300, dissipation_share = 0.9 }
+[initial]
+temperature = 300
+velocity = [1, 0]
+[time]
+end = 1
+step = 0.1
+scheme = 'bdf2'
+[[support]]
+on = ['top']
+fix = 'all'
+[[heat]]
+on = ['top']
+flux = 1e3
+[[heat]]
+on = ['left']
+temperature = 310
+[[contact]]
+on = ['bottom']
+normal.compliance = { stiffness = 1e6 }
+friction.coulomb.coefficient = 0.3
+friction_heat = 0.5
+wear.coefficient = 1e-9
+[output]
+probe = [{ name = 'middle', point = [0.5, 0.5] }]
+probe_also = ['temperature', 'wear']
+[check]
+\"history.stored_heat\" = { value = 1, absolute = 1 }
+";
+        let job = Job::from_text(text, "hot.toml", Path::new("/"), &[]).expect("a job").job;
+        let found = effects(&job).expect("effects");
+        let known = [
+            "material.density",
+            "material.heat",
+            "material.heat.expansion",
+            "material.heat.dissipation_share",
+            "heat.0",
+            "heat.1",
+            "contact.0.friction",
+            "contact.0.wear",
+            "initial.velocity",
+        ];
+        known.iter().for_each(|effect| {
+            assert_eq!(found.iter().filter(|name| name == effect).count(), 1, "{effect}: {found:?}");
+        });
+        let left =
+            |path: &str| without(&job, path, Path::new("/")).unwrap_or_else(|e| panic!("{path}: {e}")).job;
+        let cold = left("material.heat");
+        assert!(
+            !cold.has_heat() && cold.heat.is_empty() && cold.contact[0].friction == job.contact[0].friction
+        );
+        let initial = cold.initial.expect("a velocity");
+        assert!(initial.temperature.is_none() && initial.velocity.is_some());
+        let smooth = left("contact.0.friction");
+        assert!(
+            smooth.has_heat() && smooth.contact[0].friction.is_none() && smooth.contact[0].wear.is_none()
+        );
+        assert!(left("material.heat.expansion").has_heat());
+        assert_eq!(left("heat.1").heat, job.heat[..1]);
+        assert!(left("contact.0.wear").contact[0].friction.is_some());
     }
 
     #[test]
