@@ -95,3 +95,23 @@ fn a_plane_that_turns_presses_corners_in_a_stage_as_in_one_run() {
     // Without friction all forces are along the normal of the plane only where the corners are; the top has its own normal.
     assert!(forces(&whole, 20.0)[1] < 0.0);
 }
+
+#[test]
+fn a_corner_under_a_plane_or_a_roller_that_is_nearly_along_one_face_feels_it_along_this_face_alone() {
+    let time = "{ scheme = 'implicit_euler', end = 0.1, step = 0.05 }";
+    for obstacle in [
+        "plane = { point = ['1', '0.5 - 0.005*t'], normal = ['-1e-4', '-1'] }",
+        "plane = { point = ['1', '0.5 - 0.005*t'], normal = ['-0.0025', '-1'] }",
+        "sphere = { centre = ['1', '1 - 0.005*t'], radius = 0.5 }",
+        "sphere = { centre = ['0.95', '2.5 - 0.2*t'], radius = 2 }",
+    ] {
+        let pressed = |on: &str| {
+            let contact = format!("{{ on = {on}, obstacle.{obstacle}, normal.unilateral = {{}} }}");
+            forces(&block(&contact, time).run_and_keep(1), 1.0)
+        };
+        let [expected, found] = ["['top']", "['top', 'right']"].map(pressed);
+        assert!(expected[3] < -1.0, "{obstacle}: {expected:?}");
+        let difference = relative_difference(&expected, &found);
+        assert!(difference < 0.01, "{obstacle}: {expected:?}, {found:?}");
+    }
+}

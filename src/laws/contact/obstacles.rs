@@ -189,9 +189,9 @@ impl Gap {
         moves.iter().any(Scalar::depends_on_time)
     }
 
-    /// Whether it is known to be convex, so that an edge touches it along one direction.
-    pub fn is_convex(&self) -> bool {
-        matches!(self, Self::Plane(_) | Self::Sphere(Sphere { hollow: false, .. }))
+    /// Whether its surface is known to have no edges, so that a point touches it along one direction.
+    pub fn is_smooth(&self) -> bool {
+        matches!(self, Self::Plane(_) | Self::Sphere(_))
     }
 
     /// The centre in m at `time` of a sphere or shape, the point of a plane; the origin without an obstacle.

@@ -50,11 +50,11 @@ impl<const D: usize> Contact<D> {
             let touching = is_edge.then(|| gap.direction_of_nearest(&place, 0.0)).flatten();
             let touching = touching.and_then(|direction| nearest_in_cone(&direction, &cone));
             let fixed = match touching {
-                Some(direction) => turned(of_node, &direction, held),
+                Some(direction) => turned(of_node, &direction, held, gap.is_smooth()),
                 None => of_node.to_vec(),
             };
-            // Two faces of an obstacle with a hollow may touch two of the body.
-            let touches_along_one = of_node.len() == 1 || fixed.len() < 2 || gap.is_convex();
+            // Two faces of an obstacle that meet at an edge may touch two of the body.
+            let touches_along_one = of_node.len() == 1 || fixed.len() < 2 || gap.is_smooth();
             let follows = is_edge && touches_along_one && gap.turns_as_seen();
             let faces = of_node.iter().map(|point| (point.normal, point.weight)).collect();
             match follows.then(|| Edge::new(faces, cone, held.frame(node))).flatten() {
@@ -87,13 +87,21 @@ impl<const D: usize> Contact<D> {
     }
 }
 
-/// The points of a node whose faces toward the obstacle touch it along one direction; each stands for its shadow along this direction.
-fn turned<const D: usize>(points: &[Point<D>], direction: &Vector<D>, held: &Held<D>) -> Vec<Point<D>> {
+/// The points of a node whose faces toward the obstacle touch it along one direction; each stands for its shadow along this direction. Faces
+/// across it touch none where the obstacle is smooth: along their normals it is far away, in front of the node or behind it.
+fn turned<const D: usize>(
+    points: &[Point<D>],
+    direction: &Vector<D>,
+    held: &Held<D>,
+    is_smooth: bool,
+) -> Vec<Point<D>> {
     let along = |point: &&Point<D>| dot(&point.normal, direction) > ACROSS;
     let of_face = points.iter().filter(along).find(|point| sine(&point.normal, direction) < ALONG);
     let weight: f64 =
         points.iter().filter(along).map(|point| point.weight * dot(&point.normal, direction)).sum();
-    let mut out: Vec<Point<D>> = points.iter().filter(|point| !along(point)).cloned().collect();
+    let touches_along_one = is_smooth && points.iter().any(|point| along(&point));
+    let across = points.iter().filter(|point| !touches_along_one && !along(point));
+    let mut out: Vec<Point<D>> = across.cloned().collect();
     if let Some(point) = of_face {
         out.push(point.clone());
     } else if weight > 0.0 {
