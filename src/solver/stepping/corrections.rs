@@ -16,9 +16,11 @@ use crate::{
 pub(super) const MAX_CORRECTIONS: usize = 12;
 /// A correction that reduces the residual by less than this factor counts as divergence.
 const LARGEST_REDUCTION: f64 = 0.5;
+const DIVERGENCE: &str = "corrections with a factor in single precision do not converge";
 
 /// Solves a step from the velocity in `trial`, and writes the new one there: with all fallbacks, but where a body may be at rest with the
-/// first from `trial` and from there before the others. Collective.
+/// first from `trial` and from there before the others. A solver in double precision needs one pass, one in single precision corrections
+/// until the residual in double precision is small. Collective.
 pub(super) fn correct<const D: usize, const S: usize>(
     newton: &mut Newton,
     solver: &mut dyn LinearSolver,
@@ -26,59 +28,49 @@ pub(super) fn correct<const D: usize, const S: usize>(
     system: System<'_>,
     trial: &mut DistributedVector,
 ) -> Result<StepOutcome> {
-    let most = system.fallbacks[1];
-    if most < 2 || !newton.properties(problem).may_be_solved_at_rest() {
-        return correct_from(newton, solver, problem, system, trial);
+    let all = system.fallbacks;
+    let tries_rest = all[1] > 1 && newton.properties(problem).may_be_solved_at_rest();
+    if tries_rest {
+        newton.keep_extrapolated(trial)?;
     }
-    let mut start = match newton.extrapolated.take() {
-        Some(start) => start,
-        None => trial.like()?,
-    };
-    start.copy_from(trial)?;
-    let first = System { fallbacks: [0, 1], ..system };
-    let mut solved = problem.session.agree(correct_from(newton, solver, problem, first, trial));
-    for others in [first, System { fallbacks: [1, most - 1], ..system }] {
-        if !matches!(&solved, Err(error) if error.is_failure()) {
-            break;
+    let in_turn = [[0, 1], [0, 1], [1, all[1].saturating_sub(1)]];
+    let at_once = [all];
+    let mut failure = None;
+    for (number, fallbacks) in (if tries_rest { &in_turn[..] } else { &at_once }).iter().enumerate() {
+        if number > 0 {
+            restore_pressures(problem.body, problem.state)?;
         }
-        restore_pressures(problem.body, problem.state)?;
-        if others.fallbacks == first.fallbacks {
-            trial.fill(0.0)?;
-        } else {
-            trial.copy_from(&start)?;
+        match (number, &newton.extrapolated) {
+            (1, _) => trial.fill(0.0)?,
+            (2, Some(extrapolated)) => trial.copy_from(extrapolated)?,
+            _ => {}
         }
-        solved = problem.session.agree(correct_from(newton, solver, problem, others, trial));
+        let system = System { fallbacks: *fallbacks, ..system };
+        solver.start(system, trial)?;
+        let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
+        failure = None;
+        for _ in 0..MAX_CORRECTIONS {
+            match problem.session.agree(newton.solve(problem, solver.condense(system, trial)?)) {
+                Ok(outcome) => sum = sum.followed_by(outcome),
+                Err(error) if error.is_failure() => {
+                    failure = Some(error.into());
+                    break;
+                }
+                Err(error) => return Err(error.into()),
+            }
+            let Some(left) = solver.expand(system, trial)? else {
+                trial.update_ghosts()?;
+                return Ok(sum);
+            };
+            if left <= system.tolerance {
+                trial.update_ghosts()?;
+                return Ok(StepOutcome { residual: left, ..sum });
+            }
+            if left.is_nan() || left > LARGEST_REDUCTION * last {
+                break;
+            }
+            last = left;
+        }
     }
-    newton.extrapolated = Some(start);
-    Ok(solved?)
-}
-
-/// Solves a step from the velocity in `trial`, and writes the new one there. A solver in double precision needs one pass, one in single
-/// precision corrections until the residual in double precision is small. Collective.
-fn correct_from<const D: usize, const S: usize>(
-    newton: &mut Newton,
-    solver: &mut dyn LinearSolver,
-    problem: &mut StepProblem<'_, D, S>,
-    system: System<'_>,
-    trial: &mut DistributedVector,
-) -> Result<StepOutcome> {
-    solver.start(system, trial)?;
-    let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
-    for _ in 0..MAX_CORRECTIONS {
-        let outcome = newton.solve(problem, solver.condense(system, trial)?)?;
-        sum = sum.followed_by(outcome);
-        let Some(left) = solver.expand(system, trial)? else {
-            trial.update_ghosts()?;
-            return Ok(sum);
-        };
-        if left <= system.tolerance {
-            trial.update_ghosts()?;
-            return Ok(StepOutcome { residual: left, ..sum });
-        }
-        if left.is_nan() || left > LARGEST_REDUCTION * last {
-            break;
-        }
-        last = left;
-    }
-    Err(Error::Failed("corrections with a factor in single precision do not converge".into()))
+    Err(failure.unwrap_or_else(|| Error::Failed(DIVERGENCE.into())))
 }

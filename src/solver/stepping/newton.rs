@@ -191,6 +191,15 @@ impl Newton {
         Err(problem.explain(&failure, properties.softens))
     }
 
+    /// Keeps the velocity from which a step starts.
+    pub(super) fn keep_extrapolated(&mut self, trial: &DistributedVector) -> Result<()> {
+        let kept = match &mut self.extrapolated {
+            Some(kept) => kept,
+            none => none.insert(trial.like()?),
+        };
+        kept.copy_from(trial)
+    }
+
     /// Prepares obstacles, linear solves and parameters of friction graphs for new equations. Collective.
     fn start<const D: usize, const S: usize>(
         &mut self,
