@@ -380,7 +380,64 @@ fn blocks_that_friction_holds_on_springs_take_few_iterations() {
         [solver]
         accept = ["uniqueness"]
     "#;
-    for (text, steps) in [(block, 5.0), (pair, 10.0)] {
+    // The coefficient falls by a few per cent.
+    let weakening = r#"
+        [mesh.rectangle]
+        size = [1.0, 0.5]
+        cells = [4, 2]
+        [material]
+        hypothesis = "plane_stress"
+        elasticity = { youngs_modulus = 1.3e6, poisson_ratio = 0.2 }
+        damping = { stiffness = 0.001 }
+        [[support]]
+        on = ["top"]
+        stiffness = { normal = 1300.0, tangential = 13000.0 }
+        [[traction]]
+        on = ["top"]
+        value = ["4800*max(t - 0.012, 0)/0.03", "-12800*min(t/0.012, 1)"]
+        [[contact]]
+        on = ["bottom"]
+        obstacle.plane = { point = [0.0, 0.0], normal = [0.0, 1.0] }
+        normal.unilateral = {}
+        friction.distance_weakening = { static = 0.13, dynamic = 0.078, distance = 0.0265, decay = "linear" }
+        [time]
+        scheme = "implicit_euler"
+        end = 0.03
+        step = 0.003
+    "#;
+    // After the first step, nothing moves.
+    let resting = r#"
+        material.hypothesis = "plane_strain"
+        material.elasticity = { youngs_modulus = 5.4e5, poisson_ratio = 0.2 }
+        [[mesh.rectangle]]
+        name = "a"
+        size = [1.0, 0.3]
+        cells = [4, 2]
+        [[mesh.rectangle]]
+        name = "b"
+        corner = [0.1, 0.3]
+        size = [0.8, 0.25]
+        cells = [7, 2]
+        [[support]]
+        on = ["a.bottom"]
+        fix = "all"
+        [[support]]
+        on = ["a.left", "b.left"]
+        stiffness = { normal = 540.0, tangential = 1620.0 }
+        [[traction]]
+        on = ["b.top"]
+        value = [0.0, -1000.0]
+        [[contact]]
+        on = ["b.bottom"]
+        against = ["a.top"]
+        normal.compliance = { stiffness = 1e8 }
+        friction.coulomb.coefficient = 0.2
+        [time]
+        scheme = "implicit_euler"
+        end = 0.012
+        step = 0.003
+    "#;
+    for (text, steps) in [(block, 5.0), (pair, 10.0), (weakening, 10.0), (resting, 4.0)] {
         let case = Case::written_as(text);
         for ranks in [1, 2] {
             let results = case.run(ranks);

@@ -91,6 +91,14 @@ fn balanced<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
     }
 }
 
+fn held_sides<const D: usize>() -> &'static str {
+    if D == 2 {
+        "[[support]]\non = [\"left\", \"right\"]\nfix = \"all\"\n"
+    } else {
+        "[[support]]\non = [\"left\", \"right\", \"front\", \"back\"]\nfix = \"all\"\n"
+    }
+}
+
 /// Velocities at the owned nodes after every step.
 fn velocities<const D: usize, const S: usize>(
     session: &Session,
@@ -117,7 +125,7 @@ fn difference(session: &Session, one: &[Vec<f64>], other: &[Vec<f64>]) -> f64 {
 }
 
 /// A plane, a ball and a shape give the same results as gaps defined by expressions, which are measured along the normals of faces. A shell
-/// around a flat face touches its edges, along its own normals.
+/// around a flat face touches its edges, along its own normals. So does a plane that turns, where edges can move: there the sides are held.
 fn alike<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let (z, across) = (up::<D>(), if D == 2 { "" } else { "-(y-0.4)^2" });
     let half = format!("0.52^2-(x-0.2-5*t)^2{across}");
@@ -131,7 +139,9 @@ fn alike<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
     let facing_faces = obstacles::<D>().into_iter().filter(|(name, _)| !name.starts_with("a shell"));
     for ((name, obstacle), gap) in facing_faces.zip(gaps) {
         for law in [UNILATERAL, SPRINGS] {
-            let start = body::<D>(true) + &time(0.002, 40, "") + "[[contact]]\non = [\"bottom\"]\n" + law;
+            let (sides, steps) = if name.ends_with("turns") { (held_sides::<D>(), 60) } else { ("", 40) };
+            let start =
+                body::<D>(true) + sides + &time(0.002, steps, "") + "[[contact]]\non = [\"bottom\"]\n" + law;
             let by_obstacle = velocities::<D, S>(session, &(start.clone() + &obstacle), mesh);
             let by_gap = velocities::<D, S>(session, &format!("{start}gap = \"{gap}\"\n"), mesh);
             let off = difference(session, &by_obstacle, &by_gap);

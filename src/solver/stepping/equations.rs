@@ -276,7 +276,7 @@ pub struct Linearisation {
     pub derivatives: f64,
     /// A hash of the branches of all points, on which derivatives may differ.
     pub branches: f64,
-    /// The norm in N of the residual; not a number where it does not tell whether steps recur.
+    /// The norm in N of the residual.
     pub residual: f64,
 }
 
@@ -509,8 +509,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         if asked_to_stop > 0.0 {
             return Err(Error::Stopped("the run was asked to stop within a step".into()));
         }
-        // With obstacles that forces move, the same branches with nearly the same residual need not lead to the same step.
-        let residual = if self.obstacles.is_empty() { self.scratch.residuals[0] } else { f64::NAN };
+        let residual = self.scratch.residuals[0];
         self.counts.sets.push(Linearisation { derivatives, branches, residual });
         match self.counts.period(!self.halves) {
             Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle_message(period))),

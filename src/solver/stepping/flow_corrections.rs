@@ -140,8 +140,8 @@ impl FlowCorrections {
             self.right_hand_side.copy_from(system.right_hand_side)?;
             self.right_hand_side.add_scaled(-1.0, &self.given)?;
             let tolerance = CONTACT_SHARE * system.tolerance;
-            let [first, most] = system.fallbacks;
-            let fallbacks = [first, if has_tangents { most.min(MOST_FALLBACKS) } else { most }];
+            let fallbacks =
+                if has_tangents { system.fallbacks.min(MOST_FALLBACKS) } else { system.fallbacks };
             let of_contact =
                 System { right_hand_side: &self.right_hand_side, tolerance, fallbacks, ..system };
             let reduced = solver.condense(of_contact, trial)?;

@@ -51,8 +51,6 @@ pub(super) struct Newton {
     pub(super) counts: SolveCounts,
     /// The velocity from which the step was started.
     start: DistributedVector,
-    /// The velocity of the whole body from which the step was started, where it is tried at rest as well.
-    pub(super) extrapolated: Option<DistributedVector>,
     /// Whether the user has set a line search.
     has_user_search: bool,
     /// Work data for cells that flow, if there are any.
@@ -105,7 +103,6 @@ impl Newton {
             // Longer solutions enlarge the list.
             counts: SolveCounts { sets: Vec::with_capacity(128), ..SolveCounts::default() },
             start: like.like()?,
-            extrapolated: None,
             has_user_search: has_option("snes_linesearch_type")?,
             flow: None,
         })
@@ -135,7 +132,7 @@ impl Newton {
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let mut failure = String::new();
         let is_yielding = |fallback: &Fallback| fallback.search == Search::Yielding;
-        let mut rest = properties.fallbacks().skip(system.fallbacks[0]).take(system.fallbacks[1]);
+        let mut rest = properties.fallbacks().take(system.fallbacks);
         let (mut next, mut has_yielded) = (rest.next(), false);
         while let Some(fallback) = next {
             loop {
@@ -189,15 +186,6 @@ impl Newton {
             next = next.or_else(|| rest.find(|fallback| !(has_yielded && is_yielding(fallback))));
         }
         Err(problem.explain(&failure, properties.softens))
-    }
-
-    /// Keeps the velocity from which a step starts.
-    pub(super) fn keep_extrapolated(&mut self, trial: &DistributedVector) -> Result<()> {
-        let kept = match &mut self.extrapolated {
-            Some(kept) => kept,
-            none => none.insert(trial.like()?),
-        };
-        kept.copy_from(trial)
     }
 
     /// Prepares obstacles, linear solves and parameters of friction graphs for new equations. Collective.
@@ -321,7 +309,8 @@ impl Newton {
             flows,
             has_friction,
             may_rest: problem.may_rest,
-            friction_moves_obstacles: has_friction && !self.obstacles.is_empty(),
+            friction_moves_obstacles: has_friction
+                && contacts.iter().any(|contact| contact.obstacle.is_driven()),
             softens: (flows && body.softens()) || contacts.iter().any(decreases),
             has_bonds: flows && body.softens_at_surface(),
         }

@@ -57,8 +57,8 @@ pub(super) struct System<'a> {
     pub floor: Floor,
     /// The residual below which rounding errors may hide that nothing holds a body yet: equations are given up soon.
     pub hiding_floor: Floor,
-    /// The fallbacks that are tried: the number of those that are left out before, and theirs.
-    pub fallbacks: [usize; 2],
+    /// The number of fallbacks that are tried.
+    pub fallbacks: usize,
     /// The velocity of the converged state.
     pub converged: &'a DistributedVector,
     /// The parameters of each contact's graphs, along the normal and of friction: equal to the resistance of the body to motions of

@@ -56,6 +56,10 @@ const NO_FLIGHT: &str = "check the loads and the gap";
 enum Change {
     /// The step is solved as it is.
     Nothing,
+    /// Where full steps have failed and the body may rest, the step starts from there.
+    AtRest,
+    /// After that, the step starts as it did at first, with more fallbacks of Newton's method.
+    NotAtRest,
     /// The factor is one in double precision.
     DoublePrecision,
     /// Where contact alone holds a body, the step starts from what soft springs bear.
@@ -70,8 +74,10 @@ enum Change {
 
 impl Change {
     /// All changes in their order. Each attempt keeps those before.
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 8] = [
         Self::Nothing,
+        Self::AtRest,
+        Self::NotAtRest,
         Self::DoublePrecision,
         Self::FromSprings,
         Self::OnContacts,
@@ -94,6 +100,8 @@ struct Accuracy {
     awaits_pressure: bool,
     /// The number of fallbacks of Newton's method that are tried.
     fallbacks: usize,
+    /// Whether a body at rest is tried after the first of them.
+    tries_rest: bool,
     /// The forces to which its residual is compared: not below those of which rounding errors are the tolerance.
     reference: f64,
 }
@@ -126,7 +134,7 @@ impl StepSolver {
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
         let mut accuracy = self.accuracy(problem, trial)?;
-        if self.springs.are_needed() {
+        if self.springs.are_needed() || accuracy.tries_rest {
             keep(&mut self.first_start, trial)?;
         }
         let mut failure = None;
@@ -166,6 +174,22 @@ impl StepSolver {
     ) -> Result<bool> {
         match change {
             Change::Nothing => Ok(true),
+            Change::AtRest => {
+                if !accuracy.tries_rest {
+                    return Ok(false);
+                }
+                trial.fill(0.0)?;
+                restore_pressures(problem.body, problem.state)?;
+                Ok(true)
+            }
+            Change::NotAtRest => {
+                if !accuracy.tries_rest {
+                    return Ok(false);
+                }
+                accuracy.fallbacks = self.first_fallbacks();
+                go_to(&self.first_start, problem, trial)?;
+                Ok(true)
+            }
             Change::DoublePrecision => {
                 if self.parts()?.solver.precision() != Some(Precision::Single) {
                     return Ok(false);
@@ -183,12 +207,11 @@ impl StepSolver {
             }
             Change::OnContacts => Ok(self.springs.are_needed() && self.start_on_contacts(problem, trial)?),
             Change::AllFallbacks => {
-                let Some(start) = self.first_start.as_ref().filter(|_| self.springs.are_needed()) else {
+                if !self.springs.are_needed() {
                     return Ok(false);
-                };
-                trial.copy_from(start)?;
-                restore_pressures(problem.body, problem.state)?;
+                }
                 accuracy.awaits_pressure = true;
+                go_to(&self.first_start, problem, trial)?;
                 Ok(true)
             }
             Change::Relaxed => {
@@ -317,7 +340,7 @@ impl StepSolver {
                 if softens {
                     // Newton's method tells where a body goes that softens, from the start of the step.
                     is_stable = false;
-                    self.go_to_start(problem, trial)?;
+                    go_to(&self.start, problem, trial)?;
                 }
             }
         }
@@ -424,16 +447,23 @@ impl StepSolver {
         // No rounding errors of a flight.
         let far = if self.springs.are_needed() { farthest(problem) } else { f64::INFINITY };
         let floor = Floor { slope, largest: (LARGEST_FLOOR * all).max(STAGNANT * product).min(slope * far) };
-        let is_held_by_contact = self.springs.are_needed();
+        let tries_rest = self.flowing.is_none()
+            && self.newton.as_ref().is_some_and(|newton| newton.properties(problem).may_be_solved_at_rest());
         Ok(Accuracy {
             tolerance,
             size: all,
             floor,
-            awaits_pressure: is_held_by_contact,
-            // Others start from elsewhere: without any pressure, the equations are singular.
-            fallbacks: if is_held_by_contact { FIRST_FALLBACKS } else { usize::MAX },
+            awaits_pressure: self.springs.are_needed(),
+            fallbacks: if tries_rest { 1 } else { self.first_fallbacks() },
+            tries_rest,
             reference,
         })
+    }
+
+    /// The number of fallbacks that are tried from the first start; where contact alone holds a body, others start from elsewhere: without
+    /// any pressure, the equations are singular.
+    fn first_fallbacks(&self) -> usize {
+        if self.springs.are_needed() { FIRST_FALLBACKS } else { usize::MAX }
     }
 
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
@@ -442,21 +472,9 @@ impl StepSolver {
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
     ) -> Result<()> {
-        self.go_to_start(problem, trial)?;
+        go_to(&self.start, problem, trial)?;
         self.precision = Precision::Double;
         self.refactor(problem)
-    }
-
-    /// Resets a step to the start that was kept. Collective.
-    fn go_to_start<const D: usize, const S: usize>(
-        &self,
-        problem: &mut StepProblem<'_, D, S>,
-        trial: &mut DistributedVector,
-    ) -> Result<()> {
-        if let Some(start) = &self.start {
-            trial.copy_from(start)?;
-        }
-        restore_pressures(problem.body, problem.state)
     }
 }
 
@@ -472,7 +490,6 @@ impl Accuracy {
         let [floor, hiding_floor] =
             if awaits_pressure { [Floor::default(), hiding(floor)] } else { [floor, Floor::default()] };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
-        let fallbacks = [0, fallbacks];
         System { matrix, right_hand_side, tolerance, floor, hiding_floor, fallbacks, converged, scales }
     }
 }
@@ -480,6 +497,18 @@ impl Accuracy {
 /// The residual below which these rounding errors may hide that nothing holds a body.
 fn hiding(Floor { slope, largest }: Floor) -> Floor {
     Floor { slope: HIDING * slope, largest: HIDING * largest }
+}
+
+/// Resets a step to a start that was kept. Collective.
+fn go_to<const D: usize, const S: usize>(
+    start: &Option<DistributedVector>,
+    problem: &mut StepProblem<'_, D, S>,
+    trial: &mut DistributedVector,
+) -> Result<()> {
+    if let Some(start) = start {
+        trial.copy_from(start)?;
+    }
+    restore_pressures(problem.body, problem.state)
 }
 
 /// Keeps a copy of a vector.
