@@ -32,11 +32,6 @@ impl Common {
         Self { words, colours, magnification, section: Vec::new() }
     }
 
-    /// The ends of the colour scale of the picture with this name, if it shows a difference.
-    pub fn range(&self, name: &str) -> Option<(f64, f64)> {
-        self.colours.get(name).copied()
-    }
-
     /// Whether the picture with this name shows a difference.
     pub fn has(&self, name: &str) -> bool {
         self.colours.contains_key(name)

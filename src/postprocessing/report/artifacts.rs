@@ -142,8 +142,13 @@ impl RunFiles {
 /// The numbers of the times of the field file that are drawn: evenly spaced, the last among them, fewer of a large body.
 pub(super) fn drawn_times(last: &Snapshot) -> Vec<usize> {
     let cells = (last.cells.len() / last.corners).max(1);
-    let end = last.times.len().saturating_sub(1);
-    match MOST.min(MOST_CELLS / cells).min(last.times.len()) {
+    evenly(last.times.len(), MOST.min(MOST_CELLS / cells))
+}
+
+/// Numbers of this many times out of all: evenly spaced, the last among them.
+pub(super) fn evenly(all: usize, most: usize) -> Vec<usize> {
+    let end = all.saturating_sub(1);
+    match most.min(all) {
         0 | 1 => vec![end],
         count => (0..count).map(|n| n * end / (count - 1)).collect(),
     }

@@ -30,10 +30,8 @@
   };
 
   // Colours of the pictures: from the smallest value to the largest, and of states.
-  const SHADES = "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21918c 1fa088 28ae80 3fbc73 5ec962 84d44b addc30 d8e219 fde725";
-  const STATES = "dddddd 56b4e9 0072b2 009e73 d55e00 cc79a7 e6a000 000000";
-  const colour = (text) => [0, 2, 4].map((at) => parseInt(text.slice(at, at + 2), 16));
-  const [shades, states] = [SHADES, STATES].map((all) => all.split(" ").map(colour));
+  const colour = (text) => [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16));
+  const [shades, states] = [data.shades, data.states].map((all) => all.map(colour));
   const shade = (share) => {
     const along = Math.min(Math.max(share, 0), 1) * 16, below = Math.min(Math.floor(along), 15);
     return [0, 1, 2].map((i) => shades[below][i] + (along - below) * (shades[below + 1][i] - shades[below][i]));

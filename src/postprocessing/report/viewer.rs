@@ -3,9 +3,10 @@
 //! Numbers are 16 bits between the least and the largest value of a field at all times, which shows four digits of a range.
 
 use super::{
-    artifacts::RunFiles,
+    artifacts::{RunFiles, evenly},
     body::{AtCorners, DrawnBody, Look},
-    common::{Common, is_uniform},
+    colour::{LINES, VIRIDIS, hex},
+    common::is_uniform,
     markup::escape,
     scale::extent,
 };
@@ -49,7 +50,7 @@ pub(super) fn viewer(found: &RunFiles, look: Look, side: Option<[f64; 3]>) -> Re
     let bodies: Vec<DrawnBody> =
         snapshots.iter().map(|snapshot| DrawnBody::new(snapshot).with_look(look)).collect();
     let common = DrawnBody::in_common("", &bodies.iter().collect::<Vec<_>>(), false);
-    let fields = fields(&surface, &bodies, &common);
+    let fields = fields(&surface, &bodies);
     if fields.is_empty() {
         return Ok(String::new());
     }
@@ -66,17 +67,10 @@ pub(super) fn viewer(found: &RunFiles, look: Look, side: Option<[f64; 3]>) -> Re
         "displacement": displacement(&surface, &snapshots),
         "fields": fields,
         "shown": shown,
+        "shades": (0..=16).map(|n| hex(VIRIDIS.at(f64::from(n) / 16.0))).collect::<Vec<_>>(),
+        "states": std::iter::once("#dddddd".to_owned()).chain(LINES.map(hex)).collect::<Vec<_>>(),
     });
     Ok(html(&data))
-}
-
-/// Numbers of this many times out of all: evenly spaced, the last among them.
-fn evenly(all: usize, most: usize) -> Vec<usize> {
-    let end = all.saturating_sub(1);
-    match most.min(all) {
-        0 | 1 => vec![end],
-        count => (0..count).map(|n| n * end / (count - 1)).collect(),
-    }
 }
 
 /// The faces of a body with vertices of their own: a node is one in each of its regions, so that values jump between these.
@@ -129,7 +123,7 @@ impl Surface {
 }
 
 /// The fields at all times, without those that are the same everywhere at all times.
-fn fields(surface: &Surface, bodies: &[DrawnBody], common: &Common) -> Vec<Value> {
+fn fields(surface: &Surface, bodies: &[DrawnBody]) -> Vec<Value> {
     let mut of_times: Vec<Vec<AtCorners>> = bodies.iter().map(DrawnBody::quantities).collect();
     let names: Vec<String> = of_times.last().into_iter().flatten().map(|field| field.name.clone()).collect();
     let mut fields = Vec::new();
@@ -152,7 +146,7 @@ fn fields(surface: &Surface, bodies: &[DrawnBody], common: &Common) -> Vec<Value
             continue;
         }
         let ranges = here.iter().filter_map(|field| field.range);
-        let (low, high) = common.range(&name).or_else(|| ranges.reduce(wider)).unwrap_or(ends);
+        let (low, high) = ranges.reduce(wider).unwrap_or(ends);
         let states = match name.as_str() {
             name if name == CONTACT_STATUS.name => Some(STATES_OF_CONTACT.map(String::from).to_vec()),
             name if name == BRANCH.name => Some((0..=most as usize).map(|n| n.to_string()).collect()),
@@ -247,10 +241,6 @@ mod tests {
         }
     }
 
-    fn drawn(surface: &Surface, bodies: &[DrawnBody]) -> Vec<Value> {
-        fields(surface, bodies, &DrawnBody::in_common("", &bodies.iter().collect::<Vec<_>>(), false))
-    }
-
     fn numbers(text: &Value) -> Vec<u16> {
         let bytes = BASE64_STANDARD.decode(text.as_str().expect("text")).expect("base64");
         bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect()
@@ -262,7 +252,7 @@ mod tests {
         let bodies: Vec<DrawnBody> = snapshots.iter().map(DrawnBody::new).collect();
         let surface = Surface::of(&bodies[0], &snapshots[0]);
         assert_eq!((surface.vertices.len(), &surface.faces[..]), (4, &[[0, 1, 2], [0, 2, 3]][..]));
-        let fields = drawn(&surface, &bodies);
+        let fields = fields(&surface, &bodies);
         assert_eq!(fields.len(), 1, "the speed is the same everywhere");
         assert_eq!((&fields[0]["name"], &fields[0]["place"]), (&json!("von_mises"), &json!("vertex")));
         assert_eq!((&fields[0]["least"], &fields[0]["most"]), (&json!(0.0), &json!(4.0)));
@@ -280,17 +270,14 @@ mod tests {
         let per_cell = Look { per_cell: true, ..Look::default() };
         let bodies = [DrawnBody::new(&snapshot).with_look(per_cell)];
         let surface = Surface::of(&bodies[0], &snapshot);
-        let drawn_field = &drawn(&surface, &bodies)[0];
-        assert_eq!(
-            (&drawn_field["place"], numbers(&drawn_field["values"][0])),
-            (&json!("face"), vec![0, NONE - 1])
-        );
+        let drawn = &fields(&surface, &bodies)[0];
+        assert_eq!((&drawn["place"], numbers(&drawn["values"][0])), (&json!("face"), vec![0, NONE - 1]));
         snapshot.fields.insert("region", vec![0.0, 1.0]);
         let bodies = [DrawnBody::new(&snapshot)];
         let surface = Surface::of(&bodies[0], &snapshot);
-        let drawn_field = &drawn(&surface, &bodies)[0];
-        assert_eq!(numbers(&drawn_field["values"][0]), [0, 0, 0, NONE - 1, NONE - 1, NONE - 1]);
-        assert_eq!(drawn_field["place"], "vertex");
+        let drawn = &fields(&surface, &bodies)[0];
+        assert_eq!(numbers(&drawn["values"][0]), [0, 0, 0, NONE - 1, NONE - 1, NONE - 1]);
+        assert_eq!(drawn["place"], "vertex");
     }
 
     #[test]
