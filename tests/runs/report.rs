@@ -45,7 +45,7 @@ fn files(folder: &Path, ending: &str) -> Vec<String> {
 #[track_caller]
 fn check_page(page: &Path) -> Vec<String> {
     let html = std::fs::read_to_string(page).expect("page");
-    assert!(html.len() < 4_000_000, "{} bytes", html.len());
+    assert!(html.len() < 3_000_000, "{} bytes", html.len());
     for outside in ["http:", "https:", "src=\"/", "url(/", "@import", "<script src"] {
         assert!(!html.contains(outside), "{outside}");
     }

@@ -25,8 +25,8 @@ use std::collections::BTreeMap;
 const SCRIPT: &str = include_str!("viewer.js");
 /// The most times.
 const MOST_TIMES: usize = 60;
-/// The most numbers of all fields at all times: 1.1 MB of the page.
-const MOST_NUMBERS: usize = 400_000;
+/// The most numbers of all fields at all times: 0.6 MB of the page.
+const MOST_NUMBERS: usize = 220_000;
 /// The most faces, which a browser still turns smoothly.
 const MOST_FACES: usize = 200_000;
 /// The most cells of all times together that are read.
