@@ -20,6 +20,7 @@ mod parts;
 mod phases;
 mod reactions;
 mod restored;
+mod rotation;
 mod scene;
 mod setup;
 mod sides;

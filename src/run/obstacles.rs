@@ -25,6 +25,10 @@ const TOO_DEEP: f64 = 0.01;
 
 /// The slip between bodies, as a share of the size of a facet, beyond which they no longer act on the surface that they face.
 const LARGEST_SLIP: f64 = 0.5;
+/// The change of gaps by motions along an obstacle, as a share of the body's size and of the spread of the normal displacements of the
+/// boundary, above which a warning is given.
+const ASTRAY: f64 = 1e-4;
+const LARGEST_SHIFT: f64 = 0.1;
 /// The angle in rad between a boundary and a plane above which a warning is given: the tangential force of a frictionless plane is then
 /// missing, more than 3 % of the pressure.
 const TILTED: f64 = 2.0 * std::f64::consts::PI / 180.0;
@@ -248,7 +252,8 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
-        let Closeness { penetration, held, slip, sharpness } = contact.closeness.of_all(session);
+        let Closeness { penetration, held, slip, sharpness, moved, shift, shift_to_spread } =
+            contact.closeness.of_all(session);
         let on = table.on.join(", ");
         if slip > LARGEST_SLIP && table.sliding == Sliding::Small {
             out.push(format!(
@@ -268,6 +273,13 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                 "contact.{number}: the obstacle moved up to {held:.3e} m beyond nodes of the boundary {on} that a support holds along \
                  the normal: a constraint has no contact force at these nodes, and contact forces do not include what the support would \
                  have to carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
+            ));
+        }
+        if shift > ASTRAY * size && shift_to_spread > LARGEST_SHIFT {
+            out.push(format!(
+                "contact.{number}: the boundary {on} moved up to {moved:.3e} m along its obstacle while it pressed on it, which changes \
+                 distances between them by up to {shift:.3e} m: gaps and normals are those of the undeformed body, without these changes; \
+                 move the obstacle in place of the body, or mesh it and use `against` with sliding = \"finite\""
             ));
         }
         let [translation, _] = &contact.obstacle.motions;

@@ -9,6 +9,7 @@ use super::{
     outputs::{Contents, Outputs, reaches},
     phases,
     restored::{candidates, restore},
+    rotation,
     setup::{Setup, setup},
     simulation::Prepared,
     step_line::{Short, ShownColumns, StepLine},
@@ -412,6 +413,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let Simulation { body, state, .. } = &self.simulation;
         let warnings =
             obstacles::warnings_of_run(self.session, self.job, body, state, result == Ok(Exit::Done));
+        let warnings = warnings.and_then(|mut warnings| {
+            warnings.extend(rotation::warning(self.session, body, state)?);
+            Ok(warnings)
+        });
         let warnings = self.session.agree(warnings).map(|warnings| {
             warnings.into_iter().for_each(|warning| self.log.warning(warning));
         });

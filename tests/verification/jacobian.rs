@@ -235,7 +235,8 @@ fn the_jacobian_of_contact_is_the_difference_of_residuals() {
     run_on(&[1, 2, 3], |world| compare(&world.session));
 }
 
-/// The change of nodal velocities at fixed unknowns with the velocity of an obstacle that rolls over the bottom of a body.
+/// The change of nodal velocities at fixed unknowns with the velocity of an obstacle that rolls over the bottom of a body, and the power of
+/// contact forces with its motion, which is their resultant.
 fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
     let (body, state) = body::<D, S>(session, whole, &[("left", Fix::Keyword(FixedDirections::All))], vec![]);
     let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
@@ -265,7 +266,7 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
     }
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
     contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");
-    contact.follow_obstacle(true);
+    contact.follow_obstacle(true).expect("followed");
     let start = [0.7, -3.0];
     let mut velocities_at = |[along, about]: [f64; 2]| {
         for (motion, velocity) in contact.obstacle.motions.iter_mut().zip([along, about]) {
@@ -276,12 +277,23 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
         contact.subtract_obstacle(&mut apart);
         let columns = Freedom::ALL.map(|freedom| {
             let mut column = vec![0.0; apart.len()];
-            contact.add_motion(freedom, &mut column);
-            if freedom == Freedom::Translation {
-                contact.add_sweep(&mut column).expect("swept");
-            }
+            contact.add_motion(freedom, &mut column).expect("a column");
             column
         });
+        let mut velocity: Vec<f64> = (0..apart.len()).map(|at| -1e-3 * ((3 * at + 1) as f64).sin()).collect();
+        contact.map(&mut velocity);
+        let mut forces = vec![0.0; apart.len()];
+        contact.add_forces(&velocity, &mut forces);
+        for freedom in Freedom::ALL {
+            let mut row = vec![0.0; apart.len()];
+            contact.add_material_motion(freedom, &mut row);
+            let power = row.iter().zip(&forces).map(|(row, force)| row * force).sum::<f64>();
+            let [power, resultant] = session.sum([power, contact.resultant(freedom, &velocity)]);
+            assert!(
+                (power - resultant).abs() < 1e-12 * resultant.abs() && resultant != 0.0,
+                "{D}D {freedom:?}"
+            );
+        }
         (apart, columns)
     };
     let h = 1e-4;

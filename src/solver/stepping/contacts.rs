@@ -75,18 +75,19 @@ pub(super) fn refuse_passage<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Keeps how near obstacles have come in the step just committed.
+/// Keeps how near obstacles have come in the step just committed. Collective.
 pub(super) fn keep_closeness<const D: usize, const S: usize>(
+    session: &Session,
     body: &mut Body<D, S>,
     state: &State,
 ) -> Result<()> {
-    let velocity = state.velocity.local()?;
-    let velocity = body.seen_by_contacts(&velocity);
-    body.contacts.iter_mut().for_each(|contact| contact.keep_closeness(&velocity));
-    if body.coupling.is_some() {
-        let displacement = state.displacement.local()?;
-        let displacement = body.seen_by_contacts(&displacement);
-        body.contacts.iter_mut().for_each(|contact| contact.keep_slip([&displacement, &velocity]));
+    let [velocity, displacement] = [&state.velocity, &state.displacement].map(DistributedVector::local);
+    let (velocity, displacement) = (velocity?, displacement?);
+    let [velocity, displacement] = [&velocity, &displacement].map(|values| body.seen_by_contacts(values));
+    for contact in &mut body.contacts {
+        contact.keep_closeness(&velocity);
+        contact.keep_slip([&displacement, &velocity]);
+        contact.keep_shift(session, [&displacement, &velocity])?;
     }
     Ok(())
 }

@@ -142,6 +142,9 @@ const RECURRENCE: f64 = 1e-3;
 /// A line search is stuck where residuals fall to more than this share in this number of iterations: its steps end at a corner of the graphs.
 const STUCK: f64 = 0.995;
 const STUCK_ITERATIONS: usize = 10;
+/// The same number for full steps with the same derivatives, the equations of which are linear: they are so nearly singular that their
+/// solution is none.
+const SETTLED_ITERATIONS: usize = 4;
 
 /// Forces of the cells in addition to `K v`, at velocities without ghost values.
 pub trait CellForces {
@@ -309,10 +312,18 @@ impl SolveCounts {
         (at + 1 < before.len()).then(|| before.len() - at)
     }
 
-    /// Whether residuals have hardly fallen in the last iterations.
-    fn is_stuck(&self) -> bool {
-        let last = self.sets.last_chunk::<{ STUCK_ITERATIONS + 1 }>();
-        last.is_some_and(|last| last[STUCK_ITERATIONS].residual > STUCK * last[0].residual)
+    /// Whether residuals have hardly fallen in this many iterations.
+    fn is_stuck(&self, iterations: usize) -> bool {
+        let mut last = self.sets.iter().rev();
+        let now = last.next();
+        let before = last.nth(iterations - 1);
+        now.zip(before).is_some_and(|(now, before)| now.residual > STUCK * before.residual)
+    }
+
+    /// Whether derivatives have stayed the same in this many iterations.
+    fn has_settled(&self, iterations: usize) -> bool {
+        let last = self.sets.len().checked_sub(iterations + 1).map(|from| &self.sets[from..]);
+        last.is_some_and(|last| last.iter().all(|set| set.derivatives == last[0].derivatives))
     }
 
     /// Whether the branches are those of the linearisation before.
@@ -385,7 +396,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         if self.obstacles.is_empty() {
             return Ok(());
         }
-        if self.cells.is_some() || self.obstacles.is_unsymmetric(self.contacts) {
+        if self.cells.is_some() || self.obstacles.is_unsymmetric() {
             let (matrix, cells) = (self.matrix, &mut self.cells);
             self.obstacles.linearise(self.session, self.contacts, |motion, forces| {
                 matrix.multiply(motion, forces)?;
@@ -462,16 +473,18 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
 
     fn gives_up(&self) -> bool {
         // Once the branches are those of the solution, few iterations remain, or rounding errors alone.
-        let has_settled =
-            self.counts.sets.last_chunk().is_some_and(|[one, other]| one.derivatives == other.derivatives);
-        let after = if has_settled { 0 } else { self.counts.least.1 };
+        let after = if self.counts.has_settled(1) { 0 } else { self.counts.least.1 };
         let is_lost = self.counts.coupled > 0 && self.scratch.residuals[0] > LOST * self.counts.least.0;
         let patience = match (self.scratch.is_hidden, is_lost) {
             (true, _) => HIDDEN_PATIENCE,
             (false, true) => self.patience.min(LOST_PATIENCE),
             (false, false) => self.patience,
         };
-        let is_stuck = !self.stop_at_cycles && self.counts.is_stuck();
+        let is_stuck = match self.stop_at_cycles {
+            false => self.counts.is_stuck(STUCK_ITERATIONS),
+            true if self.cells.is_some() => false,
+            true => self.counts.has_settled(SETTLED_ITERATIONS) && self.counts.is_stuck(SETTLED_ITERATIONS),
+        };
         is_stuck || self.counts.sets.len() >= patience.saturating_add(after)
     }
 
@@ -573,7 +586,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         let is_coupled =
             cells.as_ref().is_some_and(|cells| !cells.is_symmetric()) || frictions.any(Friction::is_coupled);
         let coupled = (may_couple && self.session.total(usize::from(is_coupled)) > 0)
-            || self.obstacles.is_unsymmetric(self.contacts);
+            || self.obstacles.is_unsymmetric();
         let mut operator = ReducedJacobian {
             matrix: self.matrix,
             cells,
@@ -799,10 +812,13 @@ mod tests {
     fn a_line_search_is_stuck_where_ten_iterations_lower_the_residual_by_less_than_half_a_per_cent() {
         let after = |ratio: f64| {
             let sets: Vec<[f64; 3]> = (0..11).map(|n| [f64::from(n), 0.0, ratio.powi(n)]).collect();
-            (counts(&sets).is_stuck(), counts(&sets[1..]).is_stuck())
+            (counts(&sets).is_stuck(10), counts(&sets[1..]).is_stuck(10))
         };
         assert_eq!(after(0.9999), (true, false));
         assert_eq!([0.999, 0.5, f64::NAN].map(after), [(false, false); 3]);
+        let settled = counts(&[[1.0, 0.0, 9.0], [2.0, 0.0, 9.0], [2.0, 0.0, 9.0], [2.0, 0.0, 9.0]]);
+        assert_eq!([1, 2, 3, 4].map(|n| settled.has_settled(n)), [true, true, false, false]);
+        assert_eq!([1, 3, 4].map(|n| settled.is_stuck(n)), [true, true, false]);
     }
 
     #[test]

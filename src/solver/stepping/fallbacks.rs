@@ -16,6 +16,8 @@ pub(super) struct Fallback {
 pub(super) enum Search {
     /// Full steps only.
     FullSteps,
+    /// The same, given up sooner.
+    FewFullSteps,
     /// Steps of half the length until the branches of the contact graphs stay the same.
     HalfSteps,
     /// Each step is shortened until the residual decreases enough.
@@ -36,7 +38,7 @@ pub(super) enum Search {
 impl Search {
     /// Whether each step leads to the solution of the linearised equations, or at first half of the way there.
     pub(super) fn follows_branches(self) -> bool {
-        matches!(self, Self::FullSteps | Self::HalfSteps)
+        matches!(self, Self::FullSteps | Self::FewFullSteps | Self::HalfSteps)
     }
 
     /// Whether steps lower an energy.
@@ -87,7 +89,9 @@ impl Properties {
     /// falls faster with the sliding speed than the body resists, bounds follow the speeds from one solution to the next.
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         use FrictionIteration::{FixedPoint, Newton};
-        use Search::{Backtracking, Descent, Equilibrated, Falling, FullSteps, HalfSteps, Yielding};
+        use Search::{
+            Backtracking, Descent, Equilibrated, Falling, FewFullSteps, FullSteps, HalfSteps, Yielding,
+        };
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
         let rubs = self.rubs();
@@ -96,8 +100,8 @@ impl Properties {
             (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
             (follows_bounds && rubs, HalfSteps, 1.0, Newton),
-            (rubs && follows_bounds, FullSteps, 10.0, Newton),
-            (rubs && follows_bounds, FullSteps, 100.0, Newton),
+            (rubs && follows_bounds, FewFullSteps, 10.0, Newton),
+            (rubs && follows_bounds, FewFullSteps, 100.0, Newton),
             (turns, Yielding, 1.0, FixedPoint),
             (follows_bounds && self.flows, Backtracking, 1.0, Newton),
             (follows_bounds, Equilibrated, 1.0, Newton),
@@ -202,7 +206,7 @@ mod tests {
         assert_eq!(found.iter().filter(|search| **search == Search::Yielding).count(), 1);
         let coulomb = Properties { has_friction: true, follows_pressure: true, ..FRICTIONLESS };
         let tresca = Properties { has_friction: true, ..FRICTIONLESS };
-        let next = [Search::HalfSteps, Search::FullSteps, Search::FullSteps, Search::Yielding];
+        let next = [Search::HalfSteps, Search::FewFullSteps, Search::FewFullSteps, Search::Yielding];
         assert!([coulomb, tresca].into_iter().all(|friction| searches(friction)[1..5] == next));
         let resting = |properties: Properties| properties.may_be_solved_at_rest();
         assert!(resting(Properties { may_rest: true, ..tresca }) && !resting(tresca));

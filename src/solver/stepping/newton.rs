@@ -74,6 +74,9 @@ const DESCENT_REDUCTION: f64 = 1e-6;
 /// Fixed-point iterations after which an attempt fails.
 const MAX_FIXED_POINT_ITERATIONS: usize = 200;
 
+/// As [`PATIENCE`], where other searches are more promising than the last iterations of this one.
+const LITTLE_PATIENCE: usize = 25;
+
 /// As [`PATIENCE`], where cells flow: shorter steps then take fewer iterations.
 const PATIENCE_OF_FLOW: usize = 10;
 
@@ -407,6 +410,7 @@ impl Newton {
             Search::FullSteps if limit >= PATIENCE && sharpness == 1.0 => {
                 [most, if self.flow.is_some() { PATIENCE_OF_FLOW } else { PATIENCE }]
             }
+            Search::FewFullSteps => [most, LITTLE_PATIENCE],
             _ => [limit, usize::MAX],
         };
         self.counts.restart_search();

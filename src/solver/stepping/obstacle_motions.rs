@@ -3,15 +3,15 @@
 //! With the unknowns of nodes relative to their obstacles (`fem/effect/contact/driven.rs`) a step is
 //!
 //! ```text
-//! r = K v + C(x) - b = 0,   v = V(x) + N w
+//! r = K v + C(x) - b = 0,   v = V(x) + M w
 //! f = m (w - w~) / k' - F - N . C(x) = 0
 //! ```
 //!
 //! for the velocities `w` of the motions: a row and a column each beside those of the nodes. `f` is evaluated in the sum `f + N . r`, in
-//! which the contact forces cancel: with `s = m / k' + N . K N` it is `s w + N . K V(x)` but for known terms, symmetric with the rest, and
-//! not small where a light obstacle rests on a stiff body. Of each residual `w` is eliminated by this sum, and so it is of the linear
-//! equations of a Newton iteration, whose matrix is `K - K N s^-1 N . K` and the slopes of the laws. The nodal residual is then the only
-//! one; where it vanishes, so does `f`.
+//! which the contact forces cancel: with `s = m / k' + N . K M` it is `s w + N . K V(x)` but for known terms, symmetric with the rest where
+//! `N = M`, and not small where a light obstacle rests on a stiff body. Of each residual `w` is eliminated by this sum, and so it is of the
+//! linear equations of a Newton iteration, whose matrix is `K - K M s^-1 N . K` and the slopes of the laws. The nodal residual is then the
+//! only one; where it vanishes, so does `f`.
 //!
 //! An obstacle without mass that touches nothing has no equation for its velocity. It is moved until its force presses it against the body.
 
@@ -43,6 +43,8 @@ pub struct ObstacleMotions {
     motions: Vec<Motion>,
     /// `s` by rows.
     slopes: Vec<f64>,
+    /// Whether some motion changes nodal velocities otherwise than the velocities work against forces on the obstacle.
+    is_unsymmetric: bool,
     /// The residual norm in N at which the nodal equations count as solved.
     tolerance: f64,
     /// A contact that has touched although its unknowns do not follow the obstacle.
@@ -66,7 +68,7 @@ struct Motion {
     place: (usize, Freedom),
     /// `N`.
     velocities: DistributedVector,
-    /// The change of nodal velocities with that of the motion, which is `N` unless the obstacle rolls.
+    /// `M`.
     column: DistributedVector,
     /// `K` times the column, with the derivatives of forces of cells.
     forces: DistributedVector,
@@ -126,7 +128,7 @@ impl ObstacleMotions {
     ) -> Result<bool> {
         if let Some(contact) = self.parted.take() {
             self.may_part = false;
-            contacts[contact].follow_obstacle(false);
+            session.agree(contacts[contact].follow_obstacle(false))?;
             for freedom in Freedom::ALL {
                 let Some(motion) = &mut contacts[contact].obstacle.motions[freedom as usize] else {
                     continue;
@@ -138,7 +140,7 @@ impl ObstacleMotions {
             }
             session.agree(contacts[contact].place_obstacle())?;
         } else if let Some(contact) = self.touched.take() {
-            contacts[contact].follow_obstacle(true);
+            session.agree(contacts[contact].follow_obstacle(true))?;
         } else {
             return Ok(false);
         }
@@ -185,7 +187,7 @@ impl ObstacleMotions {
                 freedom == Freedom::Translation && contacts[contact].normal.approach().has_stops();
             (motion.has_stops, motion.stop) = (session.total(usize::from(has_stops)) > 0, None);
             motion.velocities.fill(0.0)?;
-            contacts[contact].add_motion(freedom, &mut motion.velocities.owned_mut()?);
+            contacts[contact].add_material_motion(freedom, &mut motion.velocities.owned_mut()?);
             motion.size = motion.velocities.norm()?;
         }
         if self.is_empty() {
@@ -203,20 +205,33 @@ impl ObstacleMotions {
         mut multiply: impl FnMut(&DistributedVector, &mut DistributedVector) -> Result<()>,
     ) -> Result<()> {
         let count = self.motions.len();
-        for Motion { place: (contact, freedom), velocities, column, forces, .. } in &mut self.motions {
-            column.copy_from(velocities)?;
-            if *freedom == Freedom::Translation && contacts[*contact].rolls() {
-                let added = contacts[*contact].add_sweep(&mut column.owned_mut()?);
-                session.agree(added)?;
-            }
+        session.agree(self.write_columns(contacts))?;
+        for Motion { column, forces, .. } in &mut self.motions {
             multiply(column, forces)?;
         }
         self.work.clear();
         for (row, column) in (0..count * count).map(|at| (at / count, at % count)) {
             self.work.push(own_dot(&self.motions[row].velocities, &self.motions[column].forces)?);
         }
+        for Motion { velocities, column, .. } in &self.motions {
+            self.work.push(square_of_difference(velocities, column)?);
+            self.work.push(own_dot(column, column)?);
+        }
         session.sum_lists_into(&self.work, &mut self.slopes);
+        let differences = self.slopes[count * count..].as_chunks().0.iter();
+        self.is_unsymmetric =
+            { differences }.any(|[difference, size]| *difference > PARALLEL * PARALLEL * size);
+        self.slopes.truncate(count * count);
         (0..count).for_each(|at| self.slopes[at * count + at] += self.motions[at].inertia);
+        Ok(())
+    }
+
+    /// Writes the columns of the motions.
+    fn write_columns<const D: usize>(&mut self, contacts: &[Contact<D>]) -> Result<()> {
+        for Motion { place: (contact, freedom), column, .. } in &mut self.motions {
+            column.fill(0.0)?;
+            contacts[*contact].add_motion(*freedom, &mut column.owned_mut()?)?;
+        }
         Ok(())
     }
 
@@ -472,8 +487,8 @@ impl ObstacleMotions {
     }
 
     /// Whether a motion changes nodal velocities otherwise than the velocities work against forces on the obstacle.
-    pub(super) fn is_unsymmetric<const D: usize>(&self, contacts: &[Contact<D>]) -> bool {
-        self.motions.iter().any(|motion| contacts[motion.place.0].rolls())
+    pub(super) fn is_unsymmetric(&self) -> bool {
+        self.is_unsymmetric
     }
 
     /// The reason why the motions are not solved, given the norm of the nodal residual in N and the relative tolerance of steps.
@@ -492,6 +507,10 @@ impl ObstacleMotions {
         Some(text + " N or N m remain")
     }
 }
+
+/// The difference of row and column relative to the column below which the system is symmetric but for rounding errors of the derivatives
+/// of gaps.
+const PARALLEL: f64 = 1e-5;
 
 /// The changes of a velocity that nothing limits.
 const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
@@ -536,7 +555,8 @@ fn find_contacts<const D: usize>(
         if let Some(change) = along.as_ref().map(LoadedMotion::change_to_free) {
             touches |= approach.change_to_touch(&velocity, change.signum()) <= change.abs();
         }
-        contact.follow_obstacle(session.total(usize::from(touches)) > 0);
+        let touches = session.total(usize::from(touches)) > 0;
+        session.agree(contact.follow_obstacle(touches))?;
         contact.follow_along_tangents(session, &velocity);
     }
     Ok(())
@@ -545,6 +565,11 @@ fn find_contacts<const D: usize>(
 /// The part of a scalar product on this rank.
 fn own_dot(one: &DistributedVector, other: &DistributedVector) -> Result<f64> {
     Ok(one.owned()?.iter().zip(&*other.owned()?).map(|(a, b)| a * b).sum())
+}
+
+/// The part of the square of the norm of a difference on this rank.
+fn square_of_difference(one: &DistributedVector, other: &DistributedVector) -> Result<f64> {
+    Ok(one.owned()?.iter().zip(&*other.owned()?).map(|(a, b)| (a - b) * (a - b)).sum())
 }
 
 /// Replaces the right-hand side by the solution of equations with this matrix, given by rows; by 0 where a row has no entries.

@@ -477,7 +477,7 @@ impl Stepper {
         self.find_temperature(session, body, state, step)?;
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
-        keep_closeness(body, state)?;
+        keep_closeness(session, body, state)?;
         body.commit();
         drop(stage);
         let balancing = Instant::now();

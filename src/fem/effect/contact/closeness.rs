@@ -13,11 +13,20 @@ pub struct Closeness {
     pub slip: f64,
     /// Largest angle in rad of edges of another body over points with contact pressure.
     pub sharpness: f64,
+    /// Largest distance in m by which a point with contact pressure had moved along an obstacle.
+    pub moved: f64,
+    /// Largest change in m of the gap of such a point by that.
+    pub shift: f64,
+    /// The same as a share of the spread of the normal displacements of the boundary.
+    pub shift_to_spread: f64,
 }
+
+/// How many numbers these are.
+const COUNT: usize = 7;
 
 impl Default for Closeness {
     fn default() -> Self {
-        Self::of([f64::NEG_INFINITY; 4])
+        Self::of([f64::NEG_INFINITY; COUNT])
     }
 }
 
@@ -28,8 +37,9 @@ impl Closeness {
     }
 
     /// All of them.
-    fn numbers(self) -> [f64; 4] {
-        [self.penetration, self.held, self.slip, self.sharpness]
+    fn numbers(self) -> [f64; COUNT] {
+        let Self { penetration, held, slip, sharpness, moved, shift, shift_to_spread } = self;
+        [penetration, held, slip, sharpness, moved, shift, shift_to_spread]
     }
 
     /// The one over all ranks. Collective.
@@ -38,8 +48,8 @@ impl Closeness {
     }
 
     /// The one with these numbers.
-    fn of([penetration, held, slip, sharpness]: [f64; 4]) -> Self {
-        Self { penetration, held, slip, sharpness }
+    fn of([penetration, held, slip, sharpness, moved, shift, shift_to_spread]: [f64; COUNT]) -> Self {
+        Self { penetration, held, slip, sharpness, moved, shift, shift_to_spread }
     }
 
     /// From the numbers of a checkpoint.

@@ -1,24 +1,33 @@
 //! A contact whose obstacle a force moves or a moment turns, in the equations of Newton's method.
 //!
 //! The velocities `w` of these motions are unknowns beside those of the nodes. The unknowns of the points are relative to the obstacle:
-//! along the normal `n` of the body to `q . n (w - w_0)`, where `q` is the velocity of the obstacle's material at `w = 1` and `w_0` that from
-//! which the step starts, and along the tangents to `q w`. Velocities of nodes at fixed unknowns change by `N w`, and the resultant of
-//! nodal contact forces `C` is `N . C` ([`Contact::add_motion`]): a row and a column of a symmetric system. Where an obstacle rolls, the
-//! column also has the change of the places that touch ([`Contact::add_sweep`]), and the system is unsymmetric. Tractions at fixed unknowns
-//! do not change with `w` where the normals of body and obstacle are parallel; elsewhere the gap changes by a different amount, and
-//! pressures have moments about the centre of a round obstacle. Both are small, exact in residuals, and left out of derivatives. Pressures
-//! at points that supports hold depend on `w` alone ([`Contact::held_stiffness`]).
+//! along the normal `n` of the body to the velocity at which the gap grows with `w - w_0`, where `w_0` is that from which the step starts,
+//! and along the tangents to `q w`, where `q` is the velocity of the obstacle's material at `w = 1`. Tractions at fixed unknowns hardly
+//! change with `w`. The resultant of nodal contact forces `C` is `N . C` with the velocities `N` of the nodes that move with the material
+//! ([`Contact::add_material_motion`]), and velocities of nodes at fixed unknowns change by `M w` ([`Contact::add_motion`]): a row and a
+//! column of the system. Where the normals of body and obstacle are parallel `N = M`, and the system is symmetric; elsewhere the gap grows
+//! otherwise than the material moves along `n`, pressures have moments about the centre of a round obstacle, and where it rolls, other
+//! places touch. The changes of that growth and of the moments within a step are small, exact in residuals, and left out of derivatives. Pressures at
+//! points that supports hold depend on `w` alone ([`Contact::held_stiffness`]).
 
 use super::{
     Contact,
     loaded_obstacle::Freedom,
     point::{Point, Unknown, Vectors::Newton},
+    tangential_point::TangentialPoint,
 };
 use crate::{
     error::Result,
     linear_algebra::tensor::{add_scaled, dot, larger, norm},
     parallel::session::Session,
 };
+use std::ops::Range;
+
+/// The differences of the velocities of gap and material along the normal, relative to the velocity of an obstacle, of points that it may
+/// touch.
+const INCLINATIONS: Range<f64> = 1e-8..0.5;
+/// The normal component of the velocity of an obstacle that turns, relative to the velocity, at such points.
+const NEARLY_TANGENTIAL: f64 = 0.2;
 
 impl<const D: usize> Contact<D> {
     /// Evaluates gaps and velocities of the obstacle after its velocities have been set.
@@ -27,27 +36,31 @@ impl<const D: usize> Contact<D> {
         if !obstacle.is_driven() || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
-        let change = obstacle.change();
         for point in self.normal.points.iter_mut().filter(|_| obstacle.moves()) {
-            let seen = obstacle.seen_after(&point.place);
-            point.set_gap(obstacle.gap.of_moved(obstacle.rate.time, &seen, &point.normal, point.moved)?);
-            point.carried = point.follows * change;
+            point.set_gap(obstacle.reach_from(point, &obstacle.seen_after(&point.place))?);
+            point.carried = point.follows * obstacle.change();
         }
         self.set_obstacle_velocities(self.obstacle.rate)
     }
 
     /// Sets whether the unknowns are relative to the motion of the obstacle: not if they are apart in the whole step.
-    pub fn follow_obstacle(&mut self, follows: bool) {
-        let obstacle = &mut self.obstacle;
-        if !obstacle.moves() {
-            return;
+    pub fn follow_obstacle(&mut self, follows: bool) -> Result<()> {
+        if !self.obstacle.moves() {
+            return Ok(());
         }
-        let change = obstacle.change();
-        obstacle.follows = follows;
+        self.obstacle.follows = follows;
+        let obstacle = &self.obstacle;
         for point in &mut self.normal.points {
-            point.follows = if follows && point.can_touch() { point.along_obstacle } else { 0.0 };
-            point.carried = point.follows * change;
+            point.follows = 0.0;
+            if follows && point.may_follow() {
+                let growth = obstacle.growth(point)?;
+                // Where a ray grazes the obstacle, its gap grows fast, but they do not touch. Less is an error of the difference.
+                let is_inclined = INCLINATIONS.contains(&(growth - point.along_obstacle).abs());
+                point.follows = if is_inclined { growth } else { point.along_obstacle };
+            }
+            point.carried = point.follows * obstacle.change();
         }
+        Ok(())
     }
 
     /// Lets the unknowns along the tangents follow the obstacle at points that touch, or are no farther from it than the deepest point is
@@ -87,26 +100,6 @@ impl<const D: usize> Contact<D> {
             .any(|point| point.traction != [0.0; D])
     }
 
-    /// Adds to [`add_motion`](Self::add_motion) of a translation the change of the velocities at points with friction where the obstacle
-    /// also turns.
-    pub fn add_sweep(&self, nodal: &mut [f64]) -> Result<()> {
-        let friction = self.friction.iter().flat_map(|friction| &friction.points);
-        for point in friction.filter(|point| self.obstacle.follows && point.follows) {
-            point.add(
-                Newton,
-                1.0,
-                &point.free_part(&self.obstacle.sweep(point.at, &self.normal.points[point.at])?),
-                nodal,
-            );
-        }
-        Ok(())
-    }
-
-    /// Whether its obstacle moves along a direction and turns.
-    pub fn rolls(&self) -> bool {
-        self.friction.is_some() && self.obstacle.moves() && self.obstacle.turns()
-    }
-
     /// Subtracts from nodal velocities those of the obstacle that they follow.
     pub fn subtract_obstacle(&self, values: &mut [f64]) {
         for point in self.normal.points.iter().filter(|point| point.unknown == Unknown::Parameter) {
@@ -129,19 +122,49 @@ impl<const D: usize> Contact<D> {
         self.normal.points.iter().filter(|point| point.can_touch()).map(speed).fold(0.0, larger)
     }
 
-    /// Adds the change of nodal velocities, a vector of Newton's method, with the velocity of a motion at fixed unknowns.
-    pub fn add_motion(&self, freedom: Freedom, nodal: &mut [f64]) {
-        if !self.obstacle.follows {
-            return;
+    /// Adds the nodal velocities, a vector of Newton's method, of a body whose points move with the material of the obstacle that they
+    /// face, for the unit velocity of a motion.
+    pub fn add_material_motion(&self, freedom: Freedom, nodal: &mut [f64]) {
+        for (at, point) in self.following() {
+            let carrying = self.obstacle.carrying(freedom, at);
+            let along = dot(&point.normal, &carrying);
+            // Pressures far from where a round obstacle touches have no moment, because there are none.
+            if freedom == Freedom::Translation || along.abs() < NEARLY_TANGENTIAL * norm(&carrying) {
+                point.add_along(Newton, along / point.free_length, nodal);
+            }
         }
-        let parameters = self.normal.points.iter().filter(|point| point.unknown == Unknown::Parameter);
-        for point in parameters.filter(|_| freedom == Freedom::Translation) {
-            point.add_along(Newton, point.follows / point.free_length, nodal);
-        }
-        let tangential = self.friction.iter().flat_map(|friction| &friction.points);
-        for point in tangential.filter(|point| point.follows) {
+        for point in self.rubbing() {
             point.add(Newton, 1.0, &point.free_part(&self.obstacle.carrying(freedom, point.at)), nodal);
         }
+    }
+
+    /// Adds the change of nodal velocities, a vector of Newton's method, with the velocity of a motion at fixed unknowns.
+    pub fn add_motion(&self, freedom: Freedom, nodal: &mut [f64]) -> Result<()> {
+        let translates = freedom == Freedom::Translation;
+        for (_, point) in self.following().filter(|_| translates) {
+            point.add_along(Newton, point.follows / point.free_length, nodal);
+        }
+        for point in self.rubbing() {
+            let mut change = self.obstacle.carrying(freedom, point.at);
+            if translates && self.obstacle.turns() {
+                let sweep = self.obstacle.sweep(point.at, &self.normal.points[point.at])?;
+                change = add_scaled(&change, 1.0, &sweep);
+            }
+            point.add(Newton, 1.0, &point.free_part(&change), nodal);
+        }
+        Ok(())
+    }
+
+    /// The points whose unknowns along the normal are relative to the obstacle, with their numbers.
+    fn following(&self) -> impl Iterator<Item = (usize, &Point<D>)> {
+        let points = self.normal.points.iter().enumerate();
+        points.filter(|(_, point)| self.obstacle.follows && point.may_follow())
+    }
+
+    /// The points whose unknowns along the tangents are relative to the obstacle.
+    fn rubbing(&self) -> impl Iterator<Item = &TangentialPoint<D>> {
+        let friction = self.friction.iter().flat_map(|friction| &friction.points);
+        friction.filter(|point| self.obstacle.follows && point.follows)
     }
 
     /// The resultant of the tractions on the obstacle for a motion, in N or N m, of points on this rank at these velocities, a vector of

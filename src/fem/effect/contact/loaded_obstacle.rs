@@ -33,7 +33,7 @@ pub const OBSTACLE_NUMERICAL: EnergyKind =
     EnergyKind::new(13, Role::Numerical, "obstacle_numerical_dissipation");
 
 /// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
-const NEAR: f64 = 1e-6;
+const NEAR: f64 = 1e-5;
 
 /// A degree of freedom of an obstacle, in the order of lists of its motions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -214,6 +214,26 @@ impl<const D: usize> Obstacle<D> {
         Ok(point.stretch * self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
     }
 
+    /// The gap in m of a point of the undeformed surface without wear from an obstacle that it sees at `seen`, after the point has moved.
+    pub(super) fn reach_from(&self, point: &Point<D>, seen: &Vector<D>) -> Result<f64> {
+        self.gap.of_moved(self.rate.time, seen, &point.normal, point.moved)
+    }
+
+    /// The velocity at which the gap of a point at the end of the step grows with that of a translation.
+    pub(super) fn growth(&self, point: &Point<D>) -> Result<f64> {
+        let Some((direction, way)) = self.translation() else { return Ok(0.0) };
+        let away = norm(&add_scaled(&point.place, -1.0, &self.gap.centre(self.rate.time)));
+        let distance = NEAR * larger(away, point.reach.abs());
+        Ok(self.growth_along(point, direction, distance)? * way / point.context.step_length)
+    }
+
+    /// By how much the gap of a point grows, relative to a short `distance` in m by which the obstacle moves to and fro along a direction.
+    fn growth_along(&self, point: &Point<D>, direction: &Vector<D>, distance: f64) -> Result<f64> {
+        let seen = self.seen_after(&point.place);
+        let reach = |way: f64| self.reach_from(point, &add_scaled(&seen, -way, direction));
+        Ok((reach(distance)? - reach(-distance)?) / (2.0 * distance))
+    }
+
     /// Sets the places at which the rays along the normals of the points meet it if a moment turns it, relative to its centre; zero where
     /// they do not meet it. Where laws take means over the step, those in its middle.
     pub(super) fn set_arms(&mut self, points: &[Point<D>]) {
@@ -254,15 +274,7 @@ impl<const D: usize> Obstacle<D> {
         let (Some((direction, way)), true) = (self.translation(), point.reach < f64::INFINITY) else {
             return Ok([0.0; D]);
         };
-        let seen = self.seen_after(&point.place);
-        let distance = NEAR * norm(&self.arms[at]);
-        let reach = self.gap.of_moved(
-            self.rate.time,
-            &add_scaled(&seen, -distance, direction),
-            &point.normal,
-            point.moved,
-        )?;
-        let slope = (reach - point.reach) / distance;
+        let slope = self.growth_along(point, direction, NEAR * norm(&self.arms[at]))?;
         let rate = add_scaled(&direction.map(|x| -x), slope, &point.normal);
         let share = if point.context.mean_from.is_none() { way } else { 0.5 * way };
         let velocity = self.turning_velocity(&rate);

@@ -101,8 +101,9 @@ pub(super) struct Point<const D: usize> {
     pub reach: f64,
     /// Normal displacement in m of the surface without wear at the start of the step.
     pub moved: f64,
-    /// Where a force moves the obstacle: the ratio of the normal velocity to that of the obstacle at which the gap stays as it is, and this
-    /// velocity in m/s for the change of that of the obstacle since the start of the step. The unknown along the normal is relative to it.
+    /// Where a force moves the obstacle: the ratio of the normal velocity to that of the obstacle at which the penetration stays as it is,
+    /// and this velocity in m/s for the change of that of the obstacle since the start of the step. The unknown along the normal is relative
+    /// to it.
     pub follows: f64,
     pub carried: f64,
     /// The component of the normal along the direction in which a force moves the obstacle; 0 without such a force.
@@ -424,6 +425,11 @@ impl<const D: usize> Point<D> {
         let before = self.penetration_before;
         let before = if before.is_finite() { self.moved - before } else { self.moved + self.worn[0] };
         self.growth = gap - before;
+    }
+
+    /// Whether its unknown along the normal may be relative to an obstacle that a force moves.
+    pub(super) fn may_follow(&self) -> bool {
+        self.unknown == Unknown::Parameter && self.can_touch()
     }
 
     /// The point of the law's graph for the unknown `along` the direction.

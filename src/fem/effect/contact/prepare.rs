@@ -65,7 +65,7 @@ impl<const D: usize> Contact<D> {
         if self.normal.law.damping() > 0.0 {
             self.set_depths_before(time_before - step.previous_length)?;
         }
-        self.follow_obstacle(true);
+        self.follow_obstacle(true)?;
         let recent = [time_before, blend.recent / step_length];
         let earlier = [time_before - step.previous_length, blend.earlier / step_length];
         self.set_obstacle_velocities(Rate { time, before: [recent, earlier] })

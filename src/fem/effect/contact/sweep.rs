@@ -12,7 +12,11 @@ use crate::{
     fem::{effect::Step, pairs::PairedNode, space::Held},
     laws::contact::{Gap, Sweep},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
+    parallel::session::Session,
 };
+
+/// A displacement of this share of the body's size is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Penetration at nodes that supports hold, as a share of the body's size, from which on an obstacle counts as beyond them.
 pub const OVERRUN: f64 = 1e-6;
@@ -178,6 +182,38 @@ impl<const D: usize> Contact<D> {
                 *sharpness = larger(*sharpness, point.sharpness);
             }
         }
+    }
+
+    /// Keeps how far points with pressure have moved along an obstacle until the step just solved, and what that changes at their gaps, which
+    /// are those of the undeformed body; at displacements and velocities at its end. Collective.
+    pub fn keep_shift(&mut self, session: &Session, [displacement, velocity]: [&[f64]; 2]) -> Result<()> {
+        let is_given = matches!(self.obstacle.gap, Gap::Distance(_));
+        if self.is_paired || is_given || !self.normal.law.depends_on_displacement() {
+            return Ok(());
+        }
+        let mut most = [f64::NEG_INFINITY; 4];
+        for point in &self.normal.points {
+            let along = point.normal_component(Body, displacement);
+            let (mut moved, mut shift) = (0.0, 0.0);
+            if point.pressure_at(&self.normal.law, Body, velocity) != 0.0 {
+                let whole = std::array::from_fn(|i| displacement[point.node() * D + i]);
+                let tangential = along_surface(point, &whole);
+                let seen = self.obstacle.seen_after(&add_scaled(&point.place, 1.0, &tangential));
+                moved = norm(&tangential);
+                shift = (self.obstacle.reach_from(point, &seen).unwrap_or(f64::INFINITY) - point.reach).abs();
+                shift = if shift.is_finite() { shift } else { moved };
+            }
+            for (most, value) in most.iter_mut().zip([moved, shift, -along, along]) {
+                *most = larger(*most, value);
+            }
+        }
+        let [moved, shift, lowest, highest] = session.largest(most);
+        let spread = (lowest + highest).max(ROUNDING * self.normal.body_size);
+        let kept = &mut self.closeness;
+        kept.moved = larger(kept.moved, moved);
+        kept.shift = larger(kept.shift, shift);
+        kept.shift_to_spread = larger(kept.shift_to_spread, shift / spread);
+        Ok(())
     }
 
     /// How the points stand to the other body along which they slide, at displacements that are relative to it.
