@@ -191,7 +191,7 @@ pub(super) fn transfer<const D: usize, const S: usize>(
     }
     words += &handover.words();
     let warning = match handover.warning() {
-        None => imbalance(session, body, state, loaded.job.time.step)?,
+        None => imbalance(session, body, state, (&found.acceleration, loaded.job.time.step))?,
         released => released,
     };
     Ok(Some(StartState { digest: found.digest, words, warning }))

@@ -266,7 +266,7 @@ pub fn restore<const D: usize, const S: usize>(
 }
 
 /// The part of the state of another run that this job can use.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct Transferred {
     /// The digest of the checkpoint.
     pub digest: String,
@@ -279,6 +279,8 @@ pub struct Transferred {
     /// Histories and motions of obstacles of this job that the checkpoint does not have.
     pub at_rest: Vec<String>,
     /// The keys of that run's job that affect the results, with their values.
+    /// Mean acceleration in m/s^2 in its last step; 0 if it took none.
+    pub acceleration: DistributedVector,
     pub physics: BTreeMap<String, String>,
 }
 
@@ -301,6 +303,7 @@ pub fn transfer<const D: usize, const S: usize>(
     if let Some(previous) = &mut state.previous_displacement {
         previous.copy_from(&state.displacement)?;
         previous.update_ghosts()?;
+    let acceleration = last_acceleration::<D>(&saved, header.step_length, state)?;
     }
     if body.paired_displacement.is_some() {
         // What was in contact stays paired as it was: under small sliding without any displacement.
@@ -347,8 +350,15 @@ pub fn transfer<const D: usize, const S: usize>(
         dropped.push("initial stress of materials without viscoplasticity".into());
     }
     let digest = session.agree(state_digest(path))?;
-    let (step, time) = (header.step, header.time);
-    let mut found = Transferred { digest, step, time, dropped, at_rest, physics: BTreeMap::new() };
+    let mut found = Transferred {
+        digest,
+        step: header.step,
+        time: header.time,
+        acceleration,
+        dropped,
+        at_rest,
+        physics: BTreeMap::new(),
+    };
     transfer_motions(&header, physics, body, &mut found);
     found.physics = header.physics;
     Ok(found)
@@ -359,6 +369,17 @@ fn surfaces_in_contact(physics: &BTreeMap<String, String>) -> Vec<(&String, &Str
     let is_surface = |key: &str| {
         key.starts_with("contact.")
             && ["on", "against", "where", "closed"].contains(&key.rsplit('.').next().unwrap_or_default())
+/// The mean acceleration of a step of this length in s, with which a saved state came to the velocity already read into `state`. Collective.
+fn last_acceleration<const D: usize>(saved: &Saved, length: f64, state: &State) -> Result<DistributedVector> {
+    let mut acceleration = state.velocity.like()?;
+    if length > 0.0 {
+        saved.fill::<D>(PREVIOUS_VELOCITY, &mut acceleration)?;
+        let (mut values, velocity) = (acceleration.local_mut()?, state.velocity.local()?);
+        values.iter_mut().zip(velocity.iter()).for_each(|(value, now)| *value = (now - *value) / length);
+    }
+    Ok(acceleration)
+}
+
     };
     physics.iter().filter(|(key, _)| is_surface(key)).collect()
 }
