@@ -113,6 +113,9 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if totals.energy_imbalance > BALANCED && !body.has_form(Form::Mass) {
             totals.allow_rounding(rounding(session, body, state, outcome.residual)?, &before);
         }
+        if totals.heat_imbalance > BALANCED {
+            totals.allow_rounding_of_heat(scheme.rounding_of_heat(session, body)?, &before);
+        }
         totals.single_precision_failed |=
             was_single && scheme.solver.factor_precision() == Some(Precision::Double);
         // The largest contact pressure under slip weakening, which the certificate bounds.

@@ -185,9 +185,7 @@ impl Totals {
 
     /// Takes rounding errors in J of energies that cancel out of the imbalance of the step just added; these are the totals `before` it.
     pub fn allow_rounding(&mut self, rounding: f64, before: &Self) {
-        let open = self.energy_imbalance * self.turnover - rounding;
-        // Not a number if the imbalance or the rounding errors are none.
-        self.energy_imbalance = if open <= 0.0 { 0.0 } else { open / self.turnover };
+        self.energy_imbalance = beyond(rounding, self.energy_imbalance, self.turnover);
         self.max_energy_imbalance = larger(before.max_energy_imbalance, self.energy_imbalance);
     }
 
@@ -197,6 +195,12 @@ impl Totals {
         let failed = failed(energy);
         failed > NOTICEABLE_SHARE * self.turnover && -of_scheme(energy) > failed
     }
+    /// Takes rounding errors in J of heats that cancel out of the imbalance of heat of the step just added; these are the totals `before` it.
+    pub fn allow_rounding_of_heat(&mut self, rounding: f64, before: &Self) {
+        self.heat_imbalance = beyond(rounding, self.heat_imbalance, self.heat_turnover);
+        self.max_heat_imbalance = larger(before.max_heat_imbalance, self.heat_imbalance);
+    }
+
 
     /// Adds a step.
     pub fn add(&mut self, outcome: &StepOutcome) {
@@ -282,6 +286,13 @@ fn failed(energy: &Energy) -> f64 {
 }
 
 /// The sum of the terms of the scheme.
+/// What an imbalance as a share of a turnover exceeds rounding errors by.
+fn beyond(rounding: f64, imbalance: f64, turnover: f64) -> f64 {
+    let open = imbalance * turnover - rounding;
+    // Not a number if the imbalance or the rounding errors are none.
+    if open <= 0.0 { 0.0 } else { open / turnover }
+}
+
 fn of_scheme(energy: &Energy) -> f64 {
     ENERGIES.iter().filter(|kind| kind.role == Role::Numerical).map(|kind| energy[*kind]).sum()
 }
