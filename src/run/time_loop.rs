@@ -242,7 +242,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     fn cover_strains(&mut self) -> Result<()> {
         let Simulation { body, state, scheme, totals, .. } = &mut self.simulation;
         let share = totals.max_rate_share.filter(|share| *share > body.covered && self.may_cover);
-        let Some(multiple) = share.map(|share| share.log2().ceil().exp2()) else { return Ok(()) };
+        let Some(share) = share else { return Ok(()) };
+        // A restarted run first has the range that it had, from which it may not have been able to go on.
+        let known = totals.covered.filter(|covered| *covered > body.covered);
+        let multiple = known.unwrap_or_else(|| share.log2().ceil().exp2());
         // All ranks have the same formulas.
         self.may_cover = body.cover(multiple);
         if !self.may_cover {
@@ -265,6 +268,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     }
 
     /// Computes the certificates for steps in this range, and fails if they require the consent of the job, unlike those before.
+        totals.covered = Some(multiple);
     /// Collective.
     fn renew_certificates(&mut self, range: StepRange) -> Result<()> {
         let Simulation { body, state, scheme, .. } = &mut self.simulation;

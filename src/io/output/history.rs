@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     fem::effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, FIRST_OF_HEAT, Peaks, Role},
     linear_algebra::tensor::larger,
-    solver::stepping::{StepLevel, StepOutcome, Work},
+    solver::stepping::{StepLevel, StepOutcome, StepRange, Work},
 };
 use serde::{Deserialize, Serialize};
 use std::{cmp::Ordering, path::Path};
@@ -131,6 +131,12 @@ pub struct Totals {
     /// Largest equivalent strain rate after any step over the reference rate, or strain over the reference strain, where viscosity or
     /// elasticity is a formula.
     pub max_rate_share: Option<f64>,
+    /// The multiple of these references up to which the run has extended the range of its certificates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covered: Option<f64>,
+    /// The lengths of the steps attempted so far.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attempted: Option<StepRange>,
     /// Newton iterations.
     pub newton_iterations: u64,
     /// Linear iterations.
