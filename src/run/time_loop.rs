@@ -176,7 +176,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             let outcome = match self.simulation.advance(self.session) {
                 Ok(Some(outcome)) => outcome,
                 Ok(None) => return Ok(Ended::Completed),
-                Err(error) if error.exit() == Exit::Stopped => return Ok(Ended::Stopped(self.signal(error))),
+        self.session.stop_after(self.deadline.end_of_steps());
+        self.cover_steps()?;
+                Err(error) if error.exit() == Exit::Stopped => {
+                    return Ok(Ended::Stopped(self.end_of_step(error)));
+                }
                 Err(error) => return self.explain(error),
             };
             self.refuse_overflow()?;
@@ -203,9 +207,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
     }
 
-    /// The signal that ended a step. Collective.
-    fn signal(&self, error: Agreed) -> String {
-        self.session.stop_requested().map_or_else(|| error.to_string(), |signal| signal.to_string())
+    /// The signal or limit that ended a step. Collective.
+    fn end_of_step(&mut self, error: Agreed) -> String {
+        let signal = self.session.stop_requested().map(|signal| signal.to_string());
+        signal.or_else(|| self.deadline.passed(self.session)).unwrap_or_else(|| error.to_string())
     }
 
     /// Adds to the error of a failed step that the certificates do not exclude several solutions.
@@ -396,6 +401,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
                 self.log.line(format!("stopping on {reason}; continue with --restart"));
                 Ok(Exit::Stopped)
             }
+        self.session.stop_after(self.deadline.end_of_steps());
             Err(error) => Err(error),
         };
         if !self.simulation.totals.are_finite() {
@@ -461,6 +467,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let is_interrupted = || session.stop_requested().is_some() || deadline.passed(session).is_some();
         let of_steps = error_of_steps(session, loaded, (mesh, simulation), is_interrupted)?;
         if let Err(reason) = &of_steps {
+        self.session.stop_after(None);
             log.line(format!("errors     those of the steps are unknown: {reason}"));
         }
         Ok(Errors {
