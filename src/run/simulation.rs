@@ -79,7 +79,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if let (Some(adaptive), Some(level)) = (&mut adaptive, totals.step_level) {
             adaptive.step_level = level;
         }
-        scheme.powers = totals.powers;
+        (scheme.powers, scheme.attempted) = (totals.powers, totals.attempted);
         if totals.single_precision_failed {
             scheme.solver.use_double_precision();
         }

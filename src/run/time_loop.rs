@@ -86,6 +86,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         .iter()
         .for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
+    let warned = log.warnings().len();
+    restored.iter().flat_map(|restored| &restored.warnings).for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = restored.as_ref().map(|restored| restored.totals);
     let simulation = Simulation::start(session, job, Prepared { body, state, scheme }, totals)?;
@@ -111,7 +113,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         certificates,
         landed: 0,
         fallen: 0,
-        has_covered: false,
+        warned,
+        has_covered: totals.is_some_and(|totals| totals.covered.is_some()),
         may_cover: true,
         outputs,
         log,
@@ -146,6 +149,8 @@ struct Run<'a, const D: usize, const S: usize> {
     fallen: u64,
     outputs: Outputs<D, S>,
     log: Log,
+    /// Number of warnings before the first step.
+    warned: usize,
     /// Whether the range of strains and strain rates of formulas was extended, and whether it may be extended further.
     has_covered: bool,
     may_cover: bool,
@@ -171,13 +176,13 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.log.start_progress(last, state.step);
         }
         let mut saved_at = Instant::now();
+        self.session.stop_after(self.deadline.end_of_steps());
+        self.cover_steps()?;
         self.cover_strains()?;
         loop {
             let outcome = match self.simulation.advance(self.session) {
                 Ok(Some(outcome)) => outcome,
                 Ok(None) => return Ok(Ended::Completed),
-        self.session.stop_after(self.deadline.end_of_steps());
-        self.cover_steps()?;
                 Err(error) if error.exit() == Exit::Stopped => {
                     return Ok(Ended::Stopped(self.end_of_step(error)));
                 }
@@ -228,17 +233,24 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// Renews the certificates if the run has made steps for which they do not hold, and fails if the new ones require the consent of the
     /// job. Collective.
     fn cover_steps(&mut self) -> Result<()> {
-        let Simulation { state, scheme, .. } = &self.simulation;
+        let Simulation { state, scheme, totals, .. } = &mut self.simulation;
+        // Of a restarted run, the steps before are known.
+        let are_new = totals.attempted != scheme.attempted;
+        totals.attempted = scheme.attempted;
         let Some(taken) = scheme.attempted.filter(|taken| !self.certificates.hold_for(*taken)) else {
             return Ok(());
         };
         let range = self.certificates.range.map_or(taken, |range| range.or(taken));
         let [shortest, longest] = taken.steps;
-        self.log.warning(format!(
+        let words = format!(
             "at t = {:.6e} s the steps of the run, of {shortest:.4e} to {longest:.4e} s, are outside of the range of its certificates, \
              which are computed anew",
             state.time
-        ));
+        );
+        match are_new {
+            true => self.log.warning(words),
+            false => self.log.quiet_line(words),
+        }
         self.renew_certificates(range)
     }
 
@@ -256,6 +268,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         if !self.may_cover {
             return Ok(());
         }
+        totals.covered = Some(multiple);
         let words = format!(
             "at t = {:.6e} s strains or strain rates are beyond reference_strain or reference_rate of a formula: up to {} times it the \
              stress is proven to grow, too; the certificates are computed anew",
@@ -273,7 +286,6 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     }
 
     /// Computes the certificates for steps in this range, and fails if they require the consent of the job, unlike those before.
-        totals.covered = Some(multiple);
     /// Collective.
     fn renew_certificates(&mut self, range: StepRange) -> Result<()> {
         let Simulation { body, state, scheme, .. } = &mut self.simulation;
@@ -385,9 +397,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     fn save(&mut self) -> Result<()> {
         let start = Instant::now();
         let Simulation { body, state, totals, .. } = &self.simulation;
-        let path = self.outputs.checkpoint(self.session, body, state, totals)?;
+        let warnings = &self.log.warnings()[self.warned..];
+        let path = self.outputs.checkpoint(self.session, body, state, (totals, warnings))?;
         self.simulation.scheme.solver.forget_tangents();
         self.deadline.add_save(start.elapsed());
+        self.session.stop_after(self.deadline.end_of_steps());
         self.log.quiet_line(format!("saved {}", path.display()));
         Ok(())
     }
@@ -401,7 +415,6 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
                 self.log.line(format!("stopping on {reason}; continue with --restart"));
                 Ok(Exit::Stopped)
             }
-        self.session.stop_after(self.deadline.end_of_steps());
             Err(error) => Err(error),
         };
         if !self.simulation.totals.are_finite() {
@@ -454,6 +467,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         });
         self.keep_first(&mut result, written);
         let closed = self.session.agree(self.outputs.close());
+        self.session.stop_after(None);
         result.and_then(|exit| closed.map(|()| exit))
     }
 
@@ -467,7 +481,6 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let is_interrupted = || session.stop_requested().is_some() || deadline.passed(session).is_some();
         let of_steps = error_of_steps(session, loaded, (mesh, simulation), is_interrupted)?;
         if let Err(reason) = &of_steps {
-        self.session.stop_after(None);
             log.line(format!("errors     those of the steps are unknown: {reason}"));
         }
         Ok(Errors {

@@ -195,18 +195,18 @@ impl Totals {
         self.max_energy_imbalance = larger(before.max_energy_imbalance, self.energy_imbalance);
     }
 
-    /// Whether a body without mass jumps in a step with these energies: what fails releases more energy than it dissipates, which only the
-    /// scheme takes up.
-    pub fn is_jump(&self, energy: &Energy) -> bool {
-        let failed = failed(energy);
-        failed > NOTICEABLE_SHARE * self.turnover && -of_scheme(energy) > failed
-    }
     /// Takes rounding errors in J of heats that cancel out of the imbalance of heat of the step just added; these are the totals `before` it.
     pub fn allow_rounding_of_heat(&mut self, rounding: f64, before: &Self) {
         self.heat_imbalance = beyond(rounding, self.heat_imbalance, self.heat_turnover);
         self.max_heat_imbalance = larger(before.max_heat_imbalance, self.heat_imbalance);
     }
 
+    /// Whether a body without mass jumps in a step with these energies: what fails releases more energy than it dissipates, which only the
+    /// scheme takes up.
+    pub fn is_jump(&self, energy: &Energy) -> bool {
+        let failed = failed(energy);
+        failed > NOTICEABLE_SHARE * self.turnover && -of_scheme(energy) > failed
+    }
 
     /// Adds a step.
     pub fn add(&mut self, outcome: &StepOutcome) {
@@ -286,12 +286,6 @@ impl Totals {
     }
 }
 
-/// The energy that damage and bonds dissipate.
-fn failed(energy: &Energy) -> f64 {
-    energy[DAMAGE] + energy[DEBONDING]
-}
-
-/// The sum of the terms of the scheme.
 /// What an imbalance as a share of a turnover exceeds rounding errors by.
 fn beyond(rounding: f64, imbalance: f64, turnover: f64) -> f64 {
     let open = imbalance * turnover - rounding;
@@ -299,6 +293,12 @@ fn beyond(rounding: f64, imbalance: f64, turnover: f64) -> f64 {
     if open <= 0.0 { 0.0 } else { open / turnover }
 }
 
+/// The energy that damage and bonds dissipate.
+fn failed(energy: &Energy) -> f64 {
+    energy[DAMAGE] + energy[DEBONDING]
+}
+
+/// The sum of the terms of the scheme.
 fn of_scheme(energy: &Energy) -> f64 {
     ENERGIES.iter().filter(|kind| kind.role == Role::Numerical).map(|kind| energy[*kind]).sum()
 }

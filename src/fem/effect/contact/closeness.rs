@@ -13,11 +13,13 @@ pub struct Closeness {
     pub slip: f64,
     /// Largest angle in rad of edges of another body over points with contact pressure.
     pub sharpness: f64,
+    /// Longest way in m of the obstacle in a step, where a force moves it.
+    pub leap: f64,
 }
 
 impl Default for Closeness {
     fn default() -> Self {
-        Self::of([f64::NEG_INFINITY; 4])
+        Self::of([f64::NEG_INFINITY; 5])
     }
 }
 
@@ -28,8 +30,8 @@ impl Closeness {
     }
 
     /// All of them.
-    fn numbers(self) -> [f64; 4] {
-        [self.penetration, self.held, self.slip, self.sharpness]
+    fn numbers(self) -> [f64; 5] {
+        [self.penetration, self.held, self.slip, self.sharpness, self.leap]
     }
 
     /// The one over all ranks. Collective.
@@ -38,8 +40,8 @@ impl Closeness {
     }
 
     /// The one with these numbers.
-    fn of([penetration, held, slip, sharpness]: [f64; 4]) -> Self {
-        Self { penetration, held, slip, sharpness }
+    fn of([penetration, held, slip, sharpness, leap]: [f64; 5]) -> Self {
+        Self { penetration, held, slip, sharpness, leap }
     }
 
     /// From the numbers of a checkpoint.
