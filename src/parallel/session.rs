@@ -13,6 +13,7 @@ use mpi::{
     traits::CommunicatorCollectives,
 };
 use std::{
+    cell::Cell,
     fmt,
     ops::Deref,
     rc::Rc,
@@ -20,6 +21,7 @@ use std::{
         Arc,
         atomic::{AtomicUsize, Ordering},
     },
+    time::Instant,
 };
 
 /// MPI, initialised. It is finalised when this value and all handles of PETSc are dropped.
@@ -46,7 +48,8 @@ impl Mpi {
     /// Starts PETSc and the signal flags on all ranks.
     pub fn session(&self) -> Result<Session> {
         let petsc = Petsc::start(&self.universe)?;
-        Ok(Session { world: World(Rc::new(self.universe.world())), petsc, signal: watch_signals()? })
+        let (world, signal) = (World(Rc::new(self.universe.world())), watch_signals()?);
+        Ok(Session { world, petsc, signal, limit: Cell::default() })
     }
 }
 
@@ -73,6 +76,8 @@ pub struct Session {
     world: World,
     petsc: Petsc,
     signal: Arc<AtomicUsize>,
+    /// When steps end although no signal has come.
+    limit: Cell<Option<Instant>>,
 }
 
 impl Session {
@@ -93,7 +98,8 @@ impl Session {
         let ranks = self.world.split_by_color(color);
         let none = || Error::Internal("MPI could not create a group of ranks".into());
         let world = World(Rc::new(self.agree(ranks.ok_or_else(none))?));
-        let session = Session { world, petsc: self.petsc.clone(), signal: Arc::clone(&self.signal) };
+        let (petsc, signal) = (self.petsc.clone(), Arc::clone(&self.signal));
+        let session = Session { world, petsc, signal, limit: self.limit.clone() };
         Ok(within(&session.world, || work(&session)))
     }
 
@@ -182,9 +188,15 @@ impl Session {
         Signal::ALL.into_iter().find(|s| s.number() == any)
     }
 
-    /// Whether this rank was asked to stop.
+    /// Lets steps end once this time is over on some rank, as by a signal; without a time not any more.
+    pub fn stop_after(&self, limit: Option<Instant>) {
+        self.limit.set(limit);
+    }
+
+    /// Whether this rank was asked to stop, or its time is over: an answer that differs between ranks until they share it.
     pub(crate) fn is_asked_to_stop(&self) -> bool {
-        self.signal.load(Ordering::Relaxed) != 0
+        let is_over = || self.limit.get().is_some_and(|limit| Instant::now() >= limit);
+        self.signal.load(Ordering::Relaxed) != 0 || is_over()
     }
 }
 

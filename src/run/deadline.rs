@@ -99,7 +99,18 @@ impl Deadline {
         self.longest_round = self.longest_round.max(spent);
     }
 
-    /// Called after each step: the reason why the run has to stop now, if it has to; the same on all ranks. Collective.
+    /// When a step must end although it is not solved, so that the last one can still be saved: none without limits, and where it is over
+    /// already, so that each run takes a step. Not the same on all ranks.
+    pub(super) fn end_of_steps(&self) -> Option<Instant> {
+        let Limits { wall, slurm, margin } = self.limits;
+        let after = |start: Instant, seconds: f64| {
+            start.checked_add(Duration::try_from_secs_f64(seconds.max(0.0)).ok()?)
+        };
+        let slurm = after(self.start, slurm - margin - self.longest_save.as_secs_f64());
+        after(self.began, wall).into_iter().chain(slurm).min().filter(|end| *end > Instant::now())
+    }
+
+    /// Called after each step, and after one that was ended: the reason why the run has to stop now, if it has to; the same on all ranks. Collective.
     pub(super) fn passed(&mut self, session: &Session) -> Option<String> {
         self.add_round(self.checked.elapsed());
         self.checked = Instant::now();
@@ -166,6 +177,33 @@ mod tests {
         let spent =
             |since_launch| Spent { since_launch, since_start: 0.0, longest_round: 7.0, longest_save: 5.0 };
         assert_eq!([59.9, 60.0].map(|seconds| limits.reached(spent(seconds))[0]), [false, true]);
+    }
+
+    #[test]
+    fn a_step_ends_at_the_first_of_the_limits() {
+        let now = Instant::now();
+        let ends = |wall: f64, slurm: f64| {
+            let deadline = Deadline {
+                began: now,
+                limits: Limits { wall, slurm, margin: 30.0 },
+                over: None,
+                start: now + Duration::from_secs(1),
+                checked: now,
+                longest_round: Duration::from_secs(40),
+                longest_save: Duration::from_secs(5),
+            };
+            deadline.end_of_steps().map(|end| (end - now).as_secs_f64())
+        };
+        let never = f64::INFINITY;
+        assert_eq!(
+            [ends(never, never), ends(60.0, never), ends(60.0, 100.0)],
+            [None, Some(60.0), Some(60.0)]
+        );
+        // 1 + 100 - 30 - 5.
+        assert_eq!(
+            [ends(never, 100.0), ends(90.0, 100.0), ends(-1.0, never)],
+            [Some(66.0), Some(66.0), None]
+        );
     }
 
     #[test]

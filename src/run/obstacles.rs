@@ -252,7 +252,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
-        let Closeness { penetration, held, slip, sharpness, moved, shift, shift_to_spread } =
+        let Closeness { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread } =
             contact.closeness.of_all(session);
         let on = table.on.join(", ");
         if slip > LARGEST_SLIP && table.sliding == Sliding::Small {
@@ -282,9 +282,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                  move the obstacle in place of the body, or mesh it and use `against` with sliding = \"finite\""
             ));
         }
-        let [translation, _] = &contact.obstacle.motions;
-        if let Some(leap) = translation.as_ref().map(|motion| motion.longest_way).filter(|leap| *leap > size)
-        {
+        if leap > size {
             out.push(format!(
                 "contact.{number}: the obstacle that a force moves leapt by {leap:.3e} m in one step, more than the size of the body, \
                  {size:.3e} m: steps that long don't resolve its motion; take a smaller [time] step, or correct its force or its mass"

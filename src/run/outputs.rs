@@ -229,14 +229,14 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        totals: &Totals,
+        of_steps: (&Totals, &[String]),
     ) -> Result<PathBuf> {
         let start = Instant::now();
         // A restart continues the files, which should therefore be complete up to this step.
         let fields = if self.fields.write_failed() { Ok(()) } else { self.fields.write_out() };
         session.agree(self.flush())?;
         let path = checkpoint_path(&self.folder, state.step);
-        let header = Header::new(session, &self.identity, body, state, totals);
+        let header = Header::new(session, &self.identity, body, state, of_steps);
         checkpoint::save(session, &path, &header, body, state)?;
         session.on_first(|| {
             self.checkpoints += length(&path);

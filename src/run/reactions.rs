@@ -69,11 +69,11 @@ impl Handover {
 
 /// The forces of a start state, in N: sums of magnitudes over the nodes.
 struct Balance {
-    /// What internal forces, loads, contacts and supports leave over.
+    /// What internal forces, loads, contacts and supports leave over, beyond the inertia of the last step if that is less.
     open: f64,
     /// The largest of the sums of loads, reactions of supports and contact forces.
     forces: f64,
-    /// What remains open in a body in motion, its inertia and the change of its internal forces in a step, and by rounding.
+    /// What remains open in a body in motion, changes of its inertia and of its internal forces in a step, and by rounding.
     moving: f64,
 }
 
@@ -99,13 +99,13 @@ impl Balance {
     }
 }
 
-/// The warning about a start state that is out of balance with the loads, supports, contacts and materials of its new body. `length` is
-/// that of a step in s. Collective.
+/// The warning about a start state that is out of balance with the loads, supports, contacts and materials of its new body, given the
+/// acceleration in m/s^2 with which it was reached and the length of a step in s. Collective.
 pub(super) fn imbalance<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
     state: &State,
-    length: f64,
+    (acceleration, length): (&DistributedVector, f64),
 ) -> Result<Option<String>> {
     let sum = |field: &DistributedVector, part: &dyn Fn(usize, &Vector<D>) -> Vector<D>| -> Result<f64> {
         let values = field.owned()?;
@@ -139,6 +139,9 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     session.agree(open.add_scaled(1.0, &viscous))?;
     let change = of_form(Form::Elasticity, &|at| length * velocity[at])?;
     let mass = of_form(Form::Mass, &|at| velocity[at])?;
+    let acceleration = session.agree(local(acceleration))?;
+    let mut beyond_inertia = of_form(Form::Mass, &|at| -acceleration[at])?;
+    session.agree(beyond_inertia.add_scaled(1.0, &open))?;
     // The size of the forces of the cells, which cancel where the body is not strained.
     let cells = of_form(Form::Elasticity, &|at| {
         displacement[at].abs() * if (at / D).is_multiple_of(2) { 1.0 } else { -1.0 }
@@ -148,8 +151,14 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     let whole = |_: usize, force: &Vector<D>| *force;
     let free = |node: usize, force: &Vector<D>| body.held.free_part(node, force);
     let held = |node: usize, force: &Vector<D>| add_scaled(force, -1.0, &body.held.free_part(node, force));
-    let sums =
-        [sum(&open, &free), sum(&loads, &whole), sum(&open, &held), sum(&change, &free), sum(&cells, &whole)];
+    let sums = [
+        sum(&open, &free),
+        sum(&beyond_inertia, &free),
+        sum(&loads, &whole),
+        sum(&open, &held),
+        sum(&change, &free),
+        sum(&cells, &whole),
+    ];
     let sums = sums.into_iter().collect::<Result<Vec<f64>>>();
     // Twice the kinetic energy, and the stored energy.
     let energies = || -> Result<[f64; 2]> {
@@ -159,9 +168,10 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
         Ok([kinetic, body.energy(state, rest)?.0[ELASTIC]])
     };
     let (sums, [kinetic, stored]) = (session.agree(sums)?, session.agree(energies())?);
-    let [open, loads, reactions, change, cells, kinetic, stored] =
-        session.sum([sums[0], sums[1], sums[2], sums[3], sums[4], kinetic, stored]);
+    let [open, beyond, loads, reactions, change, cells, kinetic, stored] =
+        session.sum([sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], kinetic, stored]);
     let forces = larger(larger(loads, reactions), open);
+    let open = if beyond < open { beyond } else { open };
     // Of a body that oscillates, inertia is a share of the forces as its velocity is of the largest one.
     let share = if kinetic > 0.0 { (kinetic / (kinetic + stored)).sqrt() } else { 0.0 };
     let moving = change + MOVING * share * forces + ROUNDING * cells;

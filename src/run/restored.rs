@@ -33,6 +33,8 @@ const ROUNDING: f64 = 1e-9;
 pub(super) struct Restored {
     pub file: String,
     pub totals: Totals,
+    /// The warnings that its steps have given.
+    pub warnings: Vec<String>,
     /// Newer checkpoints that can't be read, and why.
     pub faults: Vec<String>,
     /// The line of the log about it.
@@ -67,7 +69,8 @@ pub(super) fn restore<const D: usize, const S: usize>(
             Ok(header) => {
                 let file = path.display().to_string();
                 let words = format!("continuing from {file} (step {}, t = {} s)", header.step, header.time);
-                return Ok(Some(Restored { file, totals: header.totals, faults, words }));
+                let (totals, warnings) = (header.totals, header.warnings);
+                return Ok(Some(Restored { file, totals, warnings, faults, words }));
             }
             Err(error) if error.exit() == Exit::Refused => return Err(error),
             Err(error) => faults.push(error.to_string()),
@@ -191,7 +194,7 @@ pub(super) fn transfer<const D: usize, const S: usize>(
     }
     words += &handover.words();
     let warning = match handover.warning() {
-        None => imbalance(session, body, state, loaded.job.time.step)?,
+        None => imbalance(session, body, state, (&found.acceleration, loaded.job.time.step))?,
         released => released,
     };
     Ok(Some(StartState { digest: found.digest, words, warning }))

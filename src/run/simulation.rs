@@ -79,7 +79,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if let (Some(adaptive), Some(level)) = (&mut adaptive, totals.step_level) {
             adaptive.step_level = level;
         }
-        scheme.powers = totals.powers;
+        (scheme.powers, scheme.attempted) = (totals.powers, totals.attempted);
         if totals.single_precision_failed {
             scheme.solver.use_double_precision();
         }
@@ -112,6 +112,9 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         // The kinetic energy of a body with mass is far above rounding errors.
         if totals.energy_imbalance > BALANCED && !body.has_form(Form::Mass) {
             totals.allow_rounding(rounding(session, body, state, outcome.residual)?, &before);
+        }
+        if totals.heat_imbalance > BALANCED {
+            totals.allow_rounding_of_heat(scheme.rounding_of_heat(session, body)?, &before);
         }
         totals.single_precision_failed |=
             was_single && scheme.solver.factor_precision() == Some(Precision::Double);

@@ -87,6 +87,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         .iter()
         .for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
+    let warned = log.warnings().len();
+    restored.iter().flat_map(|restored| &restored.warnings).for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = restored.as_ref().map(|restored| restored.totals);
     let simulation = Simulation::start(session, job, Prepared { body, state, scheme }, totals)?;
@@ -112,7 +114,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         certificates,
         landed: 0,
         fallen: 0,
-        has_covered: false,
+        warned,
+        has_covered: totals.is_some_and(|totals| totals.covered.is_some()),
         may_cover: true,
         outputs,
         log,
@@ -147,6 +150,8 @@ struct Run<'a, const D: usize, const S: usize> {
     fallen: u64,
     outputs: Outputs<D, S>,
     log: Log,
+    /// Number of warnings before the first step.
+    warned: usize,
     /// Whether the range of strains and strain rates of formulas was extended, and whether it may be extended further.
     has_covered: bool,
     may_cover: bool,
@@ -172,12 +177,16 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.log.start_progress(last, state.step);
         }
         let mut saved_at = Instant::now();
+        self.session.stop_after(self.deadline.end_of_steps());
+        self.cover_steps()?;
         self.cover_strains()?;
         loop {
             let outcome = match self.simulation.advance(self.session) {
                 Ok(Some(outcome)) => outcome,
                 Ok(None) => return Ok(Ended::Completed),
-                Err(error) if error.exit() == Exit::Stopped => return Ok(Ended::Stopped(self.signal(error))),
+                Err(error) if error.exit() == Exit::Stopped => {
+                    return Ok(Ended::Stopped(self.end_of_step(error)));
+                }
                 Err(error) => return self.explain(error),
             };
             self.refuse_overflow()?;
@@ -204,9 +213,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
     }
 
-    /// The signal that ended a step. Collective.
-    fn signal(&self, error: Agreed) -> String {
-        self.session.stop_requested().map_or_else(|| error.to_string(), |signal| signal.to_string())
+    /// The signal or limit that ended a step. Collective.
+    fn end_of_step(&mut self, error: Agreed) -> String {
+        let signal = self.session.stop_requested().map(|signal| signal.to_string());
+        signal.or_else(|| self.deadline.passed(self.session)).unwrap_or_else(|| error.to_string())
     }
 
     /// Adds to the error of a failed step that the certificates do not exclude several solutions.
@@ -224,17 +234,24 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// Renews the certificates if the run has made steps for which they do not hold, and fails if the new ones require the consent of the
     /// job. Collective.
     fn cover_steps(&mut self) -> Result<()> {
-        let Simulation { state, scheme, .. } = &self.simulation;
+        let Simulation { state, scheme, totals, .. } = &mut self.simulation;
+        // Of a restarted run, the steps before are known.
+        let are_new = totals.attempted != scheme.attempted;
+        totals.attempted = scheme.attempted;
         let Some(taken) = scheme.attempted.filter(|taken| !self.certificates.hold_for(*taken)) else {
             return Ok(());
         };
         let range = self.certificates.range.map_or(taken, |range| range.or(taken));
         let [shortest, longest] = taken.steps;
-        self.log.warning(format!(
+        let words = format!(
             "at t = {:.6e} s the steps of the run, of {shortest:.4e} to {longest:.4e} s, are outside of the range of its certificates, \
              which are computed anew",
             state.time
-        ));
+        );
+        match are_new {
+            true => self.log.warning(words),
+            false => self.log.quiet_line(words),
+        }
         self.renew_certificates(range)
     }
 
@@ -243,12 +260,16 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     fn cover_strains(&mut self) -> Result<()> {
         let Simulation { body, state, scheme, totals, .. } = &mut self.simulation;
         let share = totals.max_rate_share.filter(|share| *share > body.covered && self.may_cover);
-        let Some(multiple) = share.map(|share| share.log2().ceil().exp2()) else { return Ok(()) };
+        let Some(share) = share else { return Ok(()) };
+        // A restarted run first has the range that it had, from which it may not have been able to go on.
+        let known = totals.covered.filter(|covered| *covered > body.covered);
+        let multiple = known.unwrap_or_else(|| share.log2().ceil().exp2());
         // All ranks have the same formulas.
         self.may_cover = body.cover(multiple);
         if !self.may_cover {
             return Ok(());
         }
+        totals.covered = Some(multiple);
         let words = format!(
             "at t = {:.6e} s strains or strain rates are beyond reference_strain or reference_rate of a formula: up to {} times it the \
              stress is proven to grow, too; the certificates are computed anew",
@@ -377,9 +398,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     fn save(&mut self) -> Result<()> {
         let start = Instant::now();
         let Simulation { body, state, totals, .. } = &self.simulation;
-        let path = self.outputs.checkpoint(self.session, body, state, totals)?;
+        let warnings = &self.log.warnings()[self.warned..];
+        let path = self.outputs.checkpoint(self.session, body, state, (totals, warnings))?;
         self.simulation.scheme.solver.forget_tangents();
         self.deadline.add_save(start.elapsed());
+        self.session.stop_after(self.deadline.end_of_steps());
         self.log.quiet_line(format!("saved {}", path.display()));
         Ok(())
     }
@@ -449,6 +472,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         });
         self.keep_first(&mut result, written);
         let closed = self.session.agree(self.outputs.close());
+        self.session.stop_after(None);
         result.and_then(|exit| closed.map(|()| exit))
     }
 

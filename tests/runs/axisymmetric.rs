@@ -203,6 +203,16 @@ fn a_rough_platen_moves_along_the_axis() {
 }
 
 #[test]
+fn a_side_moves_along_the_axis_beside_a_support_of_the_axis() {
+    let support = "[{ on = ['left'], fix = 'normal' }, { on = ['bottom'], fix = 'normal', displacement = ['0.01*t'] }, \
+                   { on = ['top'], fix = ['y'] }]";
+    let case = cylinder().without("traction").set("support", support).run_and_keep(2);
+    let force = last(&case, ("resultants.csv", "source", "support top"), "force_y");
+    let expected = 1000.0 * 0.005 * std::f64::consts::PI;
+    assert!((force - expected).abs() < 1e-9 * expected, "{force} {expected}");
+}
+
+#[test]
 fn springs_take_over_reactions_of_a_side_that_begins_at_the_axis() {
     let first = cylinder().set("mesh.order", "2").set("checkpoint", "{ at = [1.0] }").run_and_keep(1);
     let from = format!("{{ from = '{}' }}", first.folder().join("out").display());

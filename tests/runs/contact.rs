@@ -850,3 +850,22 @@ fn nodes_that_supports_hold_count_neither_as_touching_nor_as_open() {
         assert!((areas[0] + areas[1] - 0.875).abs() < 1e-12, "{normal}, {depth} m: {areas:?}");
     }
 }
+
+/// The shape functions at corners of quadratic cells have no share of the mass, which yet holds a body that only contact supports.
+#[test]
+fn a_body_of_quadratic_cells_with_mass_on_a_plane_is_solved_to_the_tolerance() {
+    let case = Case::written_as(
+        "
+        mesh = {rectangle = {size = [0.4, 0.2], cells = [4, 2]}, order = 2}
+        traction = [{on = ['top'], value = [0.0, '-3e4*x']}]
+        contact = [{on = ['bottom'], normal.unilateral = {}}]
+        time = {end = 0.2, step = 0.02, scheme = 'implicit_euler'}
+        [material]
+        hypothesis = 'plane_strain'
+        density = 500
+        elasticity = {youngs_modulus = 1.1e6, poisson_ratio = 0.3}
+        damage = {threshold = 4, viscosity = 0.24, largest = 0.95}",
+    );
+    let residual = case.run(2).number("max_residual");
+    assert!(residual < 1e-9, "{residual:e}");
+}

@@ -91,6 +91,33 @@ fn pair(share: &str, side: &str, sliding: &str) -> Case {
 }
 
 #[test]
+fn heat_that_stays_in_an_insulated_body_or_does_not_pass_its_boundary_is_balanced() {
+    let bar = || {
+        Case::written_as(
+            "
+            mesh.rectangle = {size = [1.0, 0.5], cells = [4, 2]}
+            support = [{on = ['bottom'], fix = 'all'}]
+            time = {end = 0.01, step = 0.001, scheme = 'implicit_euler'}
+            [material]
+            hypothesis = 'plane_strain'
+            elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}
+            heat = {conductivity = 4.55e4, volumetric_capacity = 5e5}",
+        )
+    };
+    let insulated = bar().set("initial.temperature", "'300 + 3*x'");
+    let at_ambient = bar()
+        .set("initial.temperature", "300.1")
+        .set("heat", "[{ on = ['top'], convection = { coefficient = 7.3, ambient = 300.1 } }]");
+    for case in [insulated, at_ambient] {
+        for ranks in [1, 2] {
+            case.run_with(ranks, &["--force"]).expect(0);
+            let most = case.results().number("max_heat_imbalance");
+            assert!(most < 1e-9, "{most:e}");
+        }
+    }
+}
+
+#[test]
 fn the_heat_of_friction_between_bodies_is_divided_by_the_share() {
     // 0.4 * 1000 Pa * 0.5 m * 0.1 m; the capacities are 150 and 37.5 J/(m K).
     for (share, of_upper, side, sliding, ranks) in [

@@ -416,6 +416,34 @@ fn a_start_state_out_of_balance_is_named_with_its_forces_and_one_in_motion_is_no
 }
 
 #[test]
+fn a_stage_that_begins_after_a_jump_of_the_load_is_not_out_of_balance() {
+    // A strained block moves slowly and is accelerated by a tenth of its load, which came in the last step.
+    let block = |load: &str| {
+        Case::written_as(
+            "
+            mesh.rectangle = {size = [1.0, 1.0], cells = [4, 4]}
+            support = [{on = ['bottom'], fix = 'all'}]
+            time = {end = 0.5, step = 0.001, scheme = 'implicit_euler'}
+            checkpoint.every = 1000
+            [material]
+            hypothesis = 'plane_strain'
+            density = 1e3
+            elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}
+            viscosity = {volumetric = 1e4, shear = 2e4}",
+        )
+        .set("traction", &format!("[{{ on = ['top'], value = [0, '{load}'] }}]"))
+    };
+    let first = block("-1e5 - 1e4*step(t - 0.4995)").run_and_keep(1);
+    let stage = |load: &str| {
+        let next = block(load).set("time.end", "0.002").set("initial.from", &format!("{:?}", out(&first)));
+        next.run_with(2, &[]).expect(0);
+        next
+    };
+    assert!(!is_out_of_balance(&stage("-1.1e5")));
+    assert!(is_out_of_balance(&stage("-1.2e5")), "another jump");
+}
+
+#[test]
 fn ground_at_rest_stays_at_rest_when_its_sides_give_way() {
     let held = "fix = ['x']";
     let first = settled(GROUND, held).run_and_keep(2);

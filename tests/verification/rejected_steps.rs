@@ -4,11 +4,13 @@ use super::orders::{Acting, EFFECTS, END, SCHEMES};
 use super::run_on;
 use super::scenes::simulation;
 use clarke::{
+    error::Exit,
     fem::effect::Step,
     mesh::generate::{Diagonal, rectangle},
     parallel::{agreement::fail_at, session::Session},
     run::Simulation,
 };
+use std::time::Instant;
 
 const STEPS: f64 = 16.0;
 /// Ratio of the lengths of rejected steps to that of accepted steps.
@@ -81,6 +83,30 @@ fn in_the_plane(session: &Session) {
 #[test]
 fn rejected_steps_leave_no_trace_in_any_effect_under_any_scheme() {
     run_on(&[1, 2], |world| in_the_plane(&world.session));
+}
+
+/// A step that the clock of one rank ends, ends on all; the run then goes on as if it had not begun.
+fn ended_and_straight(session: &Session) {
+    let text = EFFECTS[0].job::<2>("implicit_euler", END / STEPS);
+    let mesh = || rectangle([1.0; 2], [5; 2], Diagonal::Crossed, [1.0; 2]).expect("mesh");
+    let [mut straight, mut ended] = [(); 2].map(|()| simulation::<2, 4>(session, &text, &mesh()));
+    for _ in 0..2 {
+        session.stop_after((session.rank() + 1 == session.ranks()).then(Instant::now));
+        let error = ended.advance(session).expect_err("the time is over");
+        assert_eq!(error.exit(), Exit::Stopped, "{error}");
+        session.stop_after(None);
+        for run in [&mut straight, &mut ended] {
+            run.advance(session).expect("a step").expect("a step");
+        }
+        for ((name, straight), (_, ended)) in all(&straight).into_iter().zip(all(&ended)) {
+            assert!(straight == ended, "{name} differs");
+        }
+    }
+}
+
+#[test]
+fn a_limit_of_wall_time_ends_a_step_on_all_ranks_and_leaves_no_trace() {
+    run_on(&[1, 2, 3], |world| ended_and_straight(&world.session));
 }
 
 /// The set-up for steps of another length fails at each of its agreements in turn; steps of the previous length then give the same

@@ -40,8 +40,8 @@ impl<const D: usize> ContactMemory<D> {
         if let Some(pair) = points.windows(2).find(|pair| pair[0].1.node == pair[1].1.node) {
             return Err(Error::Refused(format!(
                 "contact memory at {:?} m: the node belongs to two contacts with memory, but stores the history of one displacement \
-                 only; name both boundaries in one table if they have the same law, round an edge between them with facets that turn \
-                 by less than 40 degrees each, or give the memory to one of them",
+                 only; if they have the same law, name both boundaries, or the boundary that `where` splits, in one table; round an \
+                 edge between boundaries with facets that turn by less than 40 degrees each; or give the memory to one of them",
                 mesh.nodes[pair[0].1.node as usize]
             )));
         }

@@ -350,36 +350,48 @@ fn what() -> String {
     "support: a displacement or velocity".into()
 }
 
+/// Independent directions among these, each with the number of its value, if it moves. `None` if another direction, a combination of
+/// them, contradicts: it is at rest only where all of them are, and moves only as one of them alone.
+fn parts<const D: usize>(all: &[(Vector<D>, Option<usize>)]) -> Option<Vec<Part<D>>> {
+    let (mut independent, mut others) = (Vec::new(), Vec::new());
+    // An orthonormal basis of the same span.
+    let mut basis: Vec<Vector<D>> = Vec::new();
+    for (direction, value) in all {
+        let out = |rest: Vector<D>, known: &Vector<D>| add_scaled(&rest, -dot(known, &rest), known);
+        let rest = basis.iter().chain(&basis).fold(*direction, out);
+        let size = norm(&rest);
+        if size > INDEPENDENT {
+            basis.push(rest.map(|x| x / size));
+            independent.push((*direction, *value));
+        } else {
+            others.push((direction, *value));
+        }
+    }
+    let directions: Vec<Vector<D>> = independent.iter().map(|(direction, _)| *direction).collect();
+    let duals = dual_basis(&directions, INDEPENDENT).unwrap_or_default();
+    let parts = independent.into_iter().zip(duals);
+    let parts: Vec<Part<D>> =
+        parts.map(|((direction, value), dual)| Part { value, direction, dual }).collect();
+    let agrees = |(direction, value): (&Vector<D>, Option<usize>)| {
+        let share = |part: &Part<D>| dot(&part.dual, direction);
+        let mut combined = parts.iter().filter(|part| share(part).abs() > INDEPENDENT);
+        match value {
+            None => combined.all(|part| part.value.is_none()),
+            Some(_) => combined.all(|part| part.value == value && share(part) > 1.0 - INDEPENDENT),
+        }
+    };
+    others.into_iter().all(agrees).then_some(parts)
+}
+
 impl<const D: usize> MovedNode<D> {
     fn new(mesh: &Mesh<D>, node: u32, all: &[(Vector<D>, Option<usize>)]) -> Result<Self> {
         let place = mesh.nodes[node as usize];
-        let mut independent: Vec<(Vector<D>, Option<usize>)> = Vec::new();
-        // An orthonormal basis of the same span.
-        let mut basis: Vec<Vector<D>> = Vec::new();
-        for (direction, value) in all {
-            let out = |rest: Vector<D>, known: &Vector<D>| add_scaled(&rest, -dot(known, &rest), known);
-            let rest = basis.iter().chain(&basis).fold(*direction, out);
-            let size = norm(&rest);
-            if size > INDEPENDENT {
-                basis.push(rest.map(|x| x / size));
-                independent.push((*direction, *value));
-                continue;
-            }
-            let same = |(other, known): &(Vector<D>, Option<usize>)| {
-                known == value && dot(other, direction) > 1.0 - INDEPENDENT
-            };
-            let rests = value.is_none() && independent.iter().all(|(_, known)| known.is_none());
-            if !rests && !independent.iter().any(same) {
-                return Err(Error::Refused(format!(
-                    "support at {place:?} m: two supports determine the same component of the displacement there and move \
-                     it differently; leave this component, or the boundary, out of one of them, or give both the same motion"
-                )));
-            }
-        }
-        let directions: Vec<Vector<D>> = independent.iter().map(|(direction, _)| *direction).collect();
-        let duals = dual_basis(&directions, INDEPENDENT).unwrap_or_default();
-        let parts = independent.iter().zip(duals);
-        let parts = parts.map(|(&(direction, value), dual)| Part { value, direction, dual }).collect();
+        let parts = parts(all).ok_or_else(|| {
+            Error::Refused(format!(
+                "support at {place:?} m: two supports determine the same component of the displacement there and move \
+                 it differently; leave this component, or the boundary, out of one of them, or give both the same motion"
+            ))
+        })?;
         Ok(Self { node, place, origin: [0.0; D], parts })
     }
 
@@ -394,5 +406,38 @@ impl<const D: usize> MovedNode<D> {
         let target = &mut nodal[self.node as usize * D..][..D];
         target.iter_mut().zip(sum).for_each(|(target, value)| *target += value);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_motions_of_the_same_component_contradict() {
+        let (s, c) = 0.5f64.sin_cos();
+        let [x, y, z, slanted] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [c, s, 0.0]];
+        let back = x.map(|x: f64| -x);
+        // The value of each independent direction, or a contradiction.
+        let values = |all: &[(Vector<3>, Option<usize>)]| {
+            Some(parts(all)?.into_iter().map(|part| part.value).collect::<Vec<_>>())
+        };
+        for moved in [y, z] {
+            assert_eq!(values(&[(back, None), (moved, Some(0)), (x, None)]), Some(vec![None, Some(0)]));
+        }
+        let held = [(x, None), (y, None), (z, Some(1))];
+        for (more, agrees) in [
+            ((slanted, None), true),
+            ((back, None), true),
+            ((z, Some(1)), true),
+            ((z, None), false),
+            ((z, Some(0)), false),
+            ((z.map(|z| -z), Some(1)), false),
+            ((slanted, Some(1)), false),
+            (([c, 0.0, s], None), false),
+        ] {
+            let all = [&held[..], &[more]].concat();
+            assert_eq!(values(&all), agrees.then(|| vec![None, None, Some(1)]), "{more:?}");
+        }
     }
 }

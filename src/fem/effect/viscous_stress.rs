@@ -15,8 +15,8 @@ pub struct ViscousStress {
     pub tensor: ByMaterial<Isotropic>,
     /// The formulas of which it contains the linear part.
     formulas: Option<ByMaterial<ViscosityFormula>>,
-    /// The multiple of their reference rates up to which it is a bound of them.
-    covered: f64,
+    /// The tensor that is a bound of them up to their reference rates.
+    given: ByMaterial<Isotropic>,
 }
 
 impl ViscousStress {
@@ -27,7 +27,7 @@ impl ViscousStress {
 
     /// Of viscosities, some of which contain the linear parts of these formulas.
     pub fn of(tensor: ByMaterial<Isotropic>, formulas: Option<ByMaterial<ViscosityFormula>>) -> Self {
-        Self { tensor, formulas, covered: 1.0 }
+        Self { given: tensor.map(|own| *own), tensor, formulas }
     }
 }
 
@@ -47,19 +47,18 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
 
     fn cover(&mut self, multiple: f64) {
         let Some(formulas) = &self.formulas else { return };
-        let multiples = [self.covered, multiple];
-        self.tensor = self.tensor.map_each(|material, own| {
-            let Some(formula) = formulas.get(material) else { return *own };
-            let [before, after] = multiples.map(|multiple| match formula.covering(multiple) {
+        // From what was given, so that the ways by which a run and its restart come to a multiple end in the same bits.
+        self.tensor = self.given.map_each(|material, given| {
+            let Some(formula) = formulas.get(material) else { return *given };
+            let [before, after] = [1.0, multiple].map(|multiple| match formula.covering(multiple) {
                 Some(wide) => wide.tensor(normal_components::<S>()),
                 None => Isotropic::default(),
             });
             Isotropic {
-                volumetric: own.volumetric + after.volumetric - before.volumetric,
-                shear: own.shear + after.shear - before.shear,
+                volumetric: given.volumetric + after.volumetric - before.volumetric,
+                shear: given.shear + after.shear - before.shear,
             }
         });
-        self.covered = multiple;
     }
 
     fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {
@@ -72,5 +71,29 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
         let whole = Integrity::default();
         energy[VISCOUS] += step.length * linear::square(tensor, batch.cells, &whole, &batch.strain_rate);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::expression::Formula;
+
+    /// A restart covers in one step what the run had covered in several.
+    #[test]
+    fn what_is_covered_does_not_depend_on_the_way_there() {
+        let shear = Formula::parse("7577.395551631344*(1 + g)^(-0.3)").expect("a formula");
+        let formula = ViscosityFormula::new(shear, 7577.395551631344, 1.0);
+        let after = |multiples: &[f64]| {
+            let tensor = ByMaterial::uniform(formula.tensor(3));
+            let mut stress = ViscousStress::of(tensor, Some(ByMaterial::uniform(formula.clone())));
+            multiples.iter().for_each(|multiple| Effect::<2, 4>::cover(&mut stress, *multiple));
+            stress.tensor.get(0).map(|found| [found.volumetric, found.shear].map(f64::to_bits))
+        };
+        for multiple in [8.0, 16.0, 64.0] {
+            let ways: Vec<f64> =
+                (1..=6).map(|n| f64::exp2(f64::from(n))).take_while(|m| *m <= multiple).collect();
+            assert_eq!(after(&[multiple]), after(&ways), "{multiple}");
+        }
     }
 }

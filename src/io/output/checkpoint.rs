@@ -73,9 +73,13 @@ pub struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_state: Option<String>,
     /// For each contact: the largest penetration in m so far of points that are free to move, and of points that supports hold; the largest
-    /// slip along another body as a share of a facet, and the largest angle in rad of edges of it over points with contact pressure.
+    /// slip along another body as a share of a facet, the largest angle in rad of edges of it over points with contact pressure, and the
+    /// longest way in m in a step of an obstacle moved by a force.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub closeness: Vec<Vec<Option<f64>>>,
+    /// The warnings that the steps so far have given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// The contacts between bodies whose law acts at nodes of `against`, by their positions in the job.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exchanged: Vec<usize>,
@@ -97,13 +101,13 @@ pub struct Identity {
 }
 
 impl Header {
-    /// The header for a state and the sums over the steps up to it. Collective.
+    /// The header for a state, and the sums over the steps up to it with their warnings. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         identity: &Identity,
         body: &Body<D, S>,
         state: &State,
-        totals: &Totals,
+        (totals, warnings): (&Totals, &[String]),
     ) -> Self {
         let motions = |number: usize| {
             body.contacts.iter().filter_map(move |contact| contact.obstacle.motions[number].as_ref())
@@ -127,6 +131,7 @@ impl Header {
                 .iter()
                 .map(|contact| contact.closeness.of_all(session).saved())
                 .collect(),
+            warnings: warnings.to_vec(),
             exchanged: exchanged(body),
             mesh: digest(body),
             physics: identity.physics.clone(),
@@ -266,7 +271,7 @@ pub fn restore<const D: usize, const S: usize>(
 }
 
 /// The part of the state of another run that this job can use.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct Transferred {
     /// The digest of the checkpoint.
     pub digest: String,
@@ -274,6 +279,8 @@ pub struct Transferred {
     pub step: u64,
     /// Its time in s.
     pub time: f64,
+    /// Mean acceleration in m/s^2 in its last step; 0 if it took none.
+    pub acceleration: DistributedVector,
     /// Tables of the checkpoint and motions of its obstacles that this job does not have.
     pub dropped: Vec<String>,
     /// Histories and motions of obstacles of this job that the checkpoint does not have.
@@ -296,6 +303,7 @@ pub fn transfer<const D: usize, const S: usize>(
     let saved = Saved::new(&checkpoint, body)?;
     saved.fill::<D>(DISPLACEMENT, &mut state.displacement)?;
     saved.fill::<D>(VELOCITY, &mut state.velocity)?;
+    let acceleration = last_acceleration::<D>(&saved, header.step_length, state)?;
     state.previous_velocity.copy_from(&state.velocity)?;
     state.previous_velocity.update_ghosts()?;
     if let Some(previous) = &mut state.previous_displacement {
@@ -347,11 +355,29 @@ pub fn transfer<const D: usize, const S: usize>(
         dropped.push("initial stress of materials without viscoplasticity".into());
     }
     let digest = session.agree(state_digest(path))?;
-    let (step, time) = (header.step, header.time);
-    let mut found = Transferred { digest, step, time, dropped, at_rest, physics: BTreeMap::new() };
+    let mut found = Transferred {
+        digest,
+        step: header.step,
+        time: header.time,
+        acceleration,
+        dropped,
+        at_rest,
+        physics: BTreeMap::new(),
+    };
     transfer_motions(&header, physics, body, &mut found);
     found.physics = header.physics;
     Ok(found)
+}
+
+/// The mean acceleration of a step of this length in s, with which a saved state came to the velocity already read into `state`. Collective.
+fn last_acceleration<const D: usize>(saved: &Saved, length: f64, state: &State) -> Result<DistributedVector> {
+    let mut acceleration = state.velocity.like()?;
+    if length > 0.0 {
+        saved.fill::<D>(PREVIOUS_VELOCITY, &mut acceleration)?;
+        let (mut values, velocity) = (acceleration.local_mut()?, state.velocity.local()?);
+        values.iter_mut().zip(velocity.iter()).for_each(|(value, now)| *value = (now - *value) / length);
+    }
+    Ok(acceleration)
 }
 
 /// The keys of a job that say which surfaces act on each other.

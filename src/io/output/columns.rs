@@ -150,7 +150,8 @@ const OF_ENERGIES: [Column; FIRST_OF_HEAT + 1] = {
 };
 
 const OF_HEAT: [Column; ENERGIES.len() - FIRST_OF_HEAT + 1] = {
-    let meaning = "imbalance of the heat of the step, as a share of the largest of these heats so far";
+    let meaning = "imbalance of the heat of the step beyond rounding errors of what conduction and convection pass on, as a share of the \
+                   largest of these heats so far";
     let imbalance = Column::plain("heat_imbalance", "", meaning);
     let mut columns = [imbalance; ENERGIES.len() - FIRST_OF_HEAT + 1];
     let mut at = FIRST_OF_HEAT;

@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     fem::effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, FIRST_OF_HEAT, Peaks, Role},
     linear_algebra::tensor::larger,
-    solver::stepping::{StepLevel, StepOutcome, Work},
+    solver::stepping::{StepLevel, StepOutcome, StepRange, Work},
 };
 use serde::{Deserialize, Serialize};
 use std::{cmp::Ordering, path::Path};
@@ -131,6 +131,12 @@ pub struct Totals {
     /// Largest equivalent strain rate after any step over the reference rate, or strain over the reference strain, where viscosity or
     /// elasticity is a formula.
     pub max_rate_share: Option<f64>,
+    /// The multiple of these references up to which the run has extended the range of its certificates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covered: Option<f64>,
+    /// The lengths of the steps attempted so far.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attempted: Option<StepRange>,
     /// Newton iterations.
     pub newton_iterations: u64,
     /// Linear iterations.
@@ -185,10 +191,14 @@ impl Totals {
 
     /// Takes rounding errors in J of energies that cancel out of the imbalance of the step just added; these are the totals `before` it.
     pub fn allow_rounding(&mut self, rounding: f64, before: &Self) {
-        let open = self.energy_imbalance * self.turnover - rounding;
-        // Not a number if the imbalance or the rounding errors are none.
-        self.energy_imbalance = if open <= 0.0 { 0.0 } else { open / self.turnover };
+        self.energy_imbalance = beyond(rounding, self.energy_imbalance, self.turnover);
         self.max_energy_imbalance = larger(before.max_energy_imbalance, self.energy_imbalance);
+    }
+
+    /// Takes rounding errors in J of heats that cancel out of the imbalance of heat of the step just added; these are the totals `before` it.
+    pub fn allow_rounding_of_heat(&mut self, rounding: f64, before: &Self) {
+        self.heat_imbalance = beyond(rounding, self.heat_imbalance, self.heat_turnover);
+        self.max_heat_imbalance = larger(before.max_heat_imbalance, self.heat_imbalance);
     }
 
     /// Whether a body without mass jumps in a step with these energies: what fails releases more energy than it dissipates, which only the
@@ -274,6 +284,13 @@ impl Totals {
         let made = larger(-of_scheme(&self.energy), 0.0);
         if made == 0.0 { 0.0 } else { made / self.supplied }
     }
+}
+
+/// What an imbalance as a share of a turnover exceeds rounding errors by.
+fn beyond(rounding: f64, imbalance: f64, turnover: f64) -> f64 {
+    let open = imbalance * turnover - rounding;
+    // Not a number if the imbalance or the rounding errors are none.
+    if open <= 0.0 { 0.0 } else { open / turnover }
 }
 
 /// The energy that damage and bonds dissipate.

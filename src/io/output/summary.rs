@@ -118,7 +118,7 @@ pub struct Summary {
     pub preconditioner: &'static str,
     /// `single` or `double`: the precision of the factors at the end, if steps are condensed to the contact.
     pub factor_precision: Option<&'static str>,
-    /// Number of set-ups of matrix and preconditioner in this run.
+    /// Number of set-ups of matrix and preconditioner in this run, since a restart if it was restarted.
     pub set_ups: u64,
     /// Dimension of the body, 2 or 3.
     #[schemars(title = "dimensions")]

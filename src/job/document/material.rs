@@ -108,7 +108,7 @@ pub(in crate::job) fn check_in_body(
     if hypothesis == Some(Hypothesis::PlaneStress) {
         table.refuse(material.constant().fault_in_plane_stress());
     }
-    if hypothesis == Some(Hypothesis::PlaneStress) || mesh.order == 2 {
+    if hypothesis == Some(Hypothesis::PlaneStress) || mesh.order == 2 || mesh.is_crossed() {
         return;
     }
     let path = table.path("");
@@ -126,7 +126,7 @@ pub(in crate::job) fn check_in_body(
         ));
     }
     let flow = material.viscoplasticity.as_ref();
-    if !mesh.is_crossed() && flow.is_some_and(|law| law.with_yield_stress(0.0).keeps_volume()) {
+    if flow.is_some_and(|law| law.with_yield_stress(0.0).keeps_volume()) {
         table.warn(format!(
             "{path}.viscoplasticity conserves volume: linear elements lock where they and their neighbours flow, for any Poisson's ratio; \
              expect a load capacity that is too high, by 10 to 30 % on common meshes; {remedy}"

@@ -182,7 +182,8 @@ pub struct Checkpoint {
     #[serde(default = "keep")]
     #[schemars(range(min = 1))]
     pub keep: u32,
-    /// Wall time after which the run saves a checkpoint and stops with exit code 3. Absent: no limit.
+    /// Wall time after which the run saves a checkpoint and stops with exit code 3, also within a step; it must be longer than a step
+    /// takes. Absent: no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 84000.0)]
     pub wall_limit: Option<f64>,

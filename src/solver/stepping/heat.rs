@@ -13,7 +13,7 @@ use crate::{
     },
     linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix},
     mesh::Mesh,
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
 };
 
 /// The residual of a solved step as a share of the powers that change the temperature.
@@ -164,6 +164,26 @@ impl HeatStep {
         energy[ENTERED_HEAT] = entered.iter().map(|heat| heat.max(0.0)).sum();
         energy[LOST_HEAT] = entered.iter().map(|heat| (-heat).max(0.0)).sum();
         Ok(energy)
+    }
+
+    /// The heat in J that rounding errors may generate in the step just committed, from what conduction and convection passed between
+    /// nodes and the boundary. Collective.
+    pub(super) fn rounding<const D: usize>(&self, session: &Session, heat: &Heat<D>) -> Result<f64, Agreed> {
+        let temperatures = heat.temperature_of_owned();
+        let mine = || -> Result<f64> {
+            let stored = heat
+                .capacity()
+                .iter()
+                .zip(self.change.owned()?.iter())
+                .map(|(c, change)| c * change.abs())
+                .sum::<f64>();
+            let Conditions { power, film, .. } = &self.conditions;
+            let passed = (0..temperatures.len())
+                .map(|node| self.conducted[node].abs() + power[node].abs() + film[node] * temperatures[node])
+                .sum::<f64>();
+            Ok(TOLERANCE * (stored + self.length * passed))
+        };
+        Ok(session.sum([session.agree(mine())?])[0])
     }
 
     /// Finds the changes of the temperature in a step that releases this heat. Collective.

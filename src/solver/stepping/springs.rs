@@ -6,12 +6,12 @@
 
 use crate::{
     error::{Error, Result},
-    fem::body::Body,
+    fem::{body::Body, coupling::Coupling},
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
-        tensor::Vector,
+        tensor::{Vector, larger},
     },
-    mesh::{Mesh, free_motions},
+    mesh::{Mesh, free_motions, shape::edges_of_cell},
     parallel::{agreement::Agreed, session::Session},
 };
 use std::collections::BTreeMap;
@@ -86,7 +86,7 @@ impl Springs {
         } else {
             vec![0.0; D * D]
         };
-        let weakest = weakest_side(session, body, length)?;
+        let resistances = resistances(session, body, (&rows, length))?;
         let stiffness = |&(node, motion): &(usize, [f64; D])| {
             let range = rows.offsets[node]..rows.offsets[node + 1];
             let rigid = rigid_part(&body.mesh, &motion);
@@ -101,7 +101,7 @@ impl Springs {
                     own = quadratic_form(block, &motion);
                 }
             }
-            if let Some(&resistance) = weakest.get(&node) {
+            if let Some(&resistance) = resistances.get(&node) {
                 together = (0..D).map(|i| resistance[i] * rigid[i] * rigid[i]).sum();
             }
             let whole = (total * together).max(quadratic_form(&inertia, &motion));
@@ -132,41 +132,61 @@ impl Springs {
     }
 }
 
-/// For the nodes of this rank that face another body, the resistance in N s/m along each axis of the one of both surfaces there that resists
-/// the translation of its body less, in steps of this length in s. Collective.
-fn weakest_side<const D: usize, const S: usize>(
+/// The resistance in N s/m along each axis to the translation of a body in steps of this length in s, at nodes of this rank whose rows of
+/// the matrix do not show it: nodes that face another body, where it is that of the body that resists less, and contact nodes of
+/// quadratic cells. Collective.
+fn resistances<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
-    length: f64,
+    (rows, length): (&BlockRows, f64),
 ) -> Result<BTreeMap<usize, Vector<D>>, Agreed> {
-    let Some(coupling) = &body.coupling else { return Ok(BTreeMap::new()) };
-    let rows = body.matrix_of_bodies(session, length)?;
-    let resistances = || -> Result<BTreeMap<usize, Vector<D>>> {
-        let mut all = DistributedVector::ghosted(D, body.mesh.owned, &body.mesh.ghosts)?;
+    let mesh = &body.mesh;
+    let is_quadratic = mesh.corner_nodes < mesh.total_nodes;
+    let of_bodies = match &body.coupling {
+        Some(_) => Some(body.matrix_of_bodies(session, length)?),
+        None if !is_quadratic => return Ok(BTreeMap::new()),
+        None => None,
+    };
+    let rows = of_bodies.as_ref().unwrap_or(rows);
+    let sums = || -> Result<Vec<f64>> {
+        let mut all = DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts)?;
         {
             let mut values = all.owned_mut()?;
             for (node, range) in rows.offsets.windows(2).enumerate() {
                 let blocks = rows.values[range[0] * D * D..range[1] * D * D].chunks_exact(D * D);
-                let rigid: [f64; D] = rigid_part(&body.mesh, &[1.0; D]);
+                let rigid: [f64; D] = rigid_part(mesh, &[1.0; D]);
                 blocks.for_each(|block| {
                     (0..D).for_each(|i| values[node * D + i] += rigid[i] * block[i * D + i]);
                 });
             }
         }
         all.update_ghosts()?;
-        let values = all.local()?;
-        let weaker = |(slave, masters): (u32, &[(u32, f64)])| {
-            let along = |i: usize| {
-                // Some shares may be negative.
-                let facing =
-                    masters.iter().map(|(master, share)| share.max(0.0) * values[*master as usize * D + i]);
-                facing.sum::<f64>().min(values[slave as usize * D + i])
-            };
-            (slave as usize, std::array::from_fn(along))
-        };
-        Ok(coupling.slaves().map(weaker).collect())
+        Ok(all.local()?.to_vec())
     };
-    session.agree(resistances())
+    let mut values = session.agree(sums())?;
+    // The integrals of shape functions at corners of quadratic cells, and with them their shares of the mass, are 0 or negative.
+    for cell in 0..mesh.cell_count() {
+        for (&middle, ends) in mesh.cell_midsides(cell).iter().zip(edges_of_cell::<D>()) {
+            for (i, end) in (0..D).flat_map(|i| ends.map(|end| (i, end))) {
+                let (at, middle) = (mesh.cell(cell)[end] as usize * D + i, values[middle as usize * D + i]);
+                values[at] = larger(values[at], middle);
+            }
+        }
+    }
+    let at = |node: usize| -> Vector<D> { std::array::from_fn(|i| values[node * D + i]) };
+    let nodes = body.contact_nodes();
+    let owned = nodes.iter().map(|contact| contact.node).filter(|node| is_quadratic && *node < mesh.owned);
+    let mut found: BTreeMap<usize, Vector<D>> = owned.map(|node| (node, at(node))).collect();
+    for (slave, masters) in body.coupling.iter().flat_map(Coupling::slaves) {
+        let along = |i: usize| {
+            // Some shares may be negative.
+            let facing =
+                masters.iter().map(|(master, share)| share.max(0.0) * values[*master as usize * D + i]);
+            facing.sum::<f64>().min(values[slave as usize * D + i])
+        };
+        found.insert(slave as usize, std::array::from_fn(along));
+    }
+    Ok(found)
 }
 
 /// The part of a motion that is a translation of the body: of a body of revolution along its axis.

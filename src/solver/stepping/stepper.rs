@@ -29,7 +29,7 @@ use crate::{
     },
     job::{Accept, Scheme},
     linear_algebra::petsc::DistributedVector,
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
 };
 use std::time::Instant;
 
@@ -431,6 +431,16 @@ impl Stepper {
         }
         self.heat_of_step = Some(found?);
         Ok(())
+    }
+
+    /// The heat in J that rounding errors may generate in the step just committed. Collective.
+    pub fn rounding_of_heat<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+    ) -> Result<f64, Agreed> {
+        let (Some(step), Some(heat)) = (&self.heat, &body.heat) else { return Ok(0.0) };
+        step.rounding(session, heat)
     }
 
     /// Finds the temperature at the end of the step just solved; gives the energies of heat. Collective.

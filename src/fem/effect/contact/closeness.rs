@@ -13,6 +13,8 @@ pub struct Closeness {
     pub slip: f64,
     /// Largest angle in rad of edges of another body over points with contact pressure.
     pub sharpness: f64,
+    /// Longest way in m of the obstacle in a step, where a force moves it.
+    pub leap: f64,
     /// Largest distance in m by which a point with contact pressure had moved along an obstacle.
     pub moved: f64,
     /// Largest change in m of the gap of such a point by that.
@@ -22,7 +24,7 @@ pub struct Closeness {
 }
 
 /// How many numbers these are.
-const COUNT: usize = 7;
+const COUNT: usize = 8;
 
 impl Default for Closeness {
     fn default() -> Self {
@@ -38,8 +40,8 @@ impl Closeness {
 
     /// All of them.
     fn numbers(self) -> [f64; COUNT] {
-        let Self { penetration, held, slip, sharpness, moved, shift, shift_to_spread } = self;
-        [penetration, held, slip, sharpness, moved, shift, shift_to_spread]
+        let Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread } = self;
+        [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread]
     }
 
     /// The one over all ranks. Collective.
@@ -48,8 +50,8 @@ impl Closeness {
     }
 
     /// The one with these numbers.
-    fn of([penetration, held, slip, sharpness, moved, shift, shift_to_spread]: [f64; COUNT]) -> Self {
-        Self { penetration, held, slip, sharpness, moved, shift, shift_to_spread }
+    fn of([penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread]: [f64; COUNT]) -> Self {
+        Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread }
     }
 
     /// From the numbers of a checkpoint.

@@ -21,7 +21,7 @@ use crate::{
         contact::{Gap, ObstacleLoad, Rate},
         expression::Scalar,
     },
-    linear_algebra::tensor::{Vector, add_scaled, cross, larger, norm},
+    linear_algebra::tensor::{Vector, add_scaled, cross, norm},
 };
 
 /// Kinetic energy of the obstacles that forces and moments move.
@@ -62,8 +62,6 @@ pub struct LoadedMotion {
     earlier: [f64; 2],
     /// Displacement at the end of the current step, and the velocity in its equations.
     trial: [f64; 2],
-    /// The longest way in m (rad) in a step of the run.
-    pub longest_way: f64,
     /// Resultant in N (N m) of the contact tractions in the last step and in the current one.
     resultant: [f64; 2],
     blend: Blend,
@@ -294,7 +292,6 @@ impl LoadedMotion {
             start,
             earlier,
             trial,
-            longest_way: 0.0,
             resultant,
             blend: Blend::euler(0.0),
             driving: 0.0,
@@ -306,6 +303,11 @@ impl LoadedMotion {
     pub fn balanced(&self) -> [f64; 2] {
         let [displacement, velocity] = self.trial;
         [displacement - (self.blend.way() - self.blend.length) * velocity, velocity]
+    }
+
+    /// The way in m (rad) in the step just solved, before it is committed.
+    pub fn way(&self) -> f64 {
+        (self.end()[0] - self.converged[0]).abs()
     }
 
     /// Displacement and velocity, each at the end of the step, after the last one, before it, and at the start of the run.
@@ -437,7 +439,6 @@ impl LoadedMotion {
 
     fn commit(&mut self) {
         (self.earlier, self.converged) = (self.converged, self.end());
-        self.longest_way = larger(self.longest_way, (self.converged[0] - self.earlier[0]).abs());
         self.resultant[0] = self.resultant[1];
     }
 }

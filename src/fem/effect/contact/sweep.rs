@@ -156,6 +156,9 @@ impl<const D: usize> Contact<D> {
             return;
         }
         let mut closeness = self.closeness;
+        if let [Some(motion), _] = &self.obstacle.motions {
+            closeness.leap = larger(closeness.leap, motion.way());
+        }
         for point in &self.normal.points {
             let after = (point.context.penetration + point.advance(Body, velocity)) / point.stretch;
             if point.carries(&self.normal.law) {
