@@ -96,8 +96,8 @@ fn a_rounded_pad_rubs_with_its_coefficient_on_any_number_of_ranks_and_restarts_i
     }
 }
 
-/// What the nodes of either side face is found anew as the pad slides, and with it their gaps, which jump. The work on these jumps, 3 to 18 kJ
-/// of the 30 kJ stored, is an error of the scheme, and in the sum nearly cancels what implicit Euler dissipates as the pressures jump.
+/// What the nodes of either side face is found anew as the pad slides, and with it their gaps, which jump. The work on these jumps, 3 to 18
+/// kJ of the 30 kJ stored, is an error of the scheme, and in the sum nearly cancels what implicit Euler dissipates as the pressures jump.
 #[test]
 fn contact_without_friction_dissipates_nothing_as_bodies_without_mass_slide() {
     for side in ["on", "against"] {

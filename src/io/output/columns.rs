@@ -361,8 +361,8 @@ pub(crate) const PROFILES: RunTable = RunTable {
         &[Column::plain(
             "slip",
             "m",
-            "accumulated slip distance relative to the obstacle; only if a profile has friction that depends on it, or with `[output] also` or \
-             `probe_also`",
+            "accumulated slip distance relative to the obstacle; only if a profile has friction that depends on it, or with `[output] also` \
+             or `probe_also`",
         )],
         &[Column::vector("tangential_displacement", "m", "displacement without its normal component")],
     ],
