@@ -195,7 +195,7 @@ impl FrictionBound for CoefficientFormula {
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        self.coefficient.uses(Variable::L).then(|| FrictionHistory {
+        self.coefficient.uses(Variable::L).then_some(FrictionHistory {
             quantity: SLIP,
             initial: 0.0,
             share: 1.0,
