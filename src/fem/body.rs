@@ -332,12 +332,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
             session.agree(paired.copy_from(displacement).and_then(|()| paired.update_ghosts()))?;
         }
         let displacement = session.agree(displacement.local())?;
-        // Without mass nothing is thrown.
-        let touches = if anew && self.has_form(Form::Mass) {
-            Some(session.agree(self.touches(&displacement))?)
-        } else {
-            None
-        };
+        let touches = if anew { Some(session.agree(self.touches(&displacement))?) } else { None };
+        let has_mass = self.has_form(Form::Mass);
         let moved = self.mesh.nodes.iter().zip(displacement.chunks_exact(D));
         let places: Vec<Vector<D>> =
             moved.map(|(place, moved)| std::array::from_fn(|i| place[i] + moved[i])).collect();
@@ -348,7 +344,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.coupling = Some(Coupling::new(session, &self.mesh, &shares(&self.mesh, &pairs), &self.held)?);
         let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, &displacement);
         for pair in pairs.iter().filter(|pair| pair.slides) {
-            let touches = touches.as_ref().map(|touches| &touches[pair.contact][..]);
+            let touches = touches.as_ref().map(|touches| (&touches[pair.contact][..], has_mass));
             session.agree(self.contacts[pair.contact].face(&pair.nodes, &self.held, &seen, touches))?;
         }
         self.pairs = pairs;

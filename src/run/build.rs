@@ -10,7 +10,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Heat, Load, Moment,
+            Contact, ContactConditions, ElasticPoint, ElasticSupport, Friction, Gravity, Heat, Load, Moment,
             Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
             surface_effects,
         },
@@ -92,6 +92,9 @@ pub(super) fn body<const D: usize, const S: usize>(
     }
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         redistribute_mass(session, job, &mut body, &parts, &state)?;
+    }
+    if job.output.asks_for_slip() {
+        body.contacts.iter_mut().flat_map(|contact| &mut contact.friction).for_each(Friction::keep_slip);
     }
     if job.time.adaptive.is_some() || job.time.scheme.states() > 1 {
         body.keep_earlier();

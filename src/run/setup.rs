@@ -54,8 +54,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let paired = pairs::find(session, job, &mut mesh, &circumstances)?;
     let probes = session.agree(Probes::locate(session, &mesh, &job.output))?;
     let (mut body, mut state) = build::body::<D, S>(session, job, mesh, paired)?;
-    let fault = probed::fault(&job.output.probe_also, &body);
-    let fault = fault.map(|[message, help]| loaded.fault("output.probe_also", message, help));
+    let fault = probed::fault(&job.output, &body);
+    let fault = fault.map(|(key, [message, help])| loaded.fault(key, message, help));
     session.agree(fault.map_or(Ok(()), Err))?;
     let began_from = transfer(session, (loaded, from), &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;

@@ -21,7 +21,13 @@ impl NodeHistory {
 
     /// The change of the value of a node, by its position, in the last step; 0 where earlier values are not kept.
     pub(super) fn last_change(&self, at: usize) -> f64 {
-        self.earlier.as_ref().map_or(0.0, |earlier| self.converged[at] - earlier[at])
+        let [recent, earlier] = self.last_two(at);
+        recent - earlier
+    }
+
+    /// The values of a node, by its position, after the last step and before it; the same where earlier values are not kept.
+    pub(super) fn last_two(&self, at: usize) -> [f64; 2] {
+        [&self.converged, self.earlier.as_ref().unwrap_or(&self.converged)].map(|values| values[at])
     }
 
     /// Trial and converged value of each node and the one before the last step, if they are kept.

@@ -249,7 +249,10 @@ pub fn restore<const D: usize, const S: usize>(
     }
     for (at, kept) in kept_by(body).into_iter().enumerate() {
         for (quantity, moment, width) in kept {
-            body.restore_history(quantity, moment, &saved.rows[at].read(quantity.name(moment), width)?);
+            let name = quantity.name(moment);
+            let is_there = saved.tables[at].iter().any(|table| table == name);
+            session.agree(if is_there { Ok(()) } else { Err(refused(path, &not_kept(quantity))) })?;
+            body.restore_history(quantity, moment, &saved.rows[at].read(name, width)?);
         }
     }
     body.refresh_histories()?;
@@ -519,6 +522,15 @@ pub fn count_from<const D: usize, const S: usize>(
     state.displacement_origin = Some(origin);
     body.support_motion.iter_mut().for_each(|motion| motion.count_from(values));
     Ok(())
+}
+
+/// Why a run of the same problem did not write a history: only output asks for it.
+fn not_kept(quantity: Quantity) -> String {
+    let name = quantity.name(Moment::Last);
+    format!(
+        "the checkpoint has no {name}, which the job asks for and that of the checkpoint did not: delete \"{name}\" from [output] also and \
+         probe_also, or start the run again without --restart"
+    )
 }
 
 fn refused(path: &Path, words: &str) -> Error {

@@ -312,7 +312,7 @@ pub(crate) const PROBES: RunTable = RunTable {
         &[Column::vector("contact_traction", "Pa", "contact traction")],
         &[Column::plain("gap", "m", "distance to the obstacle along the normal")],
         &[Column::vector("sliding_velocity", "m/s", "velocity relative to the obstacle along the boundary")],
-        &[Column::plain("slip", "m", "slip distance of the friction law")],
+        &[Column::plain("slip", "m", "accumulated slip distance relative to the obstacle")],
         &[Column::plain("wear", "m", "depth of wear")],
         &[Column::plain("temperature", "K", "temperature")],
     ],
@@ -359,6 +359,12 @@ pub(crate) const PROFILES: RunTable = RunTable {
                 "velocity along the boundary relative to the obstacle; only if a profile has friction",
             ),
         ],
+        &[Column::plain(
+            "slip",
+            "m",
+            "accumulated slip distance relative to the obstacle; only if a profile has friction that depends on it, or with `[output] also` \
+             or `probe_also`",
+        )],
         &[Column::vector("tangential_displacement", "m", "displacement without its normal component")],
     ],
 };

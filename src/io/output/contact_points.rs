@@ -15,7 +15,7 @@ use crate::{
 use std::{cmp::Ordering, collections::BTreeSet};
 
 /// Values of a state that corners have as means, vectors as in space.
-const VALUES: usize = 14;
+const VALUES: usize = 15;
 /// Pressures and normals that differ by a smaller share are the same: the rest is rounding, which depends on the partition.
 const SAME: f64 = 1e-9;
 /// Cosine of the angle up to which two normals at a node are those of one face.
@@ -211,6 +211,7 @@ fn values_of<const D: usize>(state: &PointState<D>) -> [f64; VALUES] {
     for (at, vector) in [state.direction, state.sliding, state.friction].iter().enumerate() {
         out[5 + 3 * at..][..D].copy_from_slice(vector);
     }
+    out[14] = state.slip;
     out
 }
 
@@ -227,5 +228,6 @@ fn state_of<const D: usize>(values: &[f64; VALUES]) -> PointState<D> {
         sticks: (rubs > 0.0).then_some(sticks >= 0.5 * rubs),
         sliding: vector(1),
         friction: vector(2),
+        slip: values[14],
     }
 }

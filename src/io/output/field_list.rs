@@ -166,7 +166,7 @@ static HISTORIES: [OutputField; 8] = [
         "slip",
         Place::Node,
         "m",
-        "with friction that depends on the slip",
+        "with friction that depends on the slip, or with `[output] also` or `probe_also`",
         "accumulated slip distance relative to the obstacle; 0 at other nodes",
     ),
     history("wear", Place::Node, "m", "with `[contact.wear]`", "depth of wear; 0 at other nodes"),

@@ -9,14 +9,22 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::{body::Body, effect::History, resultants::BalancedMotion, space::omits_corners},
-    job::ProbedQuantity,
+    fem::{
+        body::Body,
+        effect::{Friction, History},
+        resultants::BalancedMotion,
+        space::omits_corners,
+    },
+    job::{FurtherField, Output, ProbedQuantity},
     mesh::Mesh,
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 
 /// Number of the quantities.
 const COUNT: usize = 15;
+
+/// What a body needs to have a slip distance.
+const FRICTION: &str = "a contact with friction, whose coefficient may be 0";
 
 /// The quantities, in the order of their columns in `probes.csv`, each with what it is made of.
 const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
@@ -42,7 +50,7 @@ const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
     (ProbedQuantity::ContactTraction, &[Source::Field(Position::CONTACT_TRACTION)]),
     (ProbedQuantity::Gap, &[Source::Field(Position::GAP)]),
     (ProbedQuantity::SlidingVelocity, &[Source::Field(Position::SLIDING_VELOCITY)]),
-    (ProbedQuantity::Slip, &[Source::OfNodes("slip", "a friction law that depends on the slip")]),
+    (ProbedQuantity::Slip, &[Source::OfNodes("slip", FRICTION)]),
     (ProbedQuantity::Wear, &[Source::OfNodes("wear", "[contact.wear]")]),
     (ProbedQuantity::Temperature, &[Source::Field(Position::TEMPERATURE)]),
 ];
@@ -86,8 +94,23 @@ fn sources(wanted: &[ProbedQuantity]) -> impl Iterator<Item = Source> {
         .copied()
 }
 
-/// What is wrong with quantities that the body does not have: message and advice.
+/// What is wrong with quantities of probes and further fields that the body does not have: key, message and advice.
 pub(crate) fn fault<const D: usize, const S: usize>(
+    output: &Output,
+    body: &Body<D, S>,
+) -> Option<(&'static str, [String; 2])> {
+    let of_probes = fault_of_probes(&output.probe_also, body).map(|fault| ("output.probe_also", fault));
+    let is_kept = body.contacts.iter().flat_map(|contact| &contact.friction).any(Friction::keeps_slip);
+    let of_fields = (output.also.contains(&FurtherField::Slip) && !is_kept)
+        .then(|| ("output.also", words_of_missing(["slip", FRICTION])));
+    of_probes.or(of_fields)
+}
+
+fn words_of_missing([name, needed]: [&str; 2]) -> [String; 2] {
+    [format!("the body has no {name}"), format!("it needs {needed}; or delete \"{name}\" from the list")]
+}
+
+fn fault_of_probes<const D: usize, const S: usize>(
     wanted: &[ProbedQuantity],
     body: &Body<D, S>,
 ) -> Option<[String; 2]> {
@@ -107,10 +130,7 @@ pub(crate) fn fault<const D: usize, const S: usize>(
             Source::Field(_) | Source::Acceleration => continue,
         };
         if !is_there {
-            return Some([
-                format!("the body has no {name}"),
-                format!("it needs {needed}; or delete \"{name}\" from the list"),
-            ]);
+            return Some(words_of_missing([name, needed]));
         }
     }
     None

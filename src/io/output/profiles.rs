@@ -10,7 +10,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::PointState,
+        effect::{Friction, PointState},
         space::{SurfacePoint, surface_points},
         state::State,
     },
@@ -38,6 +38,8 @@ struct OptionalColumns {
     /// A law of the displacement acts on one of the profiles.
     gap: bool,
     friction: bool,
+    /// Slip distances are kept.
+    slip: bool,
 }
 
 /// Cosine of the angle up to which the normals of a profile and of a contact point are those of the same side of an edge: at the corner of
@@ -72,6 +74,7 @@ impl<const D: usize> Profiles<D> {
         let with = OptionalColumns {
             gap: contacts().any(|contact| contact.normal.law.depends_on_displacement()),
             friction: contacts().any(|contact| contact.friction.is_some()),
+            slip: contacts().flat_map(|contact| &contact.friction).any(Friction::keeps_slip),
         };
         Ok(Self { profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?, with, file: None })
     }
@@ -87,7 +90,7 @@ impl<const D: usize> Profiles<D> {
             return Ok(());
         }
         let path = folder.join(PROFILES.file);
-        let header = PROFILES.header(D, &[true, self.with.gap, self.with.friction, true]);
+        let header = PROFILES.header(D, &[true, self.with.gap, self.with.friction, self.with.slip, true]);
         self.file = Some(CsvFile::open(&path, &header, goes_on_after)?);
         Ok(())
     }
@@ -102,7 +105,8 @@ impl<const D: usize> Profiles<D> {
     ) -> Result<(), Agreed> {
         let at = Converged { session, body, state, stress };
         let states = session.agree(contact_points(at))?;
-        let width = 2 * D + 3 + usize::from(self.with.gap) + if self.with.friction { 2 * D } else { 0 };
+        let OptionalColumns { gap, friction, slip } = self.with;
+        let width = 2 * D + 3 + usize::from(gap) + if friction { 2 * D } else { 0 } + usize::from(slip);
         for profile in &self.profiles {
             let rows = session.agree(profile.rows(at, &states, self.with))?;
             // All rows to rank 0.
@@ -139,7 +143,7 @@ impl<const D: usize> Profiles<D> {
 
 impl<const D: usize> Profile<D> {
     /// Position, normal displacement, normal velocity, contact pressure, if requested the gap, the friction traction `-sigma_tau` and
-    /// the sliding velocity, and tangential displacement of each point on this rank.
+    /// the sliding velocity, the slip distance, and tangential displacement of each point on this rank.
     fn rows<const S: usize>(
         &self,
         Converged { body, state, stress, .. }: Converged<'_, D, S>,
@@ -178,6 +182,9 @@ impl<const D: usize> Profile<D> {
             if with.friction {
                 let rubbing = here.map_or([[0.0; D]; 2], |state| [state.friction, state.sliding]);
                 out.extend(rubbing.concat());
+            }
+            if with.slip {
+                out.push(here.map_or(0.0, |state| state.slip));
             }
             out.extend(add_scaled(&point.value(&displacement), -normal_displacement, &point.normal));
         }

@@ -89,6 +89,9 @@ pub enum FurtherField {
     Branch,
     /// The velocity relative to the obstacle along the boundary at the nodes of contacts with friction in m/s; zero at other nodes.
     SlidingVelocity,
+    /// The accumulated slip distance relative to the obstacle at the nodes of contacts with friction in m; 0 at other nodes. Without this
+    /// entry it is written where a friction law depends on it.
+    Slip,
 }
 
 /// A quantity of probes.
@@ -119,7 +122,7 @@ pub enum ProbedQuantity {
     Gap,
     /// The velocity relative to the obstacle along the boundary in m/s.
     SlidingVelocity,
-    /// The slip distance of friction laws that depend on it in m.
+    /// The accumulated slip distance relative to the obstacle, at contacts with friction, in m.
     Slip,
     /// The depth of wear in m.
     Wear,
@@ -200,6 +203,11 @@ fn keep() -> u32 {
 }
 
 impl Output {
+    /// Whether slip distances are written also where no friction law depends on them.
+    pub fn asks_for_slip(&self) -> bool {
+        self.also.contains(&FurtherField::Slip) || self.probe_also.contains(&ProbedQuantity::Slip)
+    }
+
     /// Checks the keys of a run that ends at this time in s.
     pub(in crate::job) fn check(&self, table: &mut Table<'_>, end: f64) {
         for (list, every) in [("fields", &self.fields), ("profiles", &self.profiles)] {

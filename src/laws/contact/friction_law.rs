@@ -9,7 +9,7 @@
 use crate::laws::{
     expression::Scalar,
     law::LawFault,
-    step::{Blend, Quantity},
+    step::{Blend, Quantity, quantity},
 };
 
 /// The fault of a static coefficient below the dynamic one.
@@ -238,6 +238,15 @@ pub trait FrictionBound {
         Slip { speed, traction, derivative, slope, coefficient }
     }
 }
+
+/// The accumulated slip distance in m after a step that starts from this blend of those after the last step and before it, at this sliding
+/// velocity in m/s at its end. Where a point comes to rest its slip ends, whatever the blend of a two-step scheme continues.
+pub fn slip_after([recent, earlier]: [f64; 2], blend: Blend, speed: f64) -> f64 {
+    if speed == 0.0 { recent } else { blend.of(recent, earlier) + blend.length * speed }
+}
+
+/// The accumulated slip distance.
+pub const SLIP: Quantity = quantity!("slip");
 
 /// A point whose velocity follows the parameter by less than this share of `1 / c` counts as sticking: it creeps so slowly that the change
 /// of its velocity has no effect on Newton's method, while its slope would only spoil the condition of the matrix.

@@ -26,7 +26,7 @@ mod table;
 mod wear;
 
 pub use adhesion::{Adhesion, Toughness};
-pub use friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip};
+pub use friction_law::{FrictionBound, FrictionHistory, SLIP, SlidingContext, Slip, slip_after};
 pub use laws::*;
 pub use memory::Memory;
 pub use normal_law::{NodeContext, NormalParameters, Resolved, Response};

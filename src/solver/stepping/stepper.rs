@@ -21,8 +21,8 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{
-            CONTACT, ELASTIC, Energy, Form, Freedom, Heat, NUMERICAL, Role, SLIP_BETWEEN_PAIRINGS, Step,
-            THERMAL_WORK, VISCOUS, WORK,
+            CONTACT, Contact, ELASTIC, Energy, Form, Freedom, Heat, NUMERICAL, Role, SLIP_BETWEEN_PAIRINGS,
+            Step, THERMAL_WORK, VISCOUS, WORK,
         },
         resultants::BalancedMotion,
         state::State,
@@ -515,6 +515,7 @@ impl Stepper {
         outcome.energy += of_obstacles;
         self.clock.balance += balancing.elapsed();
         outcome.energy[NUMERICAL] += std::mem::take(&mut self.energy_of_pairing);
+        body.contacts.iter_mut().for_each(Contact::forget_found);
         outcome.energy += self.heat_of_step.take().unwrap_or_default();
         if let Some(heat) = &self.heat {
             heat.commit(body)?;

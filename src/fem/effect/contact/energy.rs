@@ -39,7 +39,8 @@ impl<const D: usize> Contact<D> {
     /// `k p v + numerical = (e(d_n) - e(d_{n-1})) + p g + p h`: stored energy, work on the obstacle, dissipation. Where the law stores
     /// nothing, as a rigid obstacle, `p (d_n - d_{n-1})` is dissipated. Friction `q` on an obstacle with the velocity `w` absorbs
     /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle. Where supports prescribe a part of `v`, they do the work of pressure and
-    /// friction there.
+    /// friction there. Where bodies slide, a point is deeper or less deep because what it faces was found anew: the work on this jump is a
+    /// term of the scheme.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> ContactEnergy {
         let mut sum = ContactEnergy::default();
         let (law, is_of_two_steps) = (&self.normal.law, self.blend.earlier != 0.0);
@@ -64,8 +65,10 @@ impl<const D: usize> Contact<D> {
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let energies = law.energy(after).zip(law.energy(point.penetration_before));
             let lost = match energies {
-                Some(_) => lost_at_wall(law, pressure, [point.penetration_before, after]),
-                None => times(pressure, after - before),
+                Some(_) => {
+                    lost_at_wall(law, pressure, [point.penetration_before - point.found_deeper, after])
+                }
+                None => times(pressure, after - (before - point.found_deeper)),
             };
             let stored = energies.map_or(0.0, |energies| {
                 point.weight * (energies.0 - energies.1) + (point.weight - point.weight_before) * energies.1

@@ -27,8 +27,11 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{effect::Blend, space::Held},
-    laws::contact::{FrictionLaw, SlidingContext, Slip},
+    fem::{
+        effect::{Blend, node_history::NodeHistory},
+        space::Held,
+    },
+    laws::contact::{FrictionLaw, SLIP, SlidingContext, Slip},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     mesh::Mesh,
 };
@@ -47,6 +50,8 @@ pub struct Friction<const D: usize> {
     /// Whether the bound depends on the pressure while a step is solved.
     pub(super) follows: bool,
     pub(super) points: Vec<TangentialPoint<D>>,
+    /// The accumulated slip distance of the points in m, where the job asks for it and the law does not keep it.
+    pub(super) slip: Option<NodeHistory>,
     /// Nodes that this rank owns.
     pub(super) owned: usize,
     /// Tangents that supports hold in part, because they hold a part of the normal, beside free ones, with the points of the contact;
@@ -124,9 +129,36 @@ impl<const D: usize> Friction<D> {
             give: 0.0,
             follows,
             points: out,
+            slip: None,
             owned: mesh.owned,
             partly_held,
         })
+    }
+
+    /// Keeps the accumulated slip distance from now on, if the law does not.
+    pub fn keep_slip(&mut self) {
+        if !self.law_keeps_slip() {
+            let nodes = self.points.iter().map(|point| point.node() as u32).collect();
+            self.slip = Some(NodeHistory::new(SLIP, nodes, self.owned, 0.0));
+        }
+    }
+
+    fn law_keeps_slip(&self) -> bool {
+        self.law.history().is_some_and(|history| history.quantity == SLIP)
+    }
+
+    /// Whether the accumulated slip distance is kept, by the law or for output.
+    pub fn keeps_slip(&self) -> bool {
+        self.slip.is_some() || self.law_keeps_slip()
+    }
+
+    /// The accumulated slip distance in m of a point, by its position; 0 where it is not kept.
+    pub(super) fn slip_of(&self, at: usize) -> f64 {
+        match &self.slip {
+            Some(slip) => slip.converged[at],
+            None if self.law_keeps_slip() => self.points[at].history[0],
+            None => 0.0,
+        }
     }
 
     /// The nodes of this rank, each with the free tangents of its points.
@@ -619,6 +651,7 @@ mod tests {
             give: 0.0,
             follows: true,
             points: vec![point],
+            slip: None,
             owned: 1,
             partly_held: Vec::new(),
         }

@@ -97,6 +97,8 @@ pub(super) struct Point<const D: usize> {
     pub edge: Option<Rc<Edge<D>>>,
     /// Displacement in m relative to the body that it faces when it began to face it.
     pub faced_at: Vector<D>,
+    /// By how much it is deeper in m, in the first step after what it faces was found anew, for that reason alone.
+    pub found_deeper: f64,
     /// The gap in m at the end of the step of the undeformed surface without wear.
     pub reach: f64,
     /// Normal displacement in m of the surface without wear at the start of the step.
@@ -154,6 +156,7 @@ impl<const D: usize> Point<D> {
             stretch: 1.0,
             sharpness: 0.0,
             faced_at: [0.0; D],
+            found_deeper: 0.0,
             turns: false,
             edge: None,
             reach: 0.0,

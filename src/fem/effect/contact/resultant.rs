@@ -48,12 +48,15 @@ pub struct PointState<const D: usize> {
     pub sliding: Vector<D>,
     /// Friction traction `-sigma_tau` in Pa.
     pub friction: Vector<D>,
+    /// Accumulated slip distance in m, with friction that keeps it.
+    pub slip: f64,
 }
 
 impl<const D: usize> Default for PointState<D> {
     fn default() -> Self {
         let [normal, direction, sliding, friction] = [[0.0; D]; 4];
-        Self { normal, direction, pressure: 0.0, gap: 0.0, branch: 0, sticks: None, sliding, friction }
+        let [pressure, gap, slip] = [0.0; 3];
+        Self { normal, direction, pressure, gap, branch: 0, sticks: None, sliding, friction, slip }
     }
 }
 
@@ -98,12 +101,13 @@ impl<const D: usize> Contact<D> {
         }
         let friction = self.friction.as_ref();
         let mut moving =
-            friction.into_iter().flat_map(|friction| friction.sliding(Body, velocity)).peekable();
+            friction.into_iter().flat_map(|friction| friction.sliding(Body, velocity)).enumerate().peekable();
         let mut motions = friction.into_iter().flat_map(|friction| friction.motions(Body, velocity));
         for (at, point) in self.normal.points.iter().enumerate() {
             let mut state =
                 PointState { normal: point.normal, direction: point.direction, ..PointState::default() };
-            while let Some((tangential, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
+            while let Some((number, (tangential, sliding))) = moving.next_if(|(_, (of, _))| of.at == at) {
+                state.slip = friction.map_or(0.0, |friction| friction.slip_of(number));
                 state.sliding = sliding.map(|speed| speed / point.stretch);
                 let (free, held) = tangential.parts_of(traction);
                 state.friction = add_scaled(&free, 1.0, &held);

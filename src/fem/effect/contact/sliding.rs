@@ -17,7 +17,7 @@ use crate::{
         },
         space::Held,
     },
-    laws::contact::{FrictionLaw, LawsOfContact, NodeContext, Wear},
+    laws::contact::{FrictionLaw, LawsOfContact, NodeContext, Wear, slip_after},
     linear_algebra::tensor::norm,
     mesh::Mesh,
 };
@@ -52,6 +52,13 @@ impl<const D: usize> Contact<D> {
         let blend = self.blend.to_end();
         let Some(friction) = &mut self.friction else { return };
         friction.advance_histories(velocity, blend);
+        if let Some(mut slip) = friction.slip.take() {
+            for (at, (sliding, along)) in friction.sliding(Body, velocity).enumerate() {
+                let speed = friction.speed(sliding, &along) / self.normal.points[sliding.at].stretch;
+                slip.trial[at] = slip_after(slip.last_two(at), blend, speed);
+            }
+            friction.slip = Some(slip);
+        }
         let Some(wear) = self.wear else { return };
         for (sliding, slip) in friction.sliding(Body, velocity) {
             let point = &mut self.normal.points[sliding.at];
@@ -135,12 +142,16 @@ impl<const D: usize> Contact<D> {
     /// The histories that friction and wear keep at nodes.
     pub fn histories(&self) -> impl Iterator<Item = &dyn HistoryStore> {
         let friction = self.friction.iter().map(|friction| friction as &dyn HistoryStore);
-        friction.chain([self as &dyn HistoryStore])
+        let slip = self.friction.iter().filter_map(|friction| friction.slip.as_ref());
+        friction.chain(slip.map(|slip| slip as &dyn HistoryStore)).chain([self as &dyn HistoryStore])
     }
 
     /// Visits the same histories.
     pub fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
-        self.friction.iter_mut().for_each(|friction| visit(friction));
+        if let Some(friction) = &mut self.friction {
+            visit(friction);
+            friction.slip.iter_mut().for_each(|slip| visit(slip));
+        }
         visit(self);
     }
 

@@ -42,12 +42,19 @@ pub struct Touch<const D: usize> {
 }
 
 impl<const D: usize> Touch<D> {
+    /// Whether the point touches the body.
+    fn is_closed(&self, point: &Point<D>) -> bool {
+        self.gap <= TOUCHING * point.facet_size
+    }
+
+    /// By how much a point is deeper in m because its gap is found to be this one: where it does not touch, as far as it is inside.
+    fn found_deeper(&self, found: f64, point: &Point<D>) -> f64 {
+        if self.is_closed(point) { self.gap - found } else { (-found).max(0.0) }
+    }
+
     /// The gap in m and the normal at which a point faces a plane from now on, given its gap to the surface found.
     fn plane(&self, found: f64, point: &Point<D>) -> (f64, Vector<D>) {
-        let gap = match self.gap {
-            own if own <= TOUCHING * point.facet_size => own,
-            _ => found.max(0.0),
-        };
+        let gap = if self.is_closed(point) { self.gap } else { found.max(0.0) };
         let along = along_surface(point, &self.moved);
         let slip = norm(&along);
         let least = point.stretch * point.facet_size;
@@ -234,13 +241,15 @@ impl<const D: usize> Contact<D> {
     /// found anew. A law that removed the jump of a point that touches within one step, however short, would throw the bodies apart. So the
     /// new plane goes through the place where the point is, given how it stood, and is inclined so that it reaches the surface when the
     /// point has slid on as far as it will until it faces anew. The pressure, at right angles to the plane, then does no work beyond that
-    /// of closing a gap.
+    /// of closing a gap. Without mass nothing is thrown, and points see the surface as it is found.
+    ///
+    /// `touches` is how the points stood, if they have faced the body before, and whether the bodies have mass.
     pub fn face(
         &mut self,
         nodes: &[PairedNode<D>],
         held: &Held<D>,
         displacement: &[f64],
-        touches: Option<&[Touch<D>]>,
+        touches: Option<(&[Touch<D>], bool)>,
     ) -> Result<()> {
         for (at, node) in nodes.iter().enumerate() {
             let point = &mut self.normal.points[at];
@@ -250,17 +259,29 @@ impl<const D: usize> Contact<D> {
             // Along a normal that is not that of the plane.
             let open = node.distance / dot(&node.normal, &point.normal);
             point.distance = open + dot(&point.faced_at, &point.normal);
-            if let Some(touch) = touches.map(|touches| touches[at]).filter(|_| open.is_finite()) {
+            point.found_deeper = 0.0;
+            if let Some((touches, has_mass)) = touches.filter(|_| open.is_finite()) {
+                let touch = touches[at];
                 let [along, gap] = self.obstacle.position_at(0.0, displacement, point)?;
-                let (kept, normal) = touch.plane(gap - along, point);
-                point.turn(&normal, held);
-                let more = kept - (gap - along);
-                point.distance = open + more + dot(&point.faced_at, &point.normal);
+                let mut found = gap - along;
+                if has_mass {
+                    let (kept, normal) = touch.plane(found, point);
+                    point.turn(&normal, held);
+                    let more = kept - found;
+                    point.distance = open + more + dot(&point.faced_at, &point.normal);
+                    found = kept;
+                }
+                point.found_deeper = touch.found_deeper(found, point);
             }
             point.set_weight(node.weight);
         }
         self.turn_tangents(held);
         Ok(())
+    }
+
+    /// Forgets by how much points are deeper because what they face was found anew, after the energy of a step was computed.
+    pub fn forget_found(&mut self) {
+        self.normal.points.iter_mut().for_each(|point| point.found_deeper = 0.0);
     }
 
     /// Lets the points face planes of an earlier run, see `write_planes`.
@@ -327,6 +348,17 @@ impl<const D: usize> Contact<D> {
 mod tests {
     use super::*;
     use crate::fem::space::SurfacePoint;
+
+    #[test]
+    fn what_is_found_makes_points_deeper_that_touch_and_others_as_far_as_they_are_inside() {
+        let held = Held::<2>::from(vec![false; 2]);
+        let place = SurfacePoint { node: 0, normal: [0.0, -1.0], weight: 1.0 };
+        let mut point = Point::nodal(place, &held);
+        point.facet_size = 0.1;
+        let deeper = |gap: f64, found: f64| Touch { gap, moved: [0.0; 2] }.found_deeper(found, &point);
+        assert_eq!([deeper(0.0, -2.0), deeper(0.0, 2.0), deeper(-3.0, -1.0)], [2.0, -2.0, -2.0]);
+        assert_eq!([deeper(1.0, -2.0), deeper(1.0, 0.5), deeper(f64::INFINITY, -1.0)], [2.0, 0.0, 1.0]);
+    }
 
     #[test]
     fn a_point_that_touches_faces_a_plane_through_its_place_which_leads_to_the_surface_found() {

@@ -7,10 +7,10 @@
 //! proven.
 
 use crate::laws::{
-    contact::friction_law::{FrictionBound, FrictionHistory, STICKS, SlidingContext, Slip},
+    contact::friction_law::{FrictionBound, FrictionHistory, SLIP, STICKS, SlidingContext, Slip, slip_after},
     expression::{Enclosure, Formula, Interval, OfSliding, REACH, Scalar, Supremum, Unproven, Variable},
     law::{Derived, LawFault, increasing_root},
-    step::{Blend, quantity},
+    step::Blend,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -195,8 +195,8 @@ impl FrictionBound for CoefficientFormula {
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        self.coefficient.uses(Variable::L).then(|| FrictionHistory {
-            quantity: quantity!("slip"),
+        self.coefficient.uses(Variable::L).then_some(FrictionHistory {
+            quantity: SLIP,
             initial: 0.0,
             share: 1.0,
         })
@@ -223,9 +223,8 @@ impl FrictionBound for CoefficientFormula {
         !other.iter().any(|variable| self.coefficient.uses(*variable))
     }
 
-    /// As that of [`DistanceWeakening`](super::DistanceWeakening).
-    fn history_after(&self, [recent, earlier]: [f64; 2], blend: Blend, speed: f64) -> f64 {
-        if speed == 0.0 { recent } else { blend.of(recent, earlier) + blend.length * speed }
+    fn history_after(&self, histories: [f64; 2], blend: Blend, speed: f64) -> f64 {
+        slip_after(histories, blend, speed)
     }
 
     fn history_measure(&self, slip: f64) -> f64 {

@@ -12,9 +12,11 @@
 //! steepest decrease is `k (static - dynamic) / distance p`. In a two-step scheme `s0` is its blend of the last two slips and `k` its length.
 
 use crate::laws::{
-    contact::friction_law::{FrictionBound, FrictionHistory, SlidingContext, static_below_dynamic},
+    contact::friction_law::{
+        FrictionBound, FrictionHistory, SLIP, SlidingContext, slip_after, static_below_dynamic,
+    },
     law::LawFault,
-    step::{Blend, quantity},
+    step::Blend,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -87,12 +89,11 @@ impl FrictionBound for DistanceWeakening {
     }
 
     fn history(&self) -> Option<FrictionHistory> {
-        Some(FrictionHistory { quantity: quantity!("slip"), initial: 0.0, share: 1.0 })
+        Some(FrictionHistory { quantity: SLIP, initial: 0.0, share: 1.0 })
     }
 
-    /// Where a point comes to rest its slip ends, whatever the blend of a two-step scheme continues.
-    fn history_after(&self, [recent, earlier]: [f64; 2], blend: Blend, speed: f64) -> f64 {
-        if speed == 0.0 { recent } else { blend.of(recent, earlier) + blend.length * speed }
+    fn history_after(&self, histories: [f64; 2], blend: Blend, speed: f64) -> f64 {
+        slip_after(histories, blend, speed)
     }
 
     fn history_measure(&self, slip: f64) -> f64 {
