@@ -221,7 +221,7 @@ impl<const D: usize> Obstacle<D> {
     pub(super) fn growth(&self, point: &Point<D>) -> Result<f64> {
         let Some((direction, way)) = self.translation() else { return Ok(0.0) };
         let away = norm(&add_scaled(&point.place, -1.0, &self.gap.centre(self.rate.time)));
-        let distance = NEAR * larger(away, point.reach.abs());
+        let distance = NEAR * away.max(point.reach.abs());
         Ok(self.growth_along(point, direction, distance)? * way / point.context.step_length)
     }
 
