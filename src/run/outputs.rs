@@ -236,7 +236,11 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let fields = if self.fields.write_failed() { Ok(()) } else { self.fields.write_out() };
         session.agree(self.flush())?;
         let path = checkpoint_path(&self.folder, state.step);
-        let header = Header::new(session, &self.identity, body, state, of_steps);
+        let (totals, warnings) = of_steps;
+        let header = Header {
+            warnings: warnings.to_vec(),
+            ..Header::new(session, &self.identity, body, state, totals)
+        };
         checkpoint::save(session, &path, &header, body, state)?;
         session.on_first(|| {
             self.checkpoints += length(&path);

@@ -538,3 +538,38 @@ fn an_obstacle_that_leaps_away_in_a_step_is_warned_of() {
         assert_eq!(warns_of(&outcome, &case, words), leaps);
     }
 }
+
+/// Gaps are those of the undeformed body, whose rotations are small.
+#[test]
+fn bodies_that_move_along_inclined_obstacles_or_turn_are_warned_of() {
+    let block = |motion: &str, plane: &str| {
+        Case::written_as(&format!(
+            "
+            mesh.rectangle = {{size = [1.0, 0.4], cells = [5, 2]}}
+            material = {{hypothesis = 'plane_strain', elasticity = {{youngs_modulus = 1e8, poisson_ratio = 0.3}}}}
+            support = [{{on = ['top'], fix = 'all', displacement = ['{motion}', 0]}}]
+            contact = [{{on = ['bottom'], obstacle.plane = {{point = ['{plane}', 0], normal = [-0.02, 1]}}, normal.unilateral = {{}}}}]
+            time = {{scheme = 'implicit_euler', end = 1.0, step = 0.1}}"
+        ))
+    };
+    let warns = |case: Case, ranks: usize, of: &str| {
+        let summary = case.run(ranks).summary();
+        let warnings = summary["warnings"].as_array().expect("a list");
+        warnings.iter().any(|warning| warning.as_str().is_some_and(|words| words.contains(of)))
+    };
+    let along = "along its obstacle while it pressed on it";
+    assert!([1, 2].iter().all(|ranks| warns(block("0.1*t", "0.5"), *ranks, along)), "the block moves");
+    assert!(!warns(block("0", "0.5-0.1*t"), 1, along), "the plane moves");
+    let turning = |speed: f64| {
+        Case::written_as(&format!(
+            "
+            mesh.box = {{size = [0.4, 0.2, 0.1], cells = [2, 1, 1]}}
+            material = {{density = 1000.0, elasticity = {{youngs_modulus = 1e8, poisson_ratio = 0.3}}}}
+            initial.velocity = ['-{speed}*y', '{speed}*x', 0]
+            time = {{scheme = 'bdf2', end = 0.1, step = 0.01}}"
+        ))
+    };
+    let turned = "parts of the body have turned";
+    assert!([1, 2].iter().all(|ranks| warns(turning(1.5), *ranks, turned)), "by 0.15 rad");
+    assert!(!warns(turning(0.5), 1, turned), "by 0.05 rad");
+}

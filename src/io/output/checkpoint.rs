@@ -101,13 +101,13 @@ pub struct Identity {
 }
 
 impl Header {
-    /// The header for a state, and the sums over the steps up to it with their warnings. Collective.
+    /// The header for a state, and the sums over the steps up to it, without warnings. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         identity: &Identity,
         body: &Body<D, S>,
         state: &State,
-        (totals, warnings): (&Totals, &[String]),
+        totals: &Totals,
     ) -> Self {
         let motions = |number: usize| {
             body.contacts.iter().filter_map(move |contact| contact.obstacle.motions[number].as_ref())
@@ -131,7 +131,7 @@ impl Header {
                 .iter()
                 .map(|contact| contact.closeness.of_all(session).saved())
                 .collect(),
-            warnings: warnings.to_vec(),
+            warnings: Vec::new(),
             exchanged: exchanged(body),
             mesh: digest(body),
             physics: identity.physics.clone(),
