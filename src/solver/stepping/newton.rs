@@ -410,7 +410,7 @@ impl Newton {
             Search::FullSteps if limit >= PATIENCE && sharpness == 1.0 => {
                 [most, if self.flow.is_some() { PATIENCE_OF_FLOW } else { PATIENCE }]
             }
-            Search::FewFullSteps => [most, LITTLE_PATIENCE],
+            Search::FewFullSteps if limit >= PATIENCE => [most, LITTLE_PATIENCE],
             _ => [limit, usize::MAX],
         };
         self.counts.restart_search();

@@ -35,8 +35,8 @@ pub(super) struct Lengths {
     pub cached: f64,
 }
 
-/// The least parameters of graphs relative to the resistance of a boundary that moves alone: a whole body on soft supports resists hardly at
-/// all, and unknowns would be so much larger than velocities, which are differences of them, that these lose their digits.
+/// With friction, the least parameters of graphs relative to the resistance of a boundary that moves alone: a whole body on soft supports
+/// resists hardly at all, and unknowns would be so much larger than velocities, which are differences of them, that these lose their digits.
 const LEAST_RESISTANCE: f64 = 0.4;
 
 /// The matrix for steps of one length, and its solver.
@@ -243,12 +243,14 @@ impl StepSolver {
         self.precision = solver.precision().unwrap_or(self.precision);
         // Forces at the surface resist motions of single nodes, which a condensed matrix does not do.
         let is_stiffened = self.newton.as_ref().is_some_and(|newton| newton.flow.is_some());
-        *scales = resistances(session, &body.contacts, like, |motion| {
-            let alone = StepMatrix::power(&*matrix, motion)?;
-            if is_stiffened {
-                return Ok(alone);
+        let rubs = body.contacts.iter().any(|contact| contact.friction.is_some());
+        *scales = resistances(session, &body.contacts, like, |motion| match (is_stiffened, rubs) {
+            (true, _) => StepMatrix::power(&*matrix, motion),
+            (false, false) => solver.power(matrix, motion),
+            (false, true) => {
+                let alone = StepMatrix::power(&*matrix, motion)?;
+                Ok(solver.power(matrix, motion)?.max(LEAST_RESISTANCE * alone))
             }
-            Ok(solver.power(matrix, motion)?.max(LEAST_RESISTANCE * alone))
         })?;
         Ok(true)
     }

@@ -51,8 +51,9 @@ impl<const D: usize> Contact<D> {
         self.obstacle.follows = follows;
         let obstacle = &self.obstacle;
         for point in &mut self.normal.points {
-            point.follows = 0.0;
-            if follows && point.may_follow() {
+            point.follows = if follows && point.may_follow() { point.along_obstacle } else { 0.0 };
+            // Without friction the symmetric equations take no more iterations, which are faster.
+            if follows && point.may_follow() && self.friction.is_some() {
                 let growth = obstacle.growth(point)?;
                 // Where a ray grazes the obstacle, its gap grows fast, but they do not touch. Less is an error of the difference.
                 let is_inclined = INCLINATIONS.contains(&(growth - point.along_obstacle).abs());
