@@ -110,7 +110,8 @@ impl Deadline {
         after(self.began, wall).into_iter().chain(slurm).min().filter(|end| *end > Instant::now())
     }
 
-    /// Called after each step, and after one that was ended: the reason why the run has to stop now, if it has to; the same on all ranks. Collective.
+    /// Called after each step, and after one that was ended: the reason why the run has to stop now, if it has to; the same on all ranks.
+    /// Collective.
     pub(super) fn passed(&mut self, session: &Session) -> Option<String> {
         self.add_round(self.checked.elapsed());
         self.checked = Instant::now();

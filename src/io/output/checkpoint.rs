@@ -72,9 +72,7 @@ pub struct Header {
     /// The digest of the checkpoint from which the run started, if it started from one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_state: Option<String>,
-    /// For each contact: the largest penetration in m so far of points that are free to move, and of points that supports hold; the largest
-    /// slip along another body as a share of a facet, the largest angle in rad of edges of it over points with contact pressure, and the
-    /// longest way in m in a step of an obstacle moved by a force.
+    /// For each contact the numbers of its [`Closeness`] so far, those of all ranks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub closeness: Vec<Vec<Option<f64>>>,
     /// The warnings that the steps so far have given.

@@ -7,8 +7,9 @@
 //! ([`Contact::add_material_motion`]), and velocities of nodes at fixed unknowns change by `M w` ([`Contact::add_motion`]): a row and a
 //! column of the system. Where the normals of body and obstacle are parallel `N = M`, and the system is symmetric; elsewhere the gap grows
 //! otherwise than the material moves along `n`, pressures have moments about the centre of a round obstacle, and where it rolls, other
-//! places touch. The changes of that growth and of the moments within a step are small, exact in residuals, and left out of derivatives. Pressures at
-//! points that supports hold depend on `w` alone ([`Contact::held_stiffness`]).
+//! places touch. Without friction the growth is taken to be that along `n`, so that the system stays symmetric. That, and the changes of
+//! growth and moments within a step, are small, exact in residuals, and left out of derivatives. Pressures at points that supports hold
+//! depend on `w` alone ([`Contact::held_stiffness`]).
 
 use super::{
     Contact,
@@ -52,7 +53,6 @@ impl<const D: usize> Contact<D> {
         let obstacle = &self.obstacle;
         for point in &mut self.normal.points {
             point.follows = if follows && point.may_follow() { point.along_obstacle } else { 0.0 };
-            // Without friction the symmetric equations take no more iterations, which are faster.
             if follows && point.may_follow() && self.friction.is_some() {
                 let growth = obstacle.growth(point)?;
                 // Where a ray grazes the obstacle, its gap grows fast, but they do not touch. Less is an error of the difference.
