@@ -227,14 +227,14 @@ probe = [{ name = "middle", point = [0.5, 0.5] }]
 
 #[test]
 fn warnings_of_runs_are_counted_and_their_first_words_said() {
-    // After a tenth of the time the strain is small; after all of it the theory of small strains does not hold.
+    // After a tenth of the time the strain is small; after three tenths the theory of small strains does not hold.
     let study =
-        "set = [\"time.step=0.1\"]\n[sweep]\n\"time.end\" = [0.1, 1.0]\n[[response]]\nof = \"max_strain\"\n";
+        "set = [\"time.step=0.1\"]\n[sweep]\n\"time.end\" = [0.1, 0.3]\n[[response]]\nof = \"max_strain\"\n";
     let scene = Scene::new(super::scene::SQUARE, study);
     let said = |outcome: crate::launch::Outcome| {
         let text = outcome.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains("s, 1 warning: the strain reached "), "{text}");
-        assert!(text.contains("end-1.0: 1 warning: the strain reached "), "{text}");
+        assert!(text.contains("end-0.3: 1 warning: the strain reached "), "{text}");
         assert_eq!(text.matches("warning").count(), 3, "the table has a column: {text}");
     };
     said(scene.study(1, &[]).expect(0));
@@ -243,13 +243,13 @@ fn warnings_of_runs_are_counted_and_their_first_words_said() {
     let warning = results["runs"][1]["warnings"][0].as_str().expect("a text");
     let out = scene.path("out/study");
     let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
-    let summary: Value = serde_json::from_str(&read("runs/end-1.0/summary.json")).expect("JSON");
+    let summary: Value = serde_json::from_str(&read("runs/end-0.3/summary.json")).expect("JSON");
     assert_eq!(summary["warnings"], serde_json::json!([warning]));
     let csv = read("responses.csv");
     let row = |at: usize| csv.lines().nth(at).expect("a row").split(',').collect::<Vec<_>>();
     assert_eq!(row(0)[2..4], ["status", "warnings"]);
     assert_eq!([row(1)[3], row(2)[3]], ["0", "1"]);
-    assert!(read("study.md").contains("end-1.0: 1 warning: the strain reached "));
+    assert!(read("study.md").contains("end-0.3: 1 warning: the strain reached "));
     assert!(read("study.csv").lines().nth(2).is_some_and(|row| row.contains(",completed,1,")));
     // Those of runs that are used again are not forgotten.
     let again = scene.study(1, &[]).expect(0);

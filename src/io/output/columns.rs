@@ -405,6 +405,7 @@ impl RunTable {
 
     /// The columns of numbers in these of its groups.
     pub(super) fn columns_of_groups(&self, dimension: usize, is_there: &[bool]) -> Vec<String> {
+        assert_eq!(is_there.len(), self.groups.len(), "each group is there or not");
         let groups = self.groups.iter().zip(is_there).filter(|(_, is_there)| **is_there);
         groups.flat_map(|(group, _)| *group).flat_map(|column| column.names(dimension)).collect()
     }
@@ -425,9 +426,9 @@ mod tests {
             RESULTANTS.header(2, &[true, false, true, false, false]),
             "step,time,source,force_x,force_y,moment_z,sticking_area,slipping_area"
         );
-        assert!(RESULTANTS.header(3, &[true]).ends_with("force_z,moment_x,moment_y,moment_z"));
-        assert!(PROFILES.header(2, &[true]).starts_with("time,profile,x,y,normal_displacement,"));
-        assert_eq!(HISTORY.header(2, &[true; 2]).split(',').nth(13), Some("energy_imbalance"));
+        assert!(RESULTANTS.header(3, &[true, false, false, false, false]).ends_with("force_z,moment_x,moment_y,moment_z"));
+        assert!(PROFILES.header(2, &[true, false, false, false, false]).starts_with("time,profile,x,y,normal_displacement,"));
+        assert_eq!(HISTORY.header(2, &[true, true, false]).split(',').nth(13), Some("energy_imbalance"));
         assert_eq!((HISTORY.unit("dt", 3), RESULTANTS.unit("open_area", 2)), ("s", "m"));
     }
 

@@ -105,7 +105,10 @@ impl RunOf<'_> {
             "resultant" => super::resultants::groups(self.job).to_vec(),
             "profile" => {
                 let has_gap = contacts.iter().any(|contact| contact.normal.has_gap());
-                vec![true, has_gap, contacts.iter().any(|contact| contact.friction.is_some()), true]
+                let friction = || contacts.iter().flat_map(|contact| &contact.friction);
+                let asks_for_slip = self.job.output.asks_for_slip();
+                let slip = friction().any(|law| asks_for_slip || law.keeps_slip());
+                vec![true, has_gap, friction().next().is_some(), slip, true]
             }
             "probe" => super::probed::groups(&self.job.output.probe_also),
             _ => vec![true, true, self.job.has_heat()],
@@ -237,6 +240,7 @@ on = 'bottom'
             "resultant.support left.moment_z",
             "resultant.contact bottom.max.largest_pressure",
             "profile.bottom.first.contact_pressure",
+            "profile.bottom.first.tangential_displacement_x",
         ] {
             assert_eq!(faults(name), Vec::<[String; 2]>::new(), "{name}");
         }

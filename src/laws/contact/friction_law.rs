@@ -325,6 +325,11 @@ macro_rules! friction_laws {
                 [self.history().map_or(0.0, |history| history.initial); 2]
             }
 
+            /// Whether its history is the accumulated slip distance.
+            pub fn keeps_slip(&self) -> bool {
+                self.history().is_some_and(|history| history.quantity == $crate::laws::contact::SLIP)
+            }
+
             /// See [`FrictionBound::steepest_decrease`], in a first step of this length in s.
             pub fn first_decrease(&self, length: f64) -> f64 {
                 self.steepest_decrease(self.context(self.first_histories(), Blend::euler(length)))

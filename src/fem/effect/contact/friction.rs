@@ -137,26 +137,22 @@ impl<const D: usize> Friction<D> {
 
     /// Keeps the accumulated slip distance from now on, if the law does not.
     pub fn keep_slip(&mut self) {
-        if !self.law_keeps_slip() {
+        if !self.law.keeps_slip() {
             let nodes = self.points.iter().map(|point| point.node() as u32).collect();
             self.slip = Some(NodeHistory::new(SLIP, nodes, self.owned, 0.0));
         }
     }
 
-    fn law_keeps_slip(&self) -> bool {
-        self.law.history().is_some_and(|history| history.quantity == SLIP)
-    }
-
     /// Whether the accumulated slip distance is kept, by the law or for output.
     pub fn keeps_slip(&self) -> bool {
-        self.slip.is_some() || self.law_keeps_slip()
+        self.slip.is_some() || self.law.keeps_slip()
     }
 
     /// The accumulated slip distance in m of a point, by its position; 0 where it is not kept.
     pub(super) fn slip_of(&self, at: usize) -> f64 {
         match &self.slip {
             Some(slip) => slip.converged[at],
-            None if self.law_keeps_slip() => self.points[at].history[0],
+            None if self.law.keeps_slip() => self.points[at].history[0],
             None => 0.0,
         }
     }
