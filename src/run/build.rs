@@ -392,6 +392,9 @@ fn heat<const D: usize>(
     if job.time.scheme.states() > 1 {
         heat.keep_powers();
     }
+    if job.time.adaptive.is_some() {
+        heat.keep_rates();
+    }
     let of_friction = || job.contact.iter().filter_map(|contact| contact.friction.as_ref());
     if heat.strains() || heat.is_seen_by_flow || of_friction().any(|law| law.sees_temperature()) {
         heat.show();

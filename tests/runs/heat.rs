@@ -190,6 +190,46 @@ fn a_body_that_warms_evenly_takes_long_steps() {
 }
 
 #[test]
+fn adaptive_steps_follow_the_temperature_of_a_body_that_does_not_move() {
+    // A bar at 300 K whose end is suddenly at 400 K: 300 + 100 erfc(x / (2 sqrt(a t))).
+    let bar = || {
+        Case::written_as(
+            "[mesh.rectangle]\nsize = [1, 0.05]\ncells = [80, 1]\n[material]\nhypothesis = \"plane_strain\"\n\
+             elasticity = { youngs_modulus = 1e9, poisson_ratio = 0.3 }\n\
+             heat = { conductivity = 50, volumetric_capacity = 4e6 }\n[[support]]\non = [\"left\"]\nfix = \"all\"\n\
+             [[heat]]\non = [\"left\"]\ntemperature = 400\n[initial]\ntemperature = 300\n\
+             [time]\nscheme = \"implicit_euler\"\nend = 2000\nstep = 10\n\
+             adaptive = { smallest_step = 0.01, largest_step = 1000 }\n[checkpoint]\nevery = 30\nkeep = 5\n\
+             [output]\nprobe = [{ name = \"at\", point = [0.1, 0.025] }]\nprobe_also = [\"temperature\"]\n",
+        )
+    };
+    let straight = bar().run_and_keep(1);
+    let loose = bar().set("time.adaptive.tolerance", "1e-2").run_and_keep(2);
+    let [errors, loose_errors] = [&straight, &loose].map(|case| {
+        let rows = case.results().table("probes.csv");
+        let times = rows.numbers("time");
+        let error = |(time, found): (&f64, f64)| (found - 300.0 - 100.0 * erfc(14.142136 / time.sqrt())).abs();
+        times.iter().zip(rows.numbers("temperature")).skip(1).map(error).fold(0.0, f64::max)
+    });
+    assert!(errors < 0.5 && loose_errors < 1.5 && loose_errors > 1.5 * errors, "{errors} {loose_errors}");
+    let steps = straight.results().number("steps");
+    assert!(steps < 150.0 && loose.results().number("steps") < 60.0, "{steps}");
+    // From its middle on, the same to the last bit.
+    let restarted = bar();
+    let state = straight.results().path("checkpoint-60.h5");
+    restarted.run_with(1, &["--restart", state.to_str().expect("a path")]).expect(0);
+    let [whole, rest] = [&straight, &restarted].map(|case| case.results().table("probes.csv").rows);
+    assert!(rest.len() > 20 && whole.ends_with(&rest[1..]), "{rest:?}");
+}
+
+/// The complementary error function of a number from 0 on (Abramowitz and Stegun, 7.1.26, to 1.5e-7).
+fn erfc(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.3275911 * x);
+    let sum = [0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429];
+    sum.iter().rev().fold(0.0, |sum, factor| t * (factor + sum)) * (-x * x).exp()
+}
+
+#[test]
 fn elastic_stress_that_is_a_formula_releases_no_heat() {
     let softening = "{ youngs_modulus = 1000, poisson_ratio = 0.3, expression = { shear_factor = '1/(1 + e)', reference_strain = 1 } }";
     let kept = heated()

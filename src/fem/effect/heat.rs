@@ -58,6 +58,8 @@ pub struct Heat<const D: usize> {
     seen: Option<Seen>,
     /// Powers in W of friction and of viscosity at the owned nodes at the end of the last step, where schemes average them.
     powers: Vec<NodalField>,
+    /// Rate in K/s at the owned nodes in the last step, for adaptive steps.
+    rate: Option<NodalField>,
     owned: usize,
     /// Whether some rank has nodes on edges.
     has_middles: bool,
@@ -178,6 +180,7 @@ impl<const D: usize> Heat<D> {
             },
             seen: None,
             powers: Vec::new(),
+            rate: None,
             owned: mesh.owned,
             has_middles: mesh.corner_nodes < mesh.total_nodes,
             capacity,
@@ -270,9 +273,12 @@ impl<const D: usize> Heat<D> {
         self.boundaries.iter().flat_map(|boundary| boundary.given.expressions()).map(|(_, value)| value)
     }
 
-    /// Adds these changes of the owned nodes in K over the step just committed, which [`Self::check`] has accepted, and keeps its powers.
-    /// Nodes whose temperature is given get it without rounding. Collective.
-    pub fn commit(&mut self, changes: &[f64], given: &[f64]) -> Result<()> {
+    /// Adds these changes of the owned nodes in K over the step just committed, of this length in s, which [`Self::check`] has accepted, and
+    /// keeps its powers and rates. Nodes whose temperature is given get it without rounding. Collective.
+    pub fn commit(&mut self, changes: &[f64], given: &[f64], length: f64) -> Result<()> {
+        if let Some(rate) = &mut self.rate {
+            rate.values.iter_mut().zip(changes).for_each(|(rate, change)| *rate = change / length);
+        }
         let Released { friction, viscosity, .. } = &self.released;
         for (field, power) in self.powers.iter_mut().zip([friction, viscosity]) {
             field.values.copy_from_slice(power);
@@ -408,6 +414,7 @@ impl<const D: usize> Heat<D> {
         std::iter::once(&self.temperature)
             .chain(self.seen.iter().flat_map(|seen| [&seen.temperature, &seen.power]))
             .chain(&self.powers)
+            .chain(&self.rate)
             .map(|field| field as &dyn HistoryStore)
     }
 
@@ -418,7 +425,17 @@ impl<const D: usize> Heat<D> {
             visit(&mut seen.temperature);
             visit(&mut seen.power);
         }
-        self.powers.iter_mut().for_each(|field| visit(field));
+        self.powers.iter_mut().chain(&mut self.rate).for_each(|field| visit(field));
+    }
+
+    /// Keeps the rates of steps, for adaptive steps.
+    pub fn keep_rates(&mut self) {
+        self.rate = Some(NodalField::of_owned_nodes(quantity!("temperature_rate"), self.owned));
+    }
+
+    /// The rate in K/s at the owned nodes in the last step; empty where it is not kept.
+    pub fn rate(&self) -> &[f64] {
+        self.rate.as_ref().map_or(&[], |rate| &rate.values)
     }
 
     /// Keeps the powers at the end of steps, for schemes that average them.

@@ -37,10 +37,10 @@ pub struct Time {
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
     /// Accepted error of a step in velocities, stresses and histories, relative to the largest velocity so far and to the present
-    /// stress, at least a twentieth of the largest so far. What friction and wear keep and the motions of obstacles moved by forces
-    /// count relative to their own largest changes so far, the forces of bonds and contact memory also relative to their own largest
-    /// so far. The same number limits how far loads and obstacle motions may deviate from linear functions of time within a step,
-    /// relative to their largest values in the run.
+    /// stress, at least a twentieth of the largest so far, and in temperatures relative to their range so far. What friction and
+    /// wear keep and the motions of obstacles moved by forces count relative to their own largest changes so far, the forces of
+    /// bonds and contact memory also relative to their own largest so far. The same number limits how far loads and obstacle
+    /// motions may deviate from linear functions of time within a step, relative to their largest values in the run.
     #[serde(default = "adaptive_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,

@@ -11,11 +11,13 @@
 //! What friction and wear keep, and the motions of obstacles moved by forces, are measured against their own largest deviations from
 //! their values at the start, bonds and memory also against their own largest forces: a state of friction may change little beside a
 //! large normal stress, and a bond hold little of it, and still determine the motion.
+//! The error of the temperature is the largest of a node where it is not given, relative to the range of temperatures so far.
 //! The accumulated strain of hardening cells needs no term of its own: it grows no faster than the flow, whose error is included in
 //! that of the histories.
 
 use super::{
     StepError, StepOutcome, Stepper,
+    step_error::TemperatureError,
     step_length::{Landing, TIME_TOLERANCE, next_step},
     time_dependent_data::TimeDependentData,
 };
@@ -35,6 +37,8 @@ use serde::{Deserialize, Serialize};
 const STEPS_BEFORE_GROWTH: u32 = 2;
 /// Share of the largest stress below which the present one does not count as smaller.
 const LEAST_SHARE: f64 = 0.05;
+/// Share of the highest temperature below which differences of temperatures do not matter.
+const NEGLIGIBLE_WARMTH: f64 = 1e-6;
 /// Safety factor: share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
 
@@ -56,6 +60,9 @@ pub struct StepLevel {
     /// Largest norm of the forces of bonds and contact memory so far.
     #[serde(default)]
     pub surface: f64,
+    /// The lowest and the highest temperature in K so far, of bodies with heat.
+    #[serde(default)]
+    pub temperatures: Option<[f64; 2]>,
     /// Number of rejected steps.
     pub rejected: u64,
 }
@@ -78,13 +85,20 @@ pub struct Adaptive<const D: usize> {
 
 impl StepLevel {
     /// Keeps the norms of a step that exceed those so far.
-    fn keep_largest(&mut self, StepError { size, contact, surface, .. }: &StepError) {
+    fn keep_largest(&mut self, StepError { size, contact, surface, temperature, .. }: &StepError) {
         self.velocity = self.velocity.max(size.velocity);
         self.stress = self.stress.max(size.stress);
         for (largest, found) in self.contact.iter_mut().zip(contact) {
             *largest = largest.max(found.size);
         }
         self.surface = self.surface.max(surface.size);
+        self.temperatures = temperature.map(|found| self.range_with(found)).or(self.temperatures);
+    }
+
+    /// The lowest and the highest temperature in K so far and in a step.
+    fn range_with(&self, found: TemperatureError) -> [f64; 2] {
+        let [lowest, highest] = self.temperatures.unwrap_or([found.lowest, found.highest]);
+        [lowest.min(found.lowest), highest.max(found.highest)]
     }
 }
 
@@ -174,9 +188,10 @@ impl<const D: usize> Adaptive<D> {
         self.is_shortest(step) || error <= self.settings.tolerance
     }
 
-    /// Whether no step has moved or stressed the body yet.
+    /// Whether no step has moved, stressed or warmed the body yet.
     fn is_at_rest(&self) -> bool {
-        self.step_level.velocity == 0.0 && self.step_level.stress == 0.0
+        let StepLevel { velocity, stress, temperatures, .. } = self.step_level;
+        velocity == 0.0 && stress == 0.0 && temperatures.is_none_or(|[lowest, highest]| lowest == highest)
     }
 
     /// The length of the next attempt and the time that it must not pass. Within the length, loads and obstacles deviate from
@@ -209,8 +224,8 @@ impl<const D: usize> Adaptive<D> {
         end.filter(|end| end.time < target.time - TIME_TOLERANCE * length).unwrap_or(target)
     }
 
-    /// Solves a step without committing it. Returns its relative error and the norms at its end. A step whose error is NaN, or that
-    /// could be committed but for its temperature, has failed. Collective.
+    /// Solves a step without committing it, with its temperature if it could be committed or shows how large norms will be. Returns its
+    /// relative error and the norms at its end. A step whose error is NaN or whose temperature is none has failed. Collective.
     fn attempt<const S: usize>(
         &self,
         session: &Session,
@@ -220,7 +235,12 @@ impl<const D: usize> Adaptive<D> {
         step: Step,
     ) -> Result<(StepOutcome, f64, StepError), Agreed> {
         let outcome = session.agree(stepper.attempt(session, body, state, step))?;
-        let step_error = session.agree(stepper.error(session, body, state, step))?;
+        let mut step_error = session.agree(stepper.error(session, body, state, step))?;
+        let of_motion = self.relative(step_error);
+        if self.is_acceptable(step, of_motion) || self.is_at_rest() && !of_motion.is_nan() {
+            session.agree(stepper.find_temperature(session, body, state, step))?;
+            step_error.temperature = session.agree(stepper.temperature_error(session, body, step))?;
+        }
         let error = self.relative(step_error);
         let failed = || {
             Error::Failed(format!(
@@ -230,9 +250,6 @@ impl<const D: usize> Adaptive<D> {
             ))
         };
         session.agree(if error.is_nan() { Err(failed()) } else { Ok(()) })?;
-        if self.is_acceptable(step, error) {
-            session.agree(stepper.find_temperature(session, body, state, step))?;
-        }
         Ok((outcome, error, step_error))
     }
 
@@ -277,7 +294,8 @@ impl<const D: usize> Adaptive<D> {
     }
 
     /// The error relative to the norms so far; NaN if the error or a norm is NaN.
-    fn relative(&self, StepError { error, size, negligible, contact, surface }: StepError) -> f64 {
+    fn relative(&self, found: StepError) -> f64 {
+        let StepError { error, size, negligible, contact, surface, temperature } = found;
         let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.step_level.velocity.max(size.velocity);
         let largest_stress = self.step_level.stress.max(size.stress);
@@ -288,6 +306,11 @@ impl<const D: usize> Adaptive<D> {
         let own = self.step_level.contact.iter().chain([&self.step_level.surface]);
         for (largest, found) in own.zip(contact.into_iter().chain([surface])) {
             let ratio = ratio(found.error, largest.max(found.size).max(found.negligible));
+            square += ratio * ratio;
+        }
+        if let Some(found) = temperature {
+            let [lowest, highest] = self.step_level.range_with(found);
+            let ratio = ratio(found.error, (highest - lowest).max(NEGLIGIBLE_WARMTH * highest));
             square += ratio * ratio;
         }
         square.sqrt()
@@ -414,6 +437,21 @@ mod tests {
             (adaptive.relative(step_error([0.0, 1e-4], [5.0, 1e-9])) - 2e-3).abs() < 1e-15,
             "a free body: 1e-4 of 5e-2"
         );
+    }
+
+    #[test]
+    fn temperatures_are_measured_against_their_range_so_far() {
+        let mut adaptive = adaptive();
+        let found = |error| TemperatureError { error, lowest: 300.0, highest: 310.0 };
+        let step_error = |error| StepError { temperature: Some(found(error)), ..StepError::default() };
+        assert_eq!(adaptive.relative(step_error(1.0)), 0.1);
+        adaptive.step_level.temperatures = Some([290.0, 305.0]);
+        assert_eq!(adaptive.relative(step_error(1.0)), 0.05, "from 290 K to 310 K");
+        assert!(adaptive.relative(step_error(f64::NAN)).is_nan());
+        let even = TemperatureError { error: 3e-7, lowest: 300.0, highest: 300.0 };
+        adaptive.step_level.temperatures = None;
+        let rounding = StepError { temperature: Some(even), ..StepError::default() };
+        assert!(adaptive.relative(rounding) <= 1e-3, "a body of one temperature");
     }
 
     #[test]

@@ -3,15 +3,19 @@
 //!
 //! [`Heat`]: crate::fem::effect::Heat
 
+use super::step_error::TemperatureError;
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
         effect::{
-            Conditions, ENTERED_HEAT, Energy, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT, STORED_HEAT, Step,
+            Conditions, Curvature, ENTERED_HEAT, Energy, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT, STORED_HEAT, Step,
         },
     },
-    linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix},
+    linear_algebra::{
+        petsc::{BlockRows, DistributedVector, Ksp, Matrix},
+        tensor::larger,
+    },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
@@ -239,7 +243,29 @@ impl HeatStep {
     pub(super) fn commit<const D: usize, const S: usize>(&self, body: &mut Body<D, S>) -> Result<()> {
         let Some(heat) = &mut body.heat else { return Ok(()) };
         heat.expect(self.released.iter().map(|heat| heat / self.length));
-        heat.commit(&self.change.owned()?, &self.conditions.held)
+        heat.commit(&self.change.owned()?, &self.conditions.held, self.length)
+    }
+
+    /// The largest error in K of the temperature of a node in the step just solved, where it is not given, and the lowest and the highest
+    /// temperature at the start and at the end of the step. Collective.
+    pub(super) fn error<const D: usize>(
+        &self,
+        session: &Session,
+        heat: &Heat<D>,
+        step: Step,
+    ) -> Result<TemperatureError> {
+        let curvature = Curvature::of(step);
+        let (change, rates) = (self.change.owned()?, heat.rate());
+        let mut largest = [0.0, f64::NEG_INFINITY, f64::NEG_INFINITY];
+        for (node, (before, change)) in heat.temperature_of_owned().iter().zip(change.iter()).enumerate() {
+            let last = rates.get(node).map_or(0.0, |rate| rate * step.previous_length);
+            let error = if self.is_known[node] { 0.0 } else { curvature.error([*change, 0.0, -last]).abs() };
+            let after = before + change;
+            let found = [error, larger(-before, -after), larger(*before, after)];
+            largest = std::array::from_fn(|at| larger(largest[at], found[at]));
+        }
+        let [error, below, highest] = session.largest(largest);
+        Ok(TemperatureError { error, lowest: -below, highest })
     }
 
     /// Prepares the matrix of a step of this length in s, unless it is. Collective.

@@ -24,6 +24,17 @@ pub struct Norms {
     pub stress: f64,
 }
 
+/// The error of the temperature in a step, over all ranks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TemperatureError {
+    /// The largest error of a node in K.
+    pub error: f64,
+    /// The lowest temperature in K at the start and at the end of the step.
+    pub lowest: f64,
+    /// The highest one.
+    pub highest: f64,
+}
+
 /// The error of a step with its reference norms.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepError {
@@ -37,6 +48,8 @@ pub struct StepError {
     pub contact: [Deviation; CONTACT_QUANTITIES],
     /// Norms of the forces of bonds and contact memory.
     pub surface: Deviation,
+    /// That of the temperature, once it is found.
+    pub temperature: Option<TemperatureError>,
 }
 
 /// Work space for nodal values with ghosts.
@@ -120,6 +133,7 @@ impl ErrorWorkspace {
             negligible: Norms { velocity: NEGLIGIBLE / unit, stress: NEGLIGIBLE * unit },
             contact,
             surface: Deviation { error, size, negligible: NEGLIGIBLE * NEGLIGIBLE * all_stress },
+            temperature: None,
         })
     }
 }

@@ -11,7 +11,7 @@ use super::{
     multistart::solve_and_search,
     problem::StepProblem,
     step_clock::{Stages, StepClock, StepTraffic},
-    step_error::{ErrorWorkspace, SolvedStep, StepError},
+    step_error::{ErrorWorkspace, SolvedStep, StepError, TemperatureError},
     step_range::StepRange,
     step_solver::{Lengths, StepSolver},
     support_motion::MovingSupports,
@@ -411,6 +411,17 @@ impl Stepper {
         }
         self.is_finished = true;
         Ok(())
+    }
+
+    /// The error of the temperature in the last attempted step, once it is found; none without heat. Collective.
+    pub fn temperature_error<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+        step: Step,
+    ) -> Result<Option<TemperatureError>> {
+        let heat = self.heat.as_ref().zip(body.heat.as_ref());
+        heat.map(|(of_step, heat)| of_step.error(session, heat, step)).transpose()
     }
 
     /// Finds the temperature at the end of the last attempted step, unless it is known. Collective.
