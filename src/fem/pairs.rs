@@ -75,6 +75,8 @@ pub enum Exchange {
     Sharper,
     /// The mesh of the side `on` is coarser.
     Coarser,
+    /// The body of the side `on` is much stiffer.
+    Stiffer,
     /// Another contact has the side `on` on its other side.
     Faced,
 }

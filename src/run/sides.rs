@@ -9,6 +9,7 @@ use crate::{
         space::{Held, facets},
     },
     job::{self, Job, Side},
+    laws::material::Material,
     linear_algebra::{
         petsc::DistributedVector,
         tensor::{Vector, add_scaled, dot, norm},
@@ -16,6 +17,7 @@ use crate::{
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
+use super::materials::Materials;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Component of a unit direction along the normal of the law above which it counts as along the normal.
@@ -29,6 +31,10 @@ const SHARP: f64 = 0.052;
 /// The same (10 degrees) from which on the user is warned: forces along an inclined face are 18 % of those across.
 pub(super) const EDGE: f64 = 0.175;
 
+/// How many times as stiff as the other a body is whose nodes should not carry the law, whatever the meshes: the stress of a stiff body
+/// hardly follows the nodes of a soft one that it faces, so that Newton's method would find contact and friction node by node.
+const STIFFER: f64 = 100.0;
+
 /// What the choice of a side depends on besides the meshes of both.
 #[derive(Debug)]
 pub(super) struct Circumstances<const D: usize> {
@@ -36,6 +42,8 @@ pub(super) struct Circumstances<const D: usize> {
     held: Held<D>,
     /// The directions in which they hold nodes of pairs on all ranks, orthonormal, by global numbers.
     directions: BTreeMap<u32, Vec<Vector<D>>>,
+    /// The materials of the body, where a choice is free.
+    materials: Option<Materials>,
     /// The contacts that another run had from whose state this one starts, each with whether its sides were exchanged.
     earlier: BTreeMap<usize, bool>,
 }
@@ -49,7 +57,7 @@ impl<const D: usize> Circumstances<D> {
         earlier: BTreeMap<usize, bool>,
     ) -> Result<Self, Agreed> {
         if job.contact.iter().all(|contact| contact.against.is_empty() || contact.side != Side::Auto) {
-            return Ok(Self { held: Held::default(), directions: BTreeMap::new(), earlier });
+            return Ok(Self { held: Held::default(), directions: BTreeMap::new(), materials: None, earlier });
         }
         let layout = session.agree(DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts))?;
         let held = session.agree(Supports::of_body(session, mesh, &job.support, &layout))?.held;
@@ -73,7 +81,8 @@ impl<const D: usize> Circumstances<D> {
                 of_node.push(direction);
             }
         }
-        Ok(Self { held, directions, earlier })
+        let materials = Some(Materials::new(session, job, mesh)?);
+        Ok(Self { held, directions, materials, earlier })
     }
 
     /// Finds what the nodes of a pair face, on the side of the job's choice. Collective.
@@ -114,13 +123,38 @@ impl<const D: usize> Circumstances<D> {
                 return Ok(other);
             }
         }
-        if is_coarser(session, &first)? && !meets_another(session, mesh, job, &first)? {
-            let other = formed(first.clone().exchanged(Exchange::Coarser))?;
+        let [own, faced] = [&first.on, &first.against].map(|facets| self.stiffness(session, mesh, facets));
+        let reason = if own > STIFFER * faced {
+            Some(Exchange::Stiffer)
+        } else if faced <= STIFFER * own || own.is_nan() || faced.is_nan() {
+            is_coarser(session, &first)?.then_some(Exchange::Coarser)
+        } else {
+            None
+        };
+        if let Some(reason) = reason
+            && !meets_another(session, mesh, job, &first)?
+        {
+            let other = formed(first.clone().exchanged(reason))?;
             let is_sharp =
                 || first.slides && is_blunter((session, mesh), &first, other.sharpness(session, mesh));
             return Ok(if is_held(&other) || is_sharp() { first } else { other });
         }
         Ok(first)
+    }
+
+    /// The mean Young's modulus in Pa of the cells of these facets of all ranks, of orthotropic ones the largest; NaN where a cell has none.
+    /// Collective.
+    fn stiffness(&self, session: &Session, mesh: &Mesh<D>, facets: &[u32]) -> f64 {
+        let Some(materials) = &self.materials else { return f64::NAN };
+        let modulus = |facet: &u32| {
+            let cell = mesh.facet_cells[*facet as usize] as usize;
+            let Material { elasticity, orthotropic, .. } = &materials.all[materials.of_cell(mesh, cell)];
+            let isotropic = elasticity.as_ref().map(|law| law.youngs_modulus);
+            let largest = || orthotropic.as_ref().map(|law| law.youngs_moduli.iter().copied().fold(0.0, f64::max));
+            isotropic.or_else(largest).unwrap_or(f64::NAN)
+        };
+        let [sum, count] = session.sum([facets.iter().map(modulus).sum(), facets.len() as f64]);
+        sum / count
     }
 
     /// Exchanges the sides of pairs whose choice is free where nodes would carry the law of one contact and be faced in another one.
@@ -353,6 +387,7 @@ pub(super) fn lines<const D: usize>(job: &Job, pairs: &[Pair<D>]) -> Vec<String>
             Exchange::Held => format!("because supports hold nodes of {on}"),
             Exchange::Sharper => format!("because its corners or edges lie over {on}"),
             Exchange::Coarser => format!("because the mesh of {on} is coarser"),
+            Exchange::Stiffer => format!("because {on} is more than {STIFFER} times as stiff"),
             Exchange::Faced => format!("because {on} is faced in another contact"),
         };
         Some(format!("contact    contact.{}: nodes of {against} carry the law, {why}", pair.contact))

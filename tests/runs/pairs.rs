@@ -1015,6 +1015,35 @@ fn the_side_with_the_finer_mesh_carries_the_law_unless_the_job_states_it() {
 }
 
 #[test]
+fn the_side_of_a_much_softer_body_carries_the_law() {
+    // A heavy block of steel settles on rubber. Were its nodes to carry the law, steps would take some hundred iterations.
+    let of = |table: &str, cells: &str| {
+        Case::written_as(&format!(
+            "[[mesh.rectangle]]\nname = \"rubber\"\nsize = [1, 1]\ncells = [5, 4]\n[[mesh.rectangle]]\nname = \"steel\"\n\
+             corner = [0, 1]\nsize = [1, 1]\ncells = {cells}\n[material]\nhypothesis = \"plane_strain\"\ndensity = 1000\n\
+             elasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0.3 }}\n[[region]]\nname = \"steel\"\n\
+             [region.material]\ndensity = 7800\nelasticity = {{ youngs_modulus = 2e11, poisson_ratio = 0.3 }}\n\
+             [gravity]\nacceleration = [0, \"-10*min(t/0.5, 1)\"]\n[[support]]\non = [\"rubber.bottom\"]\nfix = \"all\"\n\
+             [[contact]]\n{table}\nnormal.unilateral = {{}}\nfriction.coulomb.coefficient = 0.5\n\
+             [time]\nscheme = \"implicit_euler\"\nend = 0.2\nstep = 0.02\n"
+        ))
+    };
+    let stiff = "on = ['steel.bottom']\nagainst = ['rubber.top']";
+    for (table, cells, ranks, names_it) in [
+        (stiff, "[7, 3]", 1, true),
+        (stiff, "[16, 3]", 2, true),
+        ("on = ['rubber.top']\nagainst = ['steel.bottom']", "[16, 3]", 3, false),
+    ] {
+        let case = of(table, cells).run_and_keep(ranks);
+        let why = "nodes of rubber.top carry the law, because steel.bottom is more than 100 times as stiff";
+        assert_eq!(log_of(&case).contains(why), names_it, "{table} {cells}");
+        assert!(!log_of(&case).contains("nodes of steel.bottom carry"), "{table} {cells}");
+        let iterations = case.results().table("history.csv").numbers("newton_iterations");
+        assert!(iterations.iter().all(|count| *count <= 5.0), "{table} {cells}: {iterations:?}");
+    }
+}
+
+#[test]
 fn a_stage_keeps_the_side_that_carries_the_law() {
     let from = |case: &Case| format!("'{}'", case.folder().join("out").display());
     let table = "on = ['lower.top'], against = ['upper.bottom']";

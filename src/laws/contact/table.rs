@@ -50,10 +50,11 @@ impl Sliding {
 #[serde(rename_all = "snake_case")]
 pub enum Side {
     /// Those in `on`, unless supports hold nodes there and not what they face, or, with `sliding = "finite"`, corners or edges of `against` lie
-    /// over them where the bodies are nearest to each other, or their mesh is clearly coarser: they face more than twice
-    /// as many nodes of `against` as they have themselves, in 3D more than four times as many. Then those in `against`, if supports do not
-    /// hold nodes there in the same way and, for a coarser mesh, no other contact has nodes of either side. The log names the choice. A run
-    /// that starts from another one (`[initial] from`) prefers the choice of that run.
+    /// over them where the bodies are nearest to each other, or their body is more than 100 times as stiff, or, of bodies that are not,
+    /// their mesh is clearly coarser: they face more than twice as many nodes of `against` as they have themselves, in 3D more than four
+    /// times as many. Then those in `against`, if supports do not hold nodes there in the same way and, for a stiffer body or a coarser
+    /// mesh, no other contact has nodes of either side. The log names the choice. A run that starts from another one (`[initial] from`)
+    /// prefers the choice of that run.
     #[default]
     Auto,
     /// Those in `on`.
