@@ -16,7 +16,7 @@ use crate::{
             PeakSquares, Peaks, Phases, Quantity, RedistributedMass, STORED_IN_CONTACT, Step, StressError,
             SupportMotion, SurfaceEffect, SurfaceForce, Tangents, Term, Touch, VISCOUS,
         },
-        pairs::{Pair, pair_of, shares},
+        pairs::{Pair, exchanged, pair_of, shares},
         space::{
             Batch, Cell, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, cell_rule, facet_points,
         },
@@ -348,7 +348,20 @@ impl<const D: usize, const S: usize> Body<D, S> {
             session.agree(self.contacts[pair.contact].face(&pair.nodes, &self.held, &seen, touches))?;
         }
         self.pairs = pairs;
+        self.place_laws();
         Ok(())
+    }
+
+    /// Tells laws between bodies at which undeformed places of the boundaries `on` of the job they act.
+    pub fn place_laws(&mut self) {
+        let mesh = &self.mesh;
+        for (number, contact) in self.contacts.iter_mut().enumerate() {
+            if let Some(pair) = exchanged(&self.pairs, number) {
+                contact.set_places(|node| {
+                    std::array::from_fn(|i| pair.across(mesh, node, |node| mesh.nodes[node][i]))
+                });
+            }
+        }
     }
 
     /// The planes that the nodes owned here face on bodies along which they slide, `D + 1` values each: the normal, of length 0 where there
@@ -465,17 +478,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
             let Some(friction) = &contact.friction else { continue };
             friction.visit_powers(&seen, |node, power| {
                 heat.add_friction(node, own * power);
-                let faced = pair.and_then(|pair| {
-                    let at = pair.nodes.binary_search_by_key(&(node as u32), |paired| paired.node).ok()?;
-                    Some(&pair.nodes[at])
-                });
-                let Some(faced) = faced else { return };
-                let share = |share: f64| share.max(0.0);
-                let sum: f64 = faced.faced().map(|(_, s)| share(*s)).sum();
-                for (master, s) in faced.faced().filter(|_| sum > 0.0) {
-                    if let Some(local) = self.mesh.local_node(*master) {
-                        heat.add_friction(local, other * power * share(*s) / sum);
-                    }
+                let Some(faced) = pair.and_then(|pair| pair.node(node)) else { return };
+                for (master, share) in faced.part_of_faced(&self.mesh) {
+                    heat.add_friction(master, other * power * share);
                 }
             });
         }

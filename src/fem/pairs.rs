@@ -56,6 +56,14 @@ impl<const D: usize> PairedNode<D> {
         self.masters.iter().filter(|(master, _)| !self.is_beside(*master))
     }
 
+    /// The local nodes on the other side, with their shares, which are not negative and whose sum is 1; none where nothing is faced.
+    pub fn part_of_faced(&self, mesh: &Mesh<D>) -> impl Iterator<Item = (usize, f64)> {
+        let sum: f64 = self.faced().map(|(_, share)| share.max(0.0)).sum();
+        self.faced().filter(move |_| sum > 0.0).filter_map(move |(master, share)| {
+            Some((mesh.local_node(*master)?, share.max(0.0) / sum))
+        })
+    }
+
     /// Whether a master, given by its global number, is a neighbour on the same side.
     pub fn is_beside(&self, master: u32) -> bool {
         !self.neighbours.is_empty() && self.neighbours.binary_search(&master).is_ok()
@@ -218,6 +226,19 @@ impl<const D: usize> Pair<D> {
         Ok(())
     }
 
+    /// The node with this local number that carries the law.
+    pub fn node(&self, local: usize) -> Option<&PairedNode<D>> {
+        let at = self.nodes.binary_search_by_key(&(local as u32), |paired| paired.node).ok()?;
+        Some(&self.nodes[at])
+    }
+
+    /// The mean of values at local nodes where the other side faces a node with this local number; the own value where nothing is faced.
+    pub fn across(&self, mesh: &Mesh<D>, local: usize, value: impl Fn(usize) -> f64) -> f64 {
+        let faced = self.node(local).into_iter().flat_map(|node| node.part_of_faced(mesh));
+        let [sum, share] = faced.fold([0.0; 2], |[sum, all], (node, share)| [sum + share * value(node), all + share]);
+        if share > 0.5 { sum / share } else { value(local) }
+    }
+
     /// The nodes owned here of the slave facets that face those of the other side on all ranks, ascending, with the local nodes of the mesh
     /// at `places` in m. Collective.
     fn paired_nodes(
@@ -284,9 +305,14 @@ pub fn pair_of<const D: usize>(pairs: &[Pair<D>], contact: usize) -> Option<&Pai
     pairs.iter().find(|pair| pair.contact == contact)
 }
 
+/// The pair of a contact if the nodes that carry its law are those of `against` in the job.
+pub fn exchanged<const D: usize>(pairs: &[Pair<D>], contact: usize) -> Option<&Pair<D>> {
+    pair_of(pairs, contact).filter(|pair| pair.exchange.is_some())
+}
+
 /// Whether the nodes that carry the law of a contact are those of `against` in the job.
 pub fn is_exchanged<const D: usize>(pairs: &[Pair<D>], contact: usize) -> bool {
-    pair_of(pairs, contact).is_some_and(|pair| pair.exchange.is_some())
+    exchanged(pairs, contact).is_some()
 }
 
 /// The nodes that carry the law of a contact, if it is one of these pairs.

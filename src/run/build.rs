@@ -80,6 +80,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.paired_displacement = Some(state.displacement.like()?);
     }
     (body.coupling, body.pairs) = (coupling, pairs);
+    body.place_laws();
     if job.has_heat() {
         let of_cell = |cell: usize| body.geometry.cell_at(cell).material();
         body.heat = Some(heat(session, job, &body.mesh, (&materials.all, of_cell))?);

@@ -222,6 +222,43 @@ fn adaptive_steps_follow_the_temperature_of_a_body_that_does_not_move() {
     assert!(rest.len() > 20 && whole.ends_with(&rest[1..]), "{rest:?}");
 }
 
+#[test]
+fn a_friction_coefficient_sees_temperature_and_places_of_the_boundaries_on_whichever_side_has_the_law() {
+    // A pad at 400 K, of which one half is rough, slides on a plate at 300 K. Supports leave the law to the pad or to the plate.
+    let pulled = |coefficient: &str, support: &str, sliding: &str| {
+        let case = Case::written_as(&format!(
+            "[[mesh.rectangle]]\nname = \"plate\"\nsize = [3, 0.1]\ncells = [60, 1]\n\
+             [[mesh.rectangle]]\nname = \"pad\"\ncorner = [0.2, 0.1]\nsize = [0.4, 0.1]\ncells = [8, 1]\n\
+             [material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0 }}\n\
+             heat = {{ conductivity = 1e-6, volumetric_capacity = 1e9 }}\n\
+             [initial]\ntemperature = \"300 + 100*step(y - 0.1001)\"\n\
+             [[heat]]\non = [\"pad.bottom\"]\ntemperature = 400\n[[heat]]\non = [\"plate.top\"]\ntemperature = 300\n\
+             [[support]]\non = [\"plate.bottom\"]\nfix = \"all\"\ndisplacement = [\"-0.5*t\", 0]\n\
+             [[support]]\non = {support}\nfix = [\"x\"]\n[[traction]]\non = [\"pad.top\"]\nvalue = [0, -1e4]\n\
+             [[contact]]\non = [\"pad.bottom\"]\nagainst = [\"plate.top\"]\n{sliding}\nnormal.unilateral = {{}}\n\
+             friction_heat = 0\nfriction.expression.coefficient = \"{coefficient}\"\n\
+             [time]\nscheme = \"implicit_euler\"\nend = 1\nstep = 0.1\n"
+        ));
+        let case = case.run_and_keep(2);
+        let rows = case.results().table("resultants.csv").only("source", "contact pad.bottom");
+        [rows.last("force_x"), rows.numbers("force_x")[4]]
+    };
+    let [top, sides] = ["[\"pad.top\"]", "[\"pad.left\", \"pad.right\"]"];
+    for sliding in ["", "sliding = \"finite\""] {
+        for support in [top, sides] {
+            let hot = pulled("0.1 + 0.4*step(temperature - 350)", support, sliding);
+            assert!((hot[0] + 2000.0).abs() < 1e-4, "{support} {sliding}: {hot:?}");
+        }
+    }
+    // The weights of the nodes differ, but the rough half stays rough as the plate passes.
+    let [[end, early], [end_of_plate, early_of_plate]] =
+        [top, sides].map(|support| pulled("0.1 + 0.4*step(x - 0.41)", support, "sliding = \"finite\""));
+    assert!((end - early).abs() < 1e-3 * early.abs(), "{end} {early}");
+    for force in [end_of_plate, early_of_plate] {
+        assert!((force / end - 1.0).abs() < 0.1, "{force} N in place of {end} N");
+    }
+}
+
 /// The complementary error function of a number from 0 on (Abramowitz and Stegun, 7.1.26, to 1.5e-7).
 fn erfc(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.3275911 * x);

@@ -5,6 +5,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{Blend, CONTACT, Energy, NUMERICAL, Step, WORK},
+        pairs::exchanged,
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
@@ -50,9 +51,13 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     }
     let (converged, start) = (state.displacement.local()?, start.local()?);
     let (converged, start) = (body.seen_by_contacts(&converged), body.seen_by_contacts(&start));
-    for contact in &mut body.contacts {
+    for (number, contact) in body.contacts.iter_mut().enumerate() {
         if let Some((friction, heat)) = contact.friction.as_mut().zip(body.heat.as_ref()) {
-            friction.set_temperatures(heat.seen());
+            let seen = |node: usize| heat.seen()[node];
+            match exchanged(&body.pairs, number) {
+                Some(pair) => friction.set_temperatures(|node| pair.across(&body.mesh, node, seen)),
+                None => friction.set_temperatures(seen),
+            }
         }
         contact.prepare(step, blend, [&converged, &start])?;
     }

@@ -209,10 +209,18 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Sets the temperatures of the points in K from those of the local nodes.
-    pub fn set_temperatures(&mut self, temperatures: &[f64]) {
+    /// Sets the temperatures of the points in K from those at their nodes.
+    pub fn set_temperatures(&mut self, temperature: impl Fn(usize) -> f64) {
         for point in &mut self.points {
-            point.context.temperature = temperatures[point.node()];
+            point.context.temperature = temperature(point.node());
+        }
+    }
+
+    /// Sets the undeformed places of the points in m, given those at their nodes.
+    pub(super) fn set_places(&mut self, place: impl Fn(usize) -> Vector<D>) {
+        for point in &mut self.points {
+            let there = place(point.node());
+            point.context.place = std::array::from_fn(|i| if i < D { there[i] } else { 0.0 });
         }
     }
 
