@@ -59,9 +59,9 @@ impl<const D: usize> PairedNode<D> {
     /// The local nodes on the other side, with their shares, which are not negative and whose sum is 1; none where nothing is faced.
     pub fn part_of_faced(&self, mesh: &Mesh<D>) -> impl Iterator<Item = (usize, f64)> {
         let sum: f64 = self.faced().map(|(_, share)| share.max(0.0)).sum();
-        self.faced().filter(move |_| sum > 0.0).filter_map(move |(master, share)| {
-            Some((mesh.local_node(*master)?, share.max(0.0) / sum))
-        })
+        self.faced()
+            .filter(move |_| sum > 0.0)
+            .filter_map(move |(master, share)| Some((mesh.local_node(*master)?, share.max(0.0) / sum)))
     }
 
     /// Whether a master, given by its global number, is a neighbour on the same side.
@@ -235,7 +235,8 @@ impl<const D: usize> Pair<D> {
     /// The mean of values at local nodes where the other side faces a node with this local number; the own value where nothing is faced.
     pub fn across(&self, mesh: &Mesh<D>, local: usize, value: impl Fn(usize) -> f64) -> f64 {
         let faced = self.node(local).into_iter().flat_map(|node| node.part_of_faced(mesh));
-        let [sum, share] = faced.fold([0.0; 2], |[sum, all], (node, share)| [sum + share * value(node), all + share]);
+        let [sum, share] =
+            faced.fold([0.0; 2], |[sum, all], (node, share)| [sum + share * value(node), all + share]);
         if share > 0.5 { sum / share } else { value(local) }
     }
 

@@ -1,5 +1,6 @@
 //! Which side of contact between bodies carries the law, and where supports prevent that.
 
+use super::materials::Materials;
 use crate::{
     error::Result,
     fem::{
@@ -17,7 +18,6 @@ use crate::{
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
-use super::materials::Materials;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Component of a unit direction along the normal of the law above which it counts as along the normal.
@@ -150,7 +150,8 @@ impl<const D: usize> Circumstances<D> {
             let cell = mesh.facet_cells[*facet as usize] as usize;
             let Material { elasticity, orthotropic, .. } = &materials.all[materials.of_cell(mesh, cell)];
             let isotropic = elasticity.as_ref().map(|law| law.youngs_modulus);
-            let largest = || orthotropic.as_ref().map(|law| law.youngs_moduli.iter().copied().fold(0.0, f64::max));
+            let largest =
+                || orthotropic.as_ref().map(|law| law.youngs_moduli.iter().copied().fold(0.0, f64::max));
             isotropic.or_else(largest).unwrap_or(f64::NAN)
         };
         let [sum, count] = session.sum([facets.iter().map(modulus).sum(), facets.len() as f64]);
@@ -287,6 +288,49 @@ pub(super) fn warnings_of_edges<const D: usize>(
         out.push(words_of_edges(job, pair, ("lie", remedy)));
     }
     Ok(out)
+}
+
+/// Warnings about wear that stays with the nodes of the other body, and about facets of which two contacts leave all nodes without a law.
+/// Collective, with the same warnings on all ranks.
+pub(super) fn warnings_of_carriers<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &[Pair<D>],
+) -> Vec<String> {
+    let names = |pair: &Pair<D>| {
+        let job::Contact { on, against, .. } = &job.contact[pair.contact];
+        if pair.exchange.is_some() { [against, on] } else { [on, against] }.map(|names| names.join(", "))
+    };
+    let mut out = Vec::new();
+    for (at, pair) in pairs.iter().enumerate() {
+        let [own, other] = names(pair);
+        if pair.slides && pair.exchange.is_some() && job.contact[pair.contact].wear.is_some() {
+            out.push(format!(
+                "contact.{}: nodes of {own} carry the law and keep the wear, so that {own} wears, not {other}: let no support hold nodes of \
+                 {other}",
+                pair.contact
+            ));
+        }
+        for second in &pairs[at + 1..] {
+            let is_left = |node: &u32| {
+                let node = mesh.global_node(*node);
+                pair.lawless.contains(&node) && second.lawless.contains(&node)
+            };
+            let spans = |facet: &&u32| mesh.facet_nodes(**facet).all(|node| is_left(&node));
+            let [spanning] =
+                session.largest([f64::from(u8::from(pair.on.iter().any(|facet| spans(&facet))))]);
+            if spanning > 0.0 {
+                let others = names(second)[1].clone();
+                out.push(format!(
+                    "contact.{} and contact.{}: facets of {own} that face both {other} and {others} carry no law, so that pressures beside them \
+                     may be wrong by half; give both one table with on = [...], or let nodes of {own} lie where they meet",
+                    pair.contact, second.contact
+                ));
+            }
+        }
+    }
+    out
 }
 
 /// The warning about a pair whose nodes were pressed by corners and edges of the other side in a run.

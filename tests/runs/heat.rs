@@ -208,7 +208,8 @@ fn adaptive_steps_follow_the_temperature_of_a_body_that_does_not_move() {
     let [errors, loose_errors] = [&straight, &loose].map(|case| {
         let rows = case.results().table("probes.csv");
         let times = rows.numbers("time");
-        let error = |(time, found): (&f64, f64)| (found - 300.0 - 100.0 * erfc(14.142136 / time.sqrt())).abs();
+        let error =
+            |(time, found): (&f64, f64)| (found - 300.0 - 100.0 * erfc(14.142136 / time.sqrt())).abs();
         times.iter().zip(rows.numbers("temperature")).skip(1).map(error).fold(0.0, f64::max)
     });
     assert!(errors < 0.5 && loose_errors < 1.5 && loose_errors > 1.5 * errors, "{errors} {loose_errors}");

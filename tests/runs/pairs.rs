@@ -1044,6 +1044,46 @@ fn the_side_of_a_much_softer_body_carries_the_law() {
 }
 
 #[test]
+fn facets_that_two_contacts_leave_without_a_law_and_wear_of_the_other_body_are_warned_of() {
+    let blocks = |cells: u32| {
+        let table = |of: &str| {
+            format!(
+                "[[contact]]\non = [\"{of}.bottom\"]\nagainst = [\"p.top\"]\nnormal.unilateral = {{}}\n\
+                 friction.coulomb.coefficient = 0.3\n"
+            )
+        };
+        Case::written_as(&format!(
+            "[[mesh.rectangle]]\nname = \"p\"\nsize = [2, 1]\ncells = [{cells}, 2]\n\
+             [[mesh.rectangle]]\nname = \"l\"\ncorner = [0, 1]\nsize = [1, 1]\ncells = [6, 2]\n\
+             [[mesh.rectangle]]\nname = \"r\"\ncorner = [1, 1]\nsize = [1, 1]\ncells = [8, 2]\n\
+             [material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0 }}\n\
+             [[support]]\non = [\"p.bottom\"]\nfix = \"all\"\n[[support]]\non = [\"l.left\", \"r.right\"]\nfix = [\"x\"]\n\
+             [[traction]]\non = [\"l.top\", \"r.top\"]\nvalue = [0, -1000]\n{}{}\
+             [time]\nscheme = \"implicit_euler\"\nend = 1\nstep = 1\n",
+            table("l"),
+            table("r")
+        ))
+    };
+    let said = |case: &Case, ranks: usize| {
+        let job = case.written();
+        launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0)
+    };
+    let words = "facets of p.top that face both l.bottom and r.bottom carry no law";
+    for ranks in [1, 2, 3] {
+        said(&blocks(7), ranks).says(words);
+    }
+    // Where a node lies between the blocks each facet faces one of them.
+    let text = launch::unwrapped(&said(&blocks(8), 2).stdout);
+    assert!(!text.contains("carry no law"), "{text}");
+    let worn = "[{ on = ['l.bottom'], against = ['p.top'], sliding = 'finite', normal = { unilateral = {} }, \
+                friction = { coulomb = { coefficient = 0.3 } }, wear = { coefficient = 1e-9 } }]";
+    let wears = blocks(8)
+        .set("contact", worn)
+        .set("support", "[{ on = ['p.bottom', 'r.top'], fix = 'all' }, { on = ['l.left'], fix = ['x'] }]");
+    said(&wears, 2).says("nodes of p.top carry the law and keep the wear, so that p.top wears, not l.bottom");
+}
+
+#[test]
 fn a_stage_keeps_the_side_that_carries_the_law() {
     let from = |case: &Case| format!("'{}'", case.folder().join("out").display());
     let table = "on = ['lower.top'], against = ['upper.bottom']";

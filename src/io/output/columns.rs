@@ -426,8 +426,16 @@ mod tests {
             RESULTANTS.header(2, &[true, false, true, false, false]),
             "step,time,source,force_x,force_y,moment_z,sticking_area,slipping_area"
         );
-        assert!(RESULTANTS.header(3, &[true, false, false, false, false]).ends_with("force_z,moment_x,moment_y,moment_z"));
-        assert!(PROFILES.header(2, &[true, false, false, false, false]).starts_with("time,profile,x,y,normal_displacement,"));
+        assert!(
+            RESULTANTS
+                .header(3, &[true, false, false, false, false])
+                .ends_with("force_z,moment_x,moment_y,moment_z")
+        );
+        assert!(
+            PROFILES
+                .header(2, &[true, false, false, false, false])
+                .starts_with("time,profile,x,y,normal_displacement,")
+        );
         assert_eq!(HISTORY.header(2, &[true, true, false]).split(',').nth(13), Some("energy_imbalance"));
         assert_eq!((HISTORY.unit("dt", 3), RESULTANTS.unit("open_area", 2)), ("s", "m"));
     }

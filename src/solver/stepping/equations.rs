@@ -486,7 +486,8 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             true => self.counts.has_settled(SETTLED_ITERATIONS) && self.counts.is_stuck(SETTLED_ITERATIONS),
         };
         // With the same derivatives the equations are linear: residuals fall to the rounding errors, or do not fall.
-        let falls = self.counts.has_settled(1) && self.scratch.residuals[0] < STAGNATION * self.scratch.residuals[1];
+        let falls =
+            self.counts.has_settled(1) && self.scratch.residuals[0] < STAGNATION * self.scratch.residuals[1];
         is_stuck || !falls && self.counts.sets.len() >= patience.saturating_add(after)
     }
 

@@ -9,7 +9,8 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            Conditions, Curvature, ENTERED_HEAT, Energy, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT, STORED_HEAT, Step,
+            Conditions, Curvature, ENTERED_HEAT, Energy, FLOW_HEAT, FRICTION_HEAT, Heat, LOST_HEAT,
+            STORED_HEAT, Step,
         },
     },
     linear_algebra::{
