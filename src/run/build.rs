@@ -18,7 +18,7 @@ use crate::{
         space::{Geometry, Held, SurfacePoint, cell_rule, place_in_cell, surface_means, surface_points},
         state::State,
     },
-    job::{self, Job},
+    job::{self, Job, Sliding},
     laws::{
         contact::{Gap, NormalResponse, Quadrature},
         material::{ByMaterial, Hypothesis, Material},
@@ -122,7 +122,9 @@ fn contacts<const D: usize>(
         }
         let (law, gap) = session.agree(normal_law(contact))?;
         let paired = nodes_of(pairs, number).map(<[_]>::to_vec);
-        let conditions = ContactConditions { quadrature: contact.quadrature, law, gap, paired };
+        let follows_surface = contact.obstacle.is_some() && contact.sliding == Sliding::Finite;
+        let conditions =
+            ContactConditions { quadrature: contact.quadrature, law, gap, paired, follows_surface };
         let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
         laws.turn_edges(session, mesh, held)?;
         if let Some(motion) = motion {

@@ -6,6 +6,8 @@
 //!
 //! Where the undeformed node sees an obstacle that moves is a function of time. A step has the direction at its end; its gap at the start is
 //! along the direction there, so that the gap has grown by what the node sees of the motion. Nothing is kept between steps.
+//!
+//! If the contact follows the surface, all nodes that no other contact has are treated in this way, see `following.rs`.
 
 use super::{
     Contact,
@@ -55,10 +57,11 @@ impl<const D: usize> Contact<D> {
             };
             // Two faces of an obstacle that meet at an edge may touch two of the body.
             let touches_along_one = of_node.len() == 1 || fixed.len() < 2 || gap.is_smooth();
-            let follows = is_edge && touches_along_one && gap.turns_as_seen();
+            let follows = self.follows_surface || is_edge && touches_along_one && gap.turns_as_seen();
             let faces = of_node.iter().map(|point| (point.normal, point.weight)).collect();
             match follows.then(|| Edge::new(faces, cone, held.frame(node))).flatten() {
-                Some(edge) => {
+                Some(mut edge) => {
+                    edge.undeformed = self.follows_surface.then_some(place);
                     let (normal, weight) = edge.toward(gap, &place, 0.0);
                     let mut point = Point::nodal(SurfacePoint { node: node as u32, normal, weight }, held);
                     (point.place, point.edge) = (place, Some(Rc::new(edge)));
