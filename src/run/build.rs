@@ -122,10 +122,9 @@ fn contacts<const D: usize>(
         }
         let (law, gap) = session.agree(normal_law(contact))?;
         let paired = nodes_of(pairs, number).map(<[_]>::to_vec);
-        let follows_surface = contact.obstacle.is_some() && contact.sliding == Sliding::Finite;
-        let conditions =
-            ContactConditions { quadrature: contact.quadrature, law, gap, paired, follows_surface };
+        let conditions = ContactConditions { quadrature: contact.quadrature, law, gap, paired };
         let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
+        laws.follows_surface = contact.obstacle.is_some() && contact.sliding == Sliding::Finite;
         laws.turn_edges(session, mesh, held)?;
         if let Some(motion) = motion {
             let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired {

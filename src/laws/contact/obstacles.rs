@@ -387,6 +387,16 @@ pub(super) mod tests {
         assert_eq!(disc([0.0, 0.0], true).direction_of_nearest(&[0.0, 0.0], 0.0), None);
     }
 
+    #[test]
+    fn a_bound_of_the_distance_shows_the_normal_of_the_surface() {
+        let half = shape("0.5*(sqrt(x^2 + y^2) - 2)", vec![]);
+        let place = [1.2, 1.6];
+        assert_eq!(half.direction_of_nearest(&place, 0.0), None);
+        let found: Vector<2> = half.direction_of_depth(&place, 0.0).expect("a direction");
+        assert!((found[0] + 0.6).abs() < 1e-9 && (found[1] + 0.8).abs() < 1e-9, "{found:?}");
+        assert_eq!(disc([0.0, 0.0], true).direction_of_depth(&[0.0, 0.0], 0.0), None);
+    }
+
     proptest! {
         #[test]
         fn the_end_of_the_gap_lies_on_the_sphere(

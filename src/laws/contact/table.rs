@@ -231,7 +231,11 @@ impl Contact {
             let of_histories = "adhesion and memory belong to the place where the boundary was first";
             let has_histories = self.adhesion.is_some() || self.memory.is_some();
             let of_distance = "only between bodies is the distance that of the mesh";
-            let why = if self.obstacle.is_none() { Some(of_sliding) } else { has_histories.then_some(of_histories) };
+            let why = if self.obstacle.is_none() {
+                Some(of_sliding)
+            } else {
+                has_histories.then_some(of_histories)
+            };
             let sliding = why.filter(|_| slides).map(|why| LawFault::at_value("sliding", why, small));
             let closed = self.closed.then(|| LawFault::at_value("closed", of_distance, "delete the key"));
             let of_side = "only contact `against` another body has two sides";

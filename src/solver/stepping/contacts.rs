@@ -59,8 +59,7 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     if body.contacts.is_empty() {
         return Ok(());
     }
-    let (converged, start, velocity) =
-        (state.displacement.local()?, start.local()?, state.velocity.local()?);
+    let (converged, start, velocity) = (state.displacement.local()?, start.local()?, state.velocity.local()?);
     let [converged, start, velocity] =
         [&converged, &start, &velocity].map(|values| body.seen_by_contacts(values));
     for contact in &mut body.contacts {

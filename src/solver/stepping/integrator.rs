@@ -18,7 +18,11 @@
 //! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
 //! ```
 
-use super::{contacts::{add_contact_energy, stored_where_following}, flow::FlowStart, outcome::over_ranks};
+use super::{
+    contacts::{add_contact_energy, stored_where_following},
+    flow::FlowStart,
+    outcome::over_ranks,
+};
 use crate::{
     error::{Error, Result},
     fem::{

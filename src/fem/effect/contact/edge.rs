@@ -51,7 +51,11 @@ impl<const D: usize> Edge<D> {
                 .and_then(|direction| nearest_in_cone(&direction, &self.cone)),
         };
         let whole: f64 = self.faces.iter().map(|(_, weight)| weight).sum();
-        let seen = seen.and_then(|direction| self.free(&self.along_face(direction)));
+        let seen = seen.map(|direction| self.along_face(direction));
+        let seen = match self.undeformed {
+            Some(_) => seen.filter(|direction| self.free_part(direction).1 > HELD),
+            None => seen.and_then(|direction| self.free(&direction)),
+        };
         let seen = seen.filter(|direction| self.shadow(direction) > ACROSS * whole).unwrap_or(self.middle);
         (seen, self.shadow(&seen))
     }
@@ -74,14 +78,25 @@ impl<const D: usize> Edge<D> {
 
     /// The unit vector along the part of a unit vector that supports leave free.
     fn free(&self, direction: &Vector<D>) -> Option<Vector<D>> {
+        let (part, length) = self.part(direction);
+        (length > HELD).then_some(part)
+    }
+
+    /// The unit vector along the part of a direction in which the node touches the obstacle that supports leave free, and the length of this
+    /// part.
+    pub(super) fn free_part(&self, direction: &Vector<D>) -> (Vector<D>, f64) {
+        if self.undeformed.is_some() { self.part(direction) } else { (*direction, 1.0) }
+    }
+
+    fn part(&self, direction: &Vector<D>) -> (Vector<D>, f64) {
         let (basis, free) = &self.frame;
         if *free == D {
-            return Some(*direction);
+            return (*direction, 1.0);
         }
         let axes = basis[..*free].iter();
         let part = axes.fold([0.0; D], |sum, axis| add_scaled(&sum, dot(axis, direction), axis));
         let length = norm(&part);
-        (length > HELD).then(|| part.map(|x| x / length))
+        (part.map(|x| x / length), length)
     }
 
     /// Multiplies the parts of the faces.

@@ -92,8 +92,6 @@ pub struct ContactConditions<const D: usize> {
     pub gap: Gap,
     /// The nodes owned here that face another body, if there is one instead of an obstacle.
     pub paired: Option<Vec<PairedNode<D>>>,
-    /// Whether points may slide along the obstacle any distance.
-    pub follows_surface: bool,
 }
 
 /// A law on a contact boundary.
@@ -117,7 +115,7 @@ pub struct Contact<const D: usize> {
     pub facets: Vec<u32>,
     /// Whether it is against another body.
     pub is_paired: bool,
-    /// Whether points may slide along the obstacle any distance.
+    /// Whether points may slide along the obstacle any distance; to be set before [`turn_edges`](Self::turn_edges).
     pub follows_surface: bool,
     /// Energy in J that it stores on this rank at the start of a step, if it follows the surface.
     stored_before: f64,
@@ -139,7 +137,7 @@ impl<const D: usize> Contact<D> {
         conditions: ContactConditions<D>,
         held: &Held<D>,
     ) -> Result<Self> {
-        let ContactConditions { quadrature, law, gap, paired, follows_surface } = conditions;
+        let ContactConditions { quadrature, law, gap, paired } = conditions;
         let is_paired = paired.is_some();
         let mut points: Vec<Point<D>> = match quadrature {
             _ if let Some(paired) = paired => {
@@ -181,7 +179,7 @@ impl<const D: usize> Contact<D> {
             reference,
             facets: facets.to_vec(),
             is_paired,
-            follows_surface,
+            follows_surface: false,
             stored_before: 0.0,
             owned: mesh.owned,
             friction: None,

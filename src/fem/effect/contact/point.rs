@@ -235,8 +235,8 @@ impl<const D: usize> Point<D> {
         self.edge.as_ref().and_then(|edge| edge.undeformed)
     }
 
-    /// Turns a point that follows the obstacle to the direction in which this place sees it at `time`, and takes its gap from where it is,
-    /// given its displacement in m.
+    /// Turns a point that follows the obstacle to the direction in which this place sees it at `time`, and takes its gap from where
+    /// it is at this displacement in m.
     pub(super) fn slide(&mut self, gap: &Gap, (seen, time): (Vector<D>, f64), displacement: &Vector<D>) {
         let direction = self.edge.as_ref().map(|edge| edge.toward(gap, &seen, time));
         if let Some((undeformed, direction)) = self.undeformed().zip(direction) {
@@ -268,10 +268,11 @@ impl<const D: usize> Point<D> {
         point
     }
 
-    /// Gives a point that no other contact shares another normal, which supports leave free, and weight.
+    /// Gives a point that no other contact shares another normal, not all of which supports hold, and weight.
     fn turn_freely(&mut self, (normal, weight): (Vector<D>, f64)) {
-        (self.normal, self.direction, self.dual, self.wall) = (normal, normal, normal, normal);
-        self.free_length = 1.0;
+        let (free, length) = self.edge.as_ref().map_or((normal, 1.0), |edge| edge.free_part(&normal));
+        (self.normal, self.direction, self.dual, self.wall) = (normal, free, free, free);
+        self.free_length = length;
         self.set_weight(weight);
     }
 

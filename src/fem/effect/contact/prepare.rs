@@ -13,7 +13,12 @@ impl<const D: usize> Contact<D> {
     /// the blend and the velocities of the converged state, all with ghosts. Histories of friction and wear start from the same blend of earlier ones, and the velocity of the
     /// obstacle follows from its positions by the same formula. If the end of the step is extrapolated, pressures of laws with a potential
     /// are their means over the step, which conserve energy.
-    pub fn prepare(&mut self, step: Step, blend: Blend, [converged, start, velocity]: [&[f64]; 3]) -> Result<()> {
+    pub fn prepare(
+        &mut self,
+        step: Step,
+        blend: Blend,
+        [converged, start, velocity]: [&[f64]; 3],
+    ) -> Result<()> {
         self.blend = blend;
         let time = blend.balanced(step).time;
         self.friction.iter_mut().for_each(|friction| friction.start_step(blend, time));
