@@ -80,8 +80,9 @@ fn a_block_slides_over_a_bump_at_the_speed_that_its_height_leaves_on_any_number_
     let mut top = 0.0f64;
     for at in 0..places.len() {
         let x = places[at] - 1.0;
-        let surface = 0.1 * (-x * x / 0.08).exp();
-        // The middle of the flat lower side of 20 mm is off the surface of this curvature, 2.5/m or less.
+        let bump = |x: f64| 0.1 * (-x * x / 0.08).exp();
+        // The centre has turned about the middle of the flat lower side of 20 mm, which is off a surface of the curvature 2.5/m or less.
+        let surface = bump(x - 0.01 * x / 0.04 * bump(x));
         assert!((heights[at] - surface).abs() < 1.5e-4, "{x}: {} m above {surface} m", heights[at]);
         let squared = 4.0 - 2.0 * 9.81 * heights[at];
         let speed = along[at].hypot(across[at]);
@@ -145,7 +146,7 @@ fn a_block_that_rubs_along_a_bowl_restarts_in_the_middle_of_its_way() {
 /// The support takes up the part of the pressure along x, so that the obstacle is pushed aside.
 #[test]
 fn an_obstacle_that_a_block_pushes_aside_gains_the_energy_that_the_block_loses() {
-    let case = block("sphere = { centre = [-0.2, -0.97979590], radius = 1.0 }", [0.0, 1e-6], 0.0)
+    let case = block("sphere = { centre = [-0.2, -0.97979590], radius = 1.0 }", [0.0, 2.1e-3], 0.0)
         .set("support", "[{ on = ['left'], fix = 'normal' }]")
         .set("contact.0.obstacle_load", "{ direction = [1.0, 0.0], force = 0.0, mass = 1.0 }")
         .set("time.step", "0.002")
@@ -155,7 +156,7 @@ fn an_obstacle_that_a_block_pushes_aside_gains_the_energy_that_the_block_loses()
     let history = results.table("history.csv");
     let moving = history.last("kinetic_energy") + history.last("obstacle_kinetic_energy");
     let expected = -0.4 * 9.81 * fallen;
-    assert!(fallen < -0.01 && (moving / expected - 1.0).abs() < 0.02, "{moving} J of {expected} J");
+    assert!(fallen < -5e-3 && (moving / expected - 1.0).abs() < 0.02, "{moving} J of {expected} J");
 }
 
 #[test]

@@ -12,8 +12,8 @@
 use super::{
     Contact,
     edge::{ACROSS, ALONG, Edge, nearest_in_cone, sine},
-    point::Point,
-    tangential_point::tangents_of,
+    point::{Point, Vectors::Body},
+    tangential_point::{TangentialPoint, tangents_of},
 };
 use crate::{
     fem::space::{Held, SurfacePoint, surface_points},
@@ -22,7 +22,7 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-use std::{collections::BTreeMap, rc::Rc};
+use std::{borrow::Cow, collections::BTreeMap, rc::Rc};
 
 /// Cosine of the angle beyond which facets count as different faces of the body (40 degrees).
 const SAME_FACE: f64 = 0.766;
@@ -71,6 +71,35 @@ impl<const D: usize> Contact<D> {
             }
         }
         Ok(())
+    }
+
+    /// Adds a unit velocity along the first free tangent of each point with friction to nodal values of the body; as for other reference values,
+    /// on an edge the tangent is that between the faces.
+    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
+        let free = self.sliding_at_all_times().filter(|point| point.is_free());
+        free.for_each(|point| point.add(Body, 1.0, &point.tangents[0], nodal));
+    }
+
+    /// `integral of w_tau^2` over the points with friction on this rank, along the same tangents.
+    pub fn sliding_square(&self, nodal: &[f64]) -> f64 {
+        let square = |point: Cow<TangentialPoint<D>>| {
+            point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
+        };
+        self.sliding_at_all_times().map(square).sum()
+    }
+
+    fn sliding_at_all_times(&self) -> impl Iterator<Item = Cow<'_, TangentialPoint<D>>> {
+        let friction = self.friction.iter().flat_map(|friction| &friction.points);
+        friction.map(|friction| {
+            let mut friction = Cow::Borrowed(friction);
+            let point = &self.normal.points[friction.at];
+            if let Some(edge) = &point.edge {
+                let (point, friction) = (point.at_all_times(), friction.to_mut());
+                (friction.tangents, friction.count, friction.all) = tangents_of(&point, edge.frame);
+                friction.weight = point.weight;
+            }
+            friction
+        })
     }
 
     /// Lets friction act along the tangents of nodes on edges, and tells them how the obstacle moves, after they have turned.
