@@ -18,7 +18,7 @@ use crate::{
         space::{Geometry, Held, SurfacePoint, cell_rule, place_in_cell, surface_means, surface_points},
         state::State,
     },
-    job::{self, Job},
+    job::{self, Job, Sliding},
     laws::{
         contact::{Gap, NormalResponse, Quadrature},
         material::{ByMaterial, Hypothesis, Material},
@@ -125,6 +125,7 @@ fn contacts<const D: usize>(
         let paired = nodes_of(pairs, number).map(<[_]>::to_vec);
         let conditions = ContactConditions { quadrature: contact.quadrature, law, gap, paired };
         let mut laws = Contact::new(session, mesh, &facets, conditions, held)?;
+        laws.follows_surface = contact.obstacle.is_some() && contact.sliding == Sliding::Finite;
         laws.turn_edges(session, mesh, held)?;
         if let Some(motion) = motion {
             let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired {

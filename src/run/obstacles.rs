@@ -71,7 +71,9 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             }
             continue;
         }
-        out.extend(warning_of_tilt(session, (number, contact), &on, job.time.end));
+        if !contact.follows_surface {
+            out.extend(warning_of_tilt(session, (number, contact), &on, job.time.end));
+        }
         out.extend(warning_of_straight_edges(session, &body.mesh, (number, contact), &on)?);
         if deepest > TOO_DEEP * size {
             out.push(format!(
@@ -133,8 +135,8 @@ fn warning_of_tilt<const D: usize>(
     (angle > TILTED).then(|| {
         format!(
             "contact.{number}: the plane in front of the boundary {on} is inclined to it by {:.1} degrees or more at t = {time} s: contact \
-             acts along the normals of the undeformed body, so that no force pushes the body down this slope; incline the body and \
-             [gravity] instead of the plane",
+             acts along the normals of the undeformed body, so that no force pushes the body down this slope; use sliding = \"finite\", or \
+             incline the body and [gravity] instead of the plane",
             angle.to_degrees()
         )
     })
@@ -276,10 +278,14 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             ));
         }
         if shift > ASTRAY * size && shift_to_spread > LARGEST_SHIFT {
+            let remedy = if table.adhesion.is_none() && table.memory.is_none() {
+                "use sliding = \"finite\""
+            } else {
+                "move the obstacle in place of the body"
+            };
             out.push(format!(
                 "contact.{number}: the boundary {on} moved up to {moved:.3e} m along its obstacle while it pressed on it, which changes \
-                 distances between them by up to {shift:.3e} m: gaps and normals are those of the undeformed body, without these changes; \
-                 move the obstacle in place of the body, or mesh it and use `against` with sliding = \"finite\""
+                 distances between them by up to {shift:.3e} m: gaps and normals are those of the undeformed body, without these changes; {remedy}"
             ));
         }
         if leap > size {

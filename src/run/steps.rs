@@ -176,7 +176,8 @@ fn impacts_of_nodes(job: &Job) -> Vec<String> {
     let has_mass = job.materials().any(|(_, material)| material.density.is_some());
     let strikes = |contact: &Contact| {
         let is_constraint = matches!(contact.normal, NormalLaw::Unilateral(_));
-        is_constraint && contact.sliding == Sliding::Finite && !contact.redistribute_mass
+        let slides = !contact.against.is_empty() && contact.sliding == Sliding::Finite;
+        is_constraint && slides && !contact.redistribute_mass
     };
     let found = job.contact.iter().enumerate().filter(|(_, contact)| has_mass && strikes(contact));
     let words = |(number, contact): (usize, &Contact)| {

@@ -1,6 +1,7 @@
 //! Complete runs of the solver under `mpirun`: results, files, restarts and failures.
 
 mod adaptive;
+mod along_obstacles;
 mod axisymmetric;
 mod batch;
 mod blocks;

@@ -146,7 +146,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             displacement.update_ghosts().expect("ghosts");
             let displacement = displacement.local().expect("local");
             contacts.iter_mut().for_each(|c| {
-                c.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared")
+                c.prepare(STEP, Blend::euler(STEP.length), [&displacement; 3]).expect("prepared")
             });
             let mut scratch = Scratch::new(&state.velocity, &contacts).expect("scratch");
             let mut linear_solver = ProjectedKsp::new("", &state.velocity, D).expect("solver");
@@ -265,7 +265,7 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
         motion.expect("a motion").start(Blend::euler(0.1), 0.1, None);
     }
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
-    contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");
+    contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 3]).expect("prepared");
     contact.follow_obstacle(true).expect("followed");
     let start = [0.7, -3.0];
     let mut velocities_at = |[along, about]: [f64; 2]| {
@@ -339,7 +339,7 @@ fn follows_belt(session: &Session) {
         .expect("friction");
     choose_unknowns(std::slice::from_mut(&mut contact), &body.mesh).expect("one boundary");
     let displacement = vec![0.0; state.velocity.local().expect("local").len()];
-    contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 2]).expect("prepared");
+    contact.prepare(STEP, Blend::euler(STEP.length), [&displacement; 3]).expect("prepared");
     contact.fix_bounds();
     let mut apart = vec![0.0; state.velocity.owned().expect("owned").len()];
     contact.subtract_obstacle(&mut apart);

@@ -42,6 +42,8 @@ obstacles! {
 const WIDTH: f64 = 1e-5;
 /// By how much the slope of the depth may differ from 1 where the surface has a normal.
 const NO_NORMAL: f64 = 0.01;
+/// The slope of a bound of the depth below which it shows no direction.
+const FLAT: f64 = 0.05;
 
 impl Default for Gap {
     fn default() -> Self {
@@ -147,6 +149,18 @@ impl Gap {
     /// The direction from a place to the obstacle at `time`, a unit vector against the normal of its surface where it is nearest; none
     /// where it has none there, as in the middle of a sphere, or where two parts of it are equally near.
     pub fn direction_of_nearest<const D: usize>(&self, place: &Vector<D>, time: f64) -> Option<Vector<D>> {
+        let (direction, slope) = self.steepest(place, time)?;
+        ((slope - 1.0).abs() < NO_NORMAL).then_some(direction)
+    }
+
+    /// The same where the depth may be a bound of it: the direction in which it grows most.
+    pub fn direction_of_depth<const D: usize>(&self, place: &Vector<D>, time: f64) -> Option<Vector<D>> {
+        let (direction, slope) = self.steepest(place, time)?;
+        (slope > FLAT).then_some(direction)
+    }
+
+    /// The unit vector along which the depth at a place grows most at `time`, and its slope along it.
+    fn steepest<const D: usize>(&self, place: &Vector<D>, time: f64) -> Option<(Vector<D>, f64)> {
         let depth = |place: &Vector<D>| self.depth(time, place).filter(|depth| depth.is_finite());
         let nearest = depth(place)?;
         let width = WIDTH * place.iter().fold(nearest.abs(), |most, x| most.max(x.abs()));
@@ -156,8 +170,8 @@ impl Gap {
                 |length: f64| depth(&std::array::from_fn(|j| place[j] + if i == j { length } else { 0.0 }));
             *component = (at(width)? - at(-width)?) / (2.0 * width);
         }
-        let length = norm(&direction);
-        ((length - 1.0).abs() < NO_NORMAL).then(|| direction.map(|x| x / length))
+        let slope = norm(&direction);
+        (slope > 0.0).then(|| (direction.map(|x| x / slope), slope))
     }
 
     /// The length of a ray, see [`Obstacle::ray`]; a given gap is that of any ray.
@@ -371,6 +385,16 @@ pub(super) mod tests {
         assert_eq!(channel.direction_of_nearest(&[1.0, 1.0], 0.0), None);
         close(channel.direction_of_nearest(&[1.0, 0.5], 0.0), [0.0, -1.0]);
         assert_eq!(disc([0.0, 0.0], true).direction_of_nearest(&[0.0, 0.0], 0.0), None);
+    }
+
+    #[test]
+    fn a_bound_of_the_distance_shows_the_normal_of_the_surface() {
+        let half = shape("0.5*(sqrt(x^2 + y^2) - 2)", vec![]);
+        let place = [1.2, 1.6];
+        assert_eq!(half.direction_of_nearest(&place, 0.0), None);
+        let found: Vector<2> = half.direction_of_depth(&place, 0.0).expect("a direction");
+        assert!((found[0] + 0.6).abs() < 1e-9 && (found[1] + 0.8).abs() < 1e-9, "{found:?}");
+        assert_eq!(disc([0.0, 0.0], true).direction_of_depth(&[0.0, 0.0], 0.0), None);
     }
 
     proptest! {

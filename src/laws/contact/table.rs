@@ -25,16 +25,19 @@ pub enum Quadrature {
     Gauss,
 }
 
-/// How far bodies in contact may slide along each other.
+/// How far bodies in contact may slide along each other or along an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sliding {
-    /// Less than half a facet: nodes act on the surface that they face in the undeformed bodies. More is warned of.
+    /// Less than half a facet: nodes act on the surface that they face in the undeformed bodies. More is warned of. Along an obstacle: gaps
+    /// and normals are those of the undeformed body. Motions that change them are warned of.
     #[default]
     Small,
     /// Any distance: what nodes face is found anew from the displacements, whenever some node has slid by a quarter of a facet since the
     /// last time, and so is the direction of the pressure: at right angles to a flat surface on which a corner or a rounded edge slides, and to both of two edges.
-    /// Corners and edges must be on the side that carries the law (`side`).
+    /// Corners and edges must be on the side that carries the law (`side`). Along an obstacle: the gap is that from where the boundary is at
+    /// the start of each step, and the pressure acts at right angles to the obstacle there, except at nodes that other contacts share. An inner
+    /// corner of an obstacle should be made of two contacts, each with one of its sides, at boundaries that meet at an edge of the body.
     /// Requires a normal law with a gap, without adhesion and memory.
     Finite,
 }
@@ -95,7 +98,7 @@ pub struct Contact {
     /// distance. Absent: the distance is that of the mesh.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub closed: bool,
-    /// How far the boundaries may slide along those in `against`.
+    /// How far the boundaries may slide along an obstacle or those in `against`.
     #[serde(default, skip_serializing_if = "Sliding::is_small")]
     pub sliding: Sliding,
     /// The part of these boundaries to which the contact applies: the facets at whose centre this expression in x, y, z is not 0. A
@@ -225,9 +228,16 @@ impl Contact {
         let small = "use \"small\", or delete the key";
         let slides = self.sliding == Sliding::Finite;
         if self.against.is_empty() {
-            let of_sliding = "only contact `against` another body distinguishes small and finite sliding";
+            let of_sliding = "only along an obstacle or another body can the boundary slide far";
+            let of_histories = "adhesion and memory belong to the place where the boundary was first";
+            let has_histories = self.adhesion.is_some() || self.memory.is_some();
             let of_distance = "only between bodies is the distance that of the mesh";
-            let sliding = slides.then(|| LawFault::at_value("sliding", of_sliding, small));
+            let why = if self.obstacle.is_none() {
+                Some(of_sliding)
+            } else {
+                has_histories.then_some(of_histories)
+            };
+            let sliding = why.filter(|_| slides).map(|why| LawFault::at_value("sliding", why, small));
             let closed = self.closed.then(|| LawFault::at_value("closed", of_distance, "delete the key"));
             let of_side = "only contact `against` another body has two sides";
             let is_given = self.side != Side::Auto;

@@ -38,6 +38,17 @@ pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     Ok(())
 }
 
+/// The energy in J that contacts which follow their obstacles store on this rank after a step.
+pub(super) fn stored_where_following<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<f64> {
+    let displacement = state.displacement.local()?;
+    let displacement = body.seen_by_contacts(&displacement);
+    let following = body.contacts.iter().filter(|contact| contact.follows_surface);
+    following.map(|contact| contact.stored_energy(state.time, &displacement)).sum()
+}
+
 /// Prepares the points of all contacts for a step from this blend, whose displacement has ghosts, with the pressures of the converged
 /// state.
 pub(super) fn prepare_contacts<const D: usize, const S: usize>(
@@ -49,8 +60,9 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     if body.contacts.is_empty() {
         return Ok(());
     }
-    let (converged, start) = (state.displacement.local()?, start.local()?);
-    let (converged, start) = (body.seen_by_contacts(&converged), body.seen_by_contacts(&start));
+    let (converged, start, velocity) = (state.displacement.local()?, start.local()?, state.velocity.local()?);
+    let [converged, start, velocity] =
+        [&converged, &start, &velocity].map(|values| body.seen_by_contacts(values));
     for (number, contact) in body.contacts.iter_mut().enumerate() {
         if let Some((friction, heat)) = contact.friction.as_mut().zip(body.heat.as_ref()) {
             let seen = |node: usize| heat.seen()[node];
@@ -59,7 +71,7 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
                 None => friction.set_temperatures(seen),
             }
         }
-        contact.prepare(step, blend, [&converged, &start])?;
+        contact.prepare(step, blend, [&converged, &start, &velocity])?;
     }
     restore_pressures(body, state)
 }

@@ -18,7 +18,11 @@
 //! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
 //! ```
 
-use super::{contacts::add_contact_energy, flow::FlowStart, outcome::over_ranks};
+use super::{
+    contacts::{add_contact_energy, stored_where_following},
+    flow::FlowStart,
+    outcome::over_ranks,
+};
 use crate::{
     error::{Error, Result},
     fem::{
@@ -255,6 +259,7 @@ impl Integrator {
         if self.blend.extrapolates() {
             peaks = peaks.or(self.extrapolate(body, state, step, &mut energy)?);
         }
+        energy[NUMERICAL] += stored_where_following(body, state)?;
         let (energy, peaks) = over_ranks(session, energy, peaks);
         Ok((energy, peaks, powers.map_values(|values| session.sum(values))))
     }

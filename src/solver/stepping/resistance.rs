@@ -25,10 +25,12 @@ pub(super) fn resistances<const D: usize>(
         contact.normal.boundary().add_normals(&mut motion.owned_mut()?);
         let square = contact.normal.boundary().normal_square(&motion.owned()?);
         let normal = against(&motion, square)?.max(2.0 * contact.monotonicity_constant());
-        let Some(friction) = &contact.friction else { return Ok([normal; 2]) };
+        if contact.friction.is_none() {
+            return Ok([normal; 2]);
+        }
         motion.fill(0.0)?;
-        friction.add_unit_sliding(&mut motion.owned_mut()?);
-        let square = friction.square(&motion.owned()?);
+        contact.add_unit_sliding(&mut motion.owned_mut()?);
+        let square = contact.sliding_square(&motion.owned()?);
         Ok([normal, against(&motion, square)?])
     };
     contacts.iter().map(&mut resistance).collect()

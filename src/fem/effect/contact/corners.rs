@@ -6,12 +6,14 @@
 //!
 //! Where the undeformed node sees an obstacle that moves is a function of time. A step has the direction at its end; its gap at the start is
 //! along the direction there, so that the gap has grown by what the node sees of the motion. Nothing is kept between steps.
+//!
+//! If the contact follows the surface, all nodes that no other contact has are treated in this way, see `following.rs`.
 
 use super::{
     Contact,
     edge::{ACROSS, ALONG, Edge, nearest_in_cone, sine},
-    point::Point,
-    tangential_point::tangents_of,
+    point::{Point, Vectors::Body},
+    tangential_point::{TangentialPoint, tangents_of},
 };
 use crate::{
     fem::space::{Held, SurfacePoint, surface_points},
@@ -20,7 +22,7 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-use std::{collections::BTreeMap, rc::Rc};
+use std::{borrow::Cow, collections::BTreeMap, rc::Rc};
 
 /// Cosine of the angle beyond which facets count as different faces of the body (40 degrees).
 const SAME_FACE: f64 = 0.766;
@@ -55,10 +57,11 @@ impl<const D: usize> Contact<D> {
             };
             // Two faces of an obstacle that meet at an edge may touch two of the body.
             let touches_along_one = of_node.len() == 1 || fixed.len() < 2 || gap.is_smooth();
-            let follows = is_edge && touches_along_one && gap.turns_as_seen();
+            let follows = self.follows_surface || is_edge && touches_along_one && gap.turns_as_seen();
             let faces = of_node.iter().map(|point| (point.normal, point.weight)).collect();
             match follows.then(|| Edge::new(faces, cone, held.frame(node))).flatten() {
-                Some(edge) => {
+                Some(mut edge) => {
+                    edge.undeformed = self.follows_surface.then_some(place);
                     let (normal, weight) = edge.toward(gap, &place, 0.0);
                     let mut point = Point::nodal(SurfacePoint { node: node as u32, normal, weight }, held);
                     (point.place, point.edge) = (place, Some(Rc::new(edge)));
@@ -68,6 +71,35 @@ impl<const D: usize> Contact<D> {
             }
         }
         Ok(())
+    }
+
+    /// Adds a unit velocity along the first free tangent of each point with friction to nodal values of the body; as for other reference values,
+    /// on an edge the tangent is that between the faces.
+    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
+        let free = self.sliding_at_all_times().filter(|point| point.is_free());
+        free.for_each(|point| point.add(Body, 1.0, &point.tangents[0], nodal));
+    }
+
+    /// `integral of w_tau^2` over the points with friction on this rank, along the same tangents.
+    pub fn sliding_square(&self, nodal: &[f64]) -> f64 {
+        let square = |point: Cow<TangentialPoint<D>>| {
+            point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
+        };
+        self.sliding_at_all_times().map(square).sum()
+    }
+
+    fn sliding_at_all_times(&self) -> impl Iterator<Item = Cow<'_, TangentialPoint<D>>> {
+        let friction = self.friction.iter().flat_map(|friction| &friction.points);
+        friction.map(|friction| {
+            let mut friction = Cow::Borrowed(friction);
+            let point = &self.normal.points[friction.at];
+            if let Some(edge) = &point.edge {
+                let (point, friction) = (point.at_all_times(), friction.to_mut());
+                (friction.tangents, friction.count, friction.all) = tangents_of(&point, edge.frame);
+                friction.weight = point.weight;
+            }
+            friction
+        })
     }
 
     /// Lets friction act along the tangents of nodes on edges, and tells them how the obstacle moves, after they have turned.

@@ -23,6 +23,9 @@ pub(super) struct Edge<const D: usize> {
     pub frame: ([Vector<D>; D], usize),
     /// The direction between the faces, where the node does not see the obstacle.
     middle: Vector<D>,
+    /// The initial position in m of a node that may slide along the obstacle any distance. It follows the normal of the obstacle, also
+    /// where this is not between the faces: these may have turned.
+    pub undeformed: Option<Vector<D>>,
 }
 
 impl<const D: usize> Edge<D> {
@@ -34,17 +37,25 @@ impl<const D: usize> Edge<D> {
     ) -> Option<Self> {
         let sum = faces.iter().fold([0.0; D], |sum, (normal, weight)| add_scaled(&sum, *weight, normal));
         let length = norm(&sum);
-        let mut edge = Self { faces, cone, frame, middle: sum.map(|x| x / length) };
+        let mut edge = Self { faces, cone, frame, middle: sum.map(|x| x / length), undeformed: None };
         edge.middle = edge.free(&edge.middle).filter(|_| length > 0.0)?;
         Some(edge)
     }
 
     /// The direction in which the node at `place` sees the obstacle at `time`, and the weight of the shadow of its faces along it.
     pub(super) fn toward(&self, gap: &Gap, place: &Vector<D>, time: f64) -> (Vector<D>, f64) {
-        let seen = gap.direction_of_nearest(place, time);
-        let seen = seen.and_then(|direction| nearest_in_cone(&direction, &self.cone));
+        let seen = match self.undeformed {
+            Some(_) => gap.direction_of_depth(place, time),
+            None => gap
+                .direction_of_nearest(place, time)
+                .and_then(|direction| nearest_in_cone(&direction, &self.cone)),
+        };
         let whole: f64 = self.faces.iter().map(|(_, weight)| weight).sum();
-        let seen = seen.and_then(|direction| self.free(&self.along_face(direction)));
+        let seen = seen.map(|direction| self.along_face(direction));
+        let seen = match self.undeformed {
+            Some(_) => seen.filter(|direction| self.free_part(direction).1 > HELD),
+            None => seen.and_then(|direction| self.free(&direction)),
+        };
         let seen = seen.filter(|direction| self.shadow(direction) > ACROSS * whole).unwrap_or(self.middle);
         (seen, self.shadow(&seen))
     }
@@ -67,14 +78,25 @@ impl<const D: usize> Edge<D> {
 
     /// The unit vector along the part of a unit vector that supports leave free.
     fn free(&self, direction: &Vector<D>) -> Option<Vector<D>> {
+        let (part, length) = self.part(direction);
+        (length > HELD).then_some(part)
+    }
+
+    /// The unit vector along the part of a direction in which the node touches the obstacle that supports leave free, and the length of this
+    /// part.
+    pub(super) fn free_part(&self, direction: &Vector<D>) -> (Vector<D>, f64) {
+        if self.undeformed.is_some() { self.part(direction) } else { (*direction, 1.0) }
+    }
+
+    fn part(&self, direction: &Vector<D>) -> (Vector<D>, f64) {
         let (basis, free) = &self.frame;
         if *free == D {
-            return Some(*direction);
+            return (*direction, 1.0);
         }
         let axes = basis[..*free].iter();
         let part = axes.fold([0.0; D], |sum, axis| add_scaled(&sum, dot(axis, direction), axis));
         let length = norm(&part);
-        (length > HELD).then(|| part.map(|x| x / length))
+        (part.map(|x| x / length), length)
     }
 
     /// Multiplies the parts of the faces.

@@ -40,9 +40,10 @@ impl<const D: usize> Contact<D> {
     /// nothing, as a rigid obstacle, `p (d_n - d_{n-1})` is dissipated. Friction `q` on an obstacle with the velocity `w` absorbs
     /// `q . v = q . (v - w) + q . w`: dissipation, work on the obstacle. Where supports prescribe a part of `v`, they do the work of pressure and
     /// friction there. Where bodies slide, a point is deeper or less deep because what it faces was found anew: the work on this jump is a
-    /// term of the scheme.
+    /// term of the scheme. Of a contact that follows its obstacle, `numerical` contains minus the stored energy at the start of the step,
+    /// in place of the change `e(d_n) - e(d_{n-1})`; that at the end is to be added.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> ContactEnergy {
-        let mut sum = ContactEnergy::default();
+        let mut sum = ContactEnergy { numerical: -self.stored_before, ..ContactEnergy::default() };
         let (law, is_of_two_steps) = (&self.normal.law, self.blend.earlier != 0.0);
         for point in &self.normal.points {
             let v = point.normal_component(Body, velocity);
@@ -64,13 +65,12 @@ impl<const D: usize> Contact<D> {
             };
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let energies = law.energy(after).zip(law.energy(point.penetration_before));
+            let found_deeper = found_deeper(law, point);
             let lost = match energies {
-                Some(_) => {
-                    lost_at_wall(law, pressure, [point.penetration_before - point.found_deeper, after])
-                }
-                None => times(pressure, after - (before - point.found_deeper)),
+                Some(_) => lost_at_wall(law, pressure, [point.penetration_before - found_deeper, after]),
+                None => times(pressure, after - (before - found_deeper)),
             };
-            let stored = energies.map_or(0.0, |energies| {
+            let stored = energies.filter(|_| !self.follows_surface).map_or(0.0, |energies| {
                 point.weight * (energies.0 - energies.1) + (point.weight - point.weight_before) * energies.1
             });
             // The growth of the wear that this step has seen, which is no longer stored.
@@ -100,13 +100,25 @@ impl<const D: usize> Contact<D> {
             return Ok(0.0);
         }
         let energy = |point: &Point<D>| {
-            let point = point.facing(&self.obstacle.gap, time);
+            let point = self.facing(point, time, displacement);
             let [along, gap] = self.obstacle.position_at(time, displacement, &point)?;
             let stored = self.normal.law.energy(along - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };
         self.normal.points.iter().map(energy).sum()
     }
+}
+
+/// By how much a point is deeper in m at the start of a step because what it faces was found anew. A point that follows an obstacle and
+/// pressed on a rigid one was at its surface.
+fn found_deeper<const D: usize>(law: &NormalResponse, point: &Point<D>) -> f64 {
+    let before = point.penetration_before;
+    if point.undeformed().is_none() || !before.is_finite() {
+        return point.found_deeper;
+    }
+    let [wall, stored] = law.wall().unwrap_or_default();
+    let was = if pressure_before(law, point) > stored { wall } else { before.min(wall) };
+    before - was
 }
 
 /// Pressure in Pa at a point before the step.

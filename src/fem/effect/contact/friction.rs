@@ -588,14 +588,6 @@ impl<const D: usize> Friction<D> {
             point.add(Body, factor * point.weight, &along, forces);
         }
     }
-
-    /// `integral of w_tau^2` over the points on this rank.
-    pub fn square(&self, nodal: &[f64]) -> f64 {
-        let square = |point: &TangentialPoint<D>| {
-            point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
-        };
-        self.points.iter().map(square).sum()
-    }
 }
 
 /// The scaled distance of a sliding velocity and a traction to the point of the graph with the same parameter `c v + q`, where `c` is

@@ -36,6 +36,7 @@ mod directions;
 mod driven;
 mod edge;
 mod energy;
+mod following;
 mod friction;
 mod inclusion;
 mod loaded_obstacle;
@@ -114,6 +115,10 @@ pub struct Contact<const D: usize> {
     pub facets: Vec<u32>,
     /// Whether it is against another body.
     pub is_paired: bool,
+    /// Whether points may slide along the obstacle any distance; to be set before [`turn_edges`](Self::turn_edges).
+    pub follows_surface: bool,
+    /// Energy in J that it stores on this rank at the start of a step, if it follows the surface.
+    stored_before: f64,
     /// Nodes that this rank owns.
     owned: usize,
     /// Friction, if there is any.
@@ -180,6 +185,8 @@ impl<const D: usize> Contact<D> {
             reference,
             facets: facets.to_vec(),
             is_paired,
+            follows_surface: false,
+            stored_before: 0.0,
             owned: mesh.owned,
             friction: None,
             edges: Vec::new(),

@@ -9,7 +9,7 @@ use crate::{
         space::{Held, SurfacePoint, facet_points},
     },
     laws::contact::{Gap, NodeContext, NormalResponse, Resolved},
-    linear_algebra::tensor::{Vector, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, norm},
     mesh::Mesh,
 };
 use std::{borrow::Cow, rc::Rc};
@@ -81,7 +81,7 @@ pub(super) struct Point<const D: usize> {
     /// Length of the normal without prescribed components before scaling.
     pub free_length: f64,
     pub unknown: Unknown,
-    /// Initial position, in m.
+    /// Initial position in m, without the part along the normal of where it is, if it follows the obstacle along which it slides.
     pub place: Vector<D>,
     /// The distance in m to the body that it faces along the normal, of the undeformed bodies; 0 if it faces none.
     pub distance: f64,
@@ -93,7 +93,8 @@ pub(super) struct Point<const D: usize> {
     pub sharpness: f64,
     /// Whether its normal follows what it faces: no other contact acts at the node.
     pub turns: bool,
-    /// On an edge of the body: the directions along which it may touch an obstacle that moves; no other contact acts at the node.
+    /// On an edge of the body, or where it slides along an obstacle: the directions along which it may touch the obstacle; no other contact
+    /// acts at the node.
     pub edge: Option<Rc<Edge<D>>>,
     /// Displacement in m relative to the body that it faces when it began to face it.
     pub faced_at: Vector<D>,
@@ -218,7 +219,8 @@ impl<const D: usize> Point<D> {
 
     /// Turns a point on an edge to the direction in which it sees the obstacle at `time`.
     pub(super) fn face_obstacle(&mut self, gap: &Gap, time: f64) {
-        if let Some(direction) = self.edge.as_ref().map(|edge| edge.toward(gap, &self.place, time)) {
+        let in_time = self.edge.as_ref().filter(|edge| edge.undeformed.is_none());
+        if let Some(direction) = in_time.map(|edge| edge.toward(gap, &self.place, time)) {
             self.turn_freely(direction);
         }
     }
@@ -226,6 +228,31 @@ impl<const D: usize> Point<D> {
     /// The point as it is at `time`.
     pub(super) fn facing(&self, gap: &Gap, time: f64) -> Cow<'_, Self> {
         self.or_turned(|edge| edge.toward(gap, &self.place, time))
+    }
+
+    /// The initial position in m of a point that follows the obstacle along which it slides.
+    pub(super) fn undeformed(&self) -> Option<Vector<D>> {
+        self.edge.as_ref().and_then(|edge| edge.undeformed)
+    }
+
+    /// Turns a point that follows the obstacle to the direction in which this place sees it at `time`, and takes its gap from where
+    /// it is at this displacement in m.
+    pub(super) fn slide(&mut self, gap: &Gap, (seen, time): (Vector<D>, f64), displacement: &Vector<D>) {
+        let direction = self.edge.as_ref().map(|edge| edge.toward(gap, &seen, time));
+        if let Some((undeformed, direction)) = self.undeformed().zip(direction) {
+            self.turn_freely(direction);
+            self.place = add_scaled(&undeformed, 1.0, &self.along_surface(displacement));
+        }
+    }
+
+    /// The part of a motion at right angles to its normal.
+    pub(super) fn along_surface(&self, motion: &Vector<D>) -> Vector<D> {
+        add_scaled(motion, -dot(motion, &self.normal), &self.normal)
+    }
+
+    /// The value at its node.
+    pub(super) fn value(&self, nodal: &[f64]) -> Vector<D> {
+        std::array::from_fn(|i| nodal[self.node() * D + i])
     }
 
     /// The point for reference values, which do not depend on when they are computed: on an edge along the direction between its faces.
@@ -241,10 +268,11 @@ impl<const D: usize> Point<D> {
         point
     }
 
-    /// Gives a point that no other contact shares another normal, which supports leave free, and weight.
+    /// Gives a point that no other contact shares another normal, not all of which supports hold, and weight.
     fn turn_freely(&mut self, (normal, weight): (Vector<D>, f64)) {
-        (self.normal, self.direction, self.dual, self.wall) = (normal, normal, normal, normal);
-        self.free_length = 1.0;
+        let (free, length) = self.edge.as_ref().map_or((normal, 1.0), |edge| edge.free_part(&normal));
+        (self.normal, self.direction, self.dual, self.wall) = (normal, free, free, free);
+        self.free_length = length;
         self.set_weight(weight);
     }
 

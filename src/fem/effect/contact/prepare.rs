@@ -10,10 +10,15 @@ use crate::{
 
 impl<const D: usize> Contact<D> {
     /// Starts a step of this blend: evaluates the gap and the motion of the obstacle, given the displacements of the converged state and of
-    /// the blend, both with ghosts. Histories of friction and wear start from the same blend of earlier ones, and the velocity of the
+    /// the blend and the velocities of the converged state, all with ghosts. Histories of friction and wear start from the same blend of earlier ones, and the velocity of the
     /// obstacle follows from its positions by the same formula. If the end of the step is extrapolated, pressures of laws with a potential
     /// are their means over the step, which conserve energy.
-    pub fn prepare(&mut self, step: Step, blend: Blend, [converged, start]: [&[f64]; 2]) -> Result<()> {
+    pub fn prepare(
+        &mut self,
+        step: Step,
+        blend: Blend,
+        [converged, start, velocity]: [&[f64]; 3],
+    ) -> Result<()> {
         self.blend = blend;
         let time = blend.balanced(step).time;
         self.friction.iter_mut().for_each(|friction| friction.start_step(blend, time));
@@ -23,6 +28,7 @@ impl<const D: usize> Contact<D> {
         let (time, time_before) = (step.time, step.start());
         let step_length = blend.way();
         for at in 0..self.normal.points.len() {
+            self.follow_surface(at, step, [converged, velocity]);
             self.normal.points[at].face_obstacle(&self.obstacle.gap, time_before);
             let point = &self.normal.points[at];
             let [worn, worn_before] = point.worn;
@@ -57,6 +63,9 @@ impl<const D: usize> Contact<D> {
             // By a normal that turns, the point that has moved is nearer to the obstacle or farther from it.
             let turned = along - along_before;
             point.growth = if before.is_finite() { gap - before - turned } else { gap - along };
+        }
+        if self.follows_surface {
+            self.stored_before = self.stored_energy(time_before, converged)?;
         }
         self.turn_tangents_of_edges();
         for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {

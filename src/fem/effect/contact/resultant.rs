@@ -126,7 +126,8 @@ impl<const D: usize> Contact<D> {
                 }
             }
             if self.normal.law.depends_on_displacement() {
-                let [along, gap] = self.obstacle.position_at(time, displacement, point)?;
+                let point = self.facing(point, time, displacement);
+                let [along, gap] = self.obstacle.position_at(time, displacement, &point)?;
                 state.gap = (gap - along) / point.stretch;
             }
             visit(point.node(), state);

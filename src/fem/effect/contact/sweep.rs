@@ -55,7 +55,7 @@ impl<const D: usize> Touch<D> {
     /// The gap in m and the normal at which a point faces a plane from now on, given its gap to the surface found.
     fn plane(&self, found: f64, point: &Point<D>) -> (f64, Vector<D>) {
         let gap = if self.is_closed(point) { self.gap } else { found.max(0.0) };
-        let along = along_surface(point, &self.moved);
+        let along = point.along_surface(&self.moved);
         let slip = norm(&along);
         let least = point.stretch * point.facet_size;
         let ascent = (gap - found) / slip.max(SLIP_BETWEEN_PAIRINGS * least);
@@ -74,14 +74,9 @@ fn moved<const D: usize>(point: &Point<D>, displacement: &[f64]) -> Vector<D> {
     std::array::from_fn(|i| displacement[point.node() * D + i] - point.faced_at[i])
 }
 
-/// The part of a motion at right angles to the normal of a point.
-fn along_surface<const D: usize>(point: &Point<D>, motion: &Vector<D>) -> Vector<D> {
-    add_scaled(motion, -dot(motion, &point.normal), &point.normal)
-}
-
 /// How far a point has slid along another body since it began to face it, as a share of the size of the facets there.
 fn slip<const D: usize>(point: &Point<D>, displacement: &[f64]) -> f64 {
-    norm(&along_surface(point, &moved(point, displacement))) / point.stretch / point.facet_size
+    norm(&point.along_surface(&moved(point, displacement))) / point.stretch / point.facet_size
 }
 
 impl<const D: usize> NormalContact<D> {
@@ -195,19 +190,18 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Keeps how far points with pressure have moved along an obstacle until the step just solved, and what that changes at their gaps, which
-    /// are those of the undeformed body; at displacements and velocities at its end. Collective.
+    /// are those of the undeformed body (`sliding = "small"`); at displacements and velocities at its end. Collective.
     pub fn keep_shift(&mut self, session: &Session, [displacement, velocity]: [&[f64]; 2]) -> Result<()> {
         let is_given = matches!(self.obstacle.gap, Gap::Distance(_));
         if self.is_paired || is_given || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
         let mut most = [f64::NEG_INFINITY; 4];
-        for point in &self.normal.points {
+        for point in self.normal.points.iter().filter(|point| point.undeformed().is_none()) {
             let along = point.normal_component(Body, displacement);
             let (mut moved, mut shift) = (0.0, 0.0);
             if point.pressure_at(&self.normal.law, Body, velocity) != 0.0 {
-                let whole = std::array::from_fn(|i| displacement[point.node() * D + i]);
-                let tangential = along_surface(point, &whole);
+                let tangential = point.along_surface(&point.value(displacement));
                 let seen = self.obstacle.seen_after(&add_scaled(&point.place, 1.0, &tangential));
                 moved = norm(&tangential);
                 shift = (self.obstacle.reach_from(point, &seen).unwrap_or(f64::INFINITY) - point.reach).abs();
@@ -330,7 +324,7 @@ impl<const D: usize> Contact<D> {
     pub fn gaps(&self, time: f64, displacement: &[f64]) -> Gaps {
         let mut gaps = Gaps { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, without: 0 };
         for point in &self.normal.points {
-            let point = point.facing(&self.obstacle.gap, time);
+            let point = self.facing(point, time, displacement);
             let Ok([along, gap]) = self.obstacle.position_at(time, displacement, &point) else { continue };
             if gap == f64::INFINITY {
                 gaps.without += 1;
