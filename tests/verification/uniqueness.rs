@@ -151,9 +151,7 @@ fn falling<const D: usize, const S: usize>(
 
 /// The matrix of the form `sum of d w w_tau^2` over the points with friction, with the decrease `d` and the weight `w`. Collective.
 fn sliding<const D: usize, const S: usize>(session: &Session, run: &Simulation<D, S>, fall: f64) -> Dense {
-    let square = |x: &[f64]| {
-        run.body.contacts.iter().map(|c| c.sliding_square(x)).sum::<f64>()
-    };
+    let square = |x: &[f64]| run.body.contacts.iter().map(|c| c.sliding_square(x)).sum::<f64>();
     dense_form(session, run, |x, forces| {
         // By polarisation against each component: all others are at rest.
         let mut near = x.to_vec();
