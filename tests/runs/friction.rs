@@ -641,6 +641,25 @@ fn a_heated_plate_that_nothing_but_friction_holds_has_a_solution_in_each_step() 
 }
 
 #[test]
+fn a_sheet_that_creeps_on_a_table_as_it_is_heated_and_cooled_takes_few_iterations_at_each_turn() {
+    let job = "[mesh.rectangle]\nsize = [1.0, 0.1]\ncells = [40, 4]\n\
+        [material]\nhypothesis = 'plane_strain'\nelasticity = { youngs_modulus = 2e11, poisson_ratio = 0.3 }\n\
+        heat = { conductivity = 5e4, volumetric_capacity = 1.0, expansion = 1e-5, reference = 293.0 }\n\
+        [initial]\ntemperature = 293.0\n\
+        [[heat]]\non = ['top', 'bottom', 'left', 'right']\ntemperature = '293 + 100*min(t/2, 2 - t/2)'\n\
+        [[body_force]]\nvalue = [0.0, '-1e5*min(t/0.2, 1)']\n\
+        [[contact]]\non = ['bottom']\nnormal.unilateral = {}\nfriction.coulomb.coefficient = 0.3\n\
+        [time]\nscheme = 'implicit_euler'\nend = 2.4\nstep = 0.2\n";
+    // Before points resisted that all slide: up to 80 with coulomb, 58 with tresca.
+    for law in ["{ coulomb.coefficient = 0.3 }", "{ tresca.bound = 3e3 }"] {
+        let kept = Case::written_as(job).set("contact.0.friction", law).run_and_keep(1);
+        let history = kept.results().table("history.csv");
+        let largest = history.numbers("newton_iterations").into_iter().fold(0.0, f64::max);
+        assert!(largest <= 21.0, "{law}: {largest}");
+    }
+}
+
+#[test]
 fn friction_that_falls_fast_under_lagged_euler_is_warned_of_by_checks_and_runs() {
     for (scheme, is_warned) in [("lagged_euler", true), ("bdf2", false)] {
         let case = Case::of("verification/fault_rupture")

@@ -181,6 +181,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 linear_solver: &mut linear_solver,
                 session,
                 stop_at_cycles: false,
+                lacks_hold: false,
                 halves: false,
                 patience: usize::MAX,
                 equilibrated: false,

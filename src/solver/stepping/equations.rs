@@ -4,8 +4,11 @@ use super::obstacle_motions::ObstacleMotions;
 use crate::{
     error::{Error, Result},
     fem::effect::{Contact, Friction, set_walls},
-    linear_algebra::petsc::{
-        DistributedVector, Matrix, NonlinearProblem, ProjectedKind, ProjectedKsp, ProjectedOperator,
+    linear_algebra::{
+        petsc::{
+            DistributedVector, Matrix, NonlinearProblem, ProjectedKind, ProjectedKsp, ProjectedOperator,
+        },
+        tensor::larger,
     },
     parallel::session::Session,
 };
@@ -139,6 +142,9 @@ const HIDDEN_PATIENCE: usize = 5;
 /// approached, not met.
 const RECURRENCE: f64 = 1e-3;
 
+/// Points of a contact that slide and would move so many times as fast after a step move with a body that nothing holds.
+const FAR: f64 = 1e6;
+
 /// A line search is stuck where residuals fall to more than this share in this number of iterations: its steps end at a corner of the graphs.
 const STUCK: f64 = 0.995;
 const STUCK_ITERATIONS: usize = 10;
@@ -188,6 +194,8 @@ pub struct ContactEquations<'a, const D: usize> {
     pub session: &'a Session,
     /// Whether to fail when a set of branches of the contact graphs recurs.
     pub stop_at_cycles: bool,
+    /// Whether nothing but contact holds a body, so that equations are singular where all points slide.
+    pub lacks_hold: bool,
     /// Whether steps are halved until the branches of the contact graphs stay the same.
     pub halves: bool,
     /// The number of iterations without progress after which to give up.
@@ -415,6 +423,40 @@ impl<const D: usize> ContactEquations<'_, D> {
         Ok(())
     }
 
+    /// Lets points of contacts resist that all slide, and some of which this step turns round or moves far, where friction alone may hold a body: the
+    /// equations are singular, and nothing tells how far the body moves until so many points slide the other way that friction is
+    /// balanced. If sliding speeds are spread evenly, as those of a body that is heated, it is as far as with a viscous resistance of half
+    /// the mean bound divided by the mean speed. The resistance vanishes with the residual, once that is less than friction at one point
+    /// if spread over all. Returns whether there are such contacts; without a step, all turn round. Collective.
+    fn resist_sliding(&mut self, step: Option<&DistributedVector>) -> Result<bool> {
+        let mut is_resisted = false;
+        let values = step.unwrap_or(&self.scratch.velocity).owned()?;
+        for friction in self.contacts.iter_mut().flat_map(|contact| &mut contact.friction) {
+            let [sticking, turning, points, bounds, speeds, changes] =
+                self.session.sum(friction.sizes(&values));
+            // The velocity from which a step starts may take all pressure away.
+            let bounds = larger(bounds, friction.first_bounds);
+            if sticking == 0.0 && (turning > 0.0 || changes > FAR * speeds || step.is_none()) && speeds > 0.0
+            {
+                let share = (self.scratch.residuals[0] * points.powf(1.5) / bounds).min(1.0);
+                friction.raise_slopes(0.5 * share * bounds / speeds);
+                is_resisted = true;
+            }
+        }
+        Ok(is_resisted)
+    }
+
+    /// Where all points of a contact slide after this step, those that turn round stick first. Collective.
+    fn hold_turning(&mut self, step: &mut DistributedVector) -> Result<()> {
+        let mut step = step.owned_mut()?;
+        for friction in self.contacts.iter().flat_map(|contact| &contact.friction) {
+            if self.session.total(friction.count_sticking(&step)) == 0 {
+                friction.hold_turning(&mut step);
+            }
+        }
+        Ok(())
+    }
+
     /// Writes the residual at the mapped velocities.
     fn write_residual(&mut self, residual: &mut DistributedVector) -> Result<()> {
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
@@ -557,17 +599,41 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         residual: &DistributedVector,
         direction: &mut DistributedVector,
     ) -> Result<()> {
-        let is_solved = self.solve_linearised(residual, direction, (ProjectedKind::Symmetric, true))?;
+        let kind = (ProjectedKind::Symmetric, true);
+        let singular = self.counts.singular;
+        let solved = self.solve_linearised(residual, direction, kind);
+        let is_solved = if self.lacks_hold {
+            let first = self.session.agree(solved);
+            let step = matches!(first, Ok(true)).then_some(&*direction);
+            let is_fault = first.as_ref().is_err_and(|error| !error.is_failure());
+            if !is_fault && self.resist_sliding(step)? {
+                // Steps from these equations are others than those from the same branches before.
+                if let Some(last) = self.counts.sets.last_mut() {
+                    last.derivatives = f64::NAN;
+                }
+                self.counts.singular = singular;
+                self.solve_linearised(residual, direction, kind)?
+            } else {
+                first?
+            }
+        } else {
+            solved?
+        };
         // Without a direction, iterations would repeat the same velocity.
         if !is_solved {
             return Err(Error::Failed(NO_DIRECTION.into()));
         }
-        if self.halves && !self.counts.keeps_branches() { direction.scale(0.5) } else { Ok(()) }
+        if self.halves && !self.counts.keeps_branches() {
+            direction.scale(0.5)?;
+        }
+        if self.lacks_hold { self.hold_turning(direction) } else { Ok(()) }
     }
 }
 
 /// Linear equations count as solved by their own factor if this share of the right-hand side is left at most.
 const LARGEST_LINEAR_RESIDUAL: f64 = 0.01;
+/// A solution of GMRES is none if more than this share is left.
+const FALSE_SOLUTION: f64 = 0.5;
 const NEARLY_SINGULAR: &str = "the linear equations are nearly singular";
 
 impl<const D: usize> ContactEquations<'_, D> {
@@ -625,19 +691,23 @@ impl<const D: usize> ContactEquations<'_, D> {
         self.linear_solver.limit_iterations(most.unwrap_or(usize::MAX));
         let mut outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
         self.linear_solver.limit_iterations(usize::MAX);
-        if most.is_some() && outcome.linear.ran_out() {
+        // GMRES measures residuals behind the factor, which may hide those of equations that are nearly singular.
+        let share_left = |operator: &mut ReducedJacobian<'_, D>, velocity: &DistributedVector| {
+            let mut left = open.like()?;
+            operator.apply(velocity, &mut left)?;
+            left.scale(-1.0)?;
+            left.add_scaled(1.0, open)?;
+            Ok::<_, Error>(left.norm()? / open.norm()?)
+        };
+        let is_false = coupled && self.lacks_hold && share_left(&mut operator, velocity)? > FALSE_SOLUTION;
+        if most.is_some() && (outcome.linear.ran_out() || is_false) {
             let rebuilt =
                 self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?;
             self.counts.refreshed += usize::from(rebuilt);
             let first = outcome.linear;
             outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
             outcome.linear = first.followed_by(outcome.linear);
-            // GMRES measures residuals behind the factor, which may hide those of equations that are nearly singular.
-            let mut left = open.like()?;
-            operator.apply(velocity, &mut left)?;
-            left.scale(-1.0)?;
-            left.add_scaled(1.0, open)?;
-            is_solved = left.norm()? <= LARGEST_LINEAR_RESIDUAL * open.norm()?;
+            is_solved = share_left(&mut operator, velocity)? <= LARGEST_LINEAR_RESIDUAL;
         }
         is_solved &= outcome.linear.converged();
         let is_on_springs = most.is_some()

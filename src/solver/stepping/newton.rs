@@ -200,7 +200,12 @@ impl Newton {
         let (session, contacts, system) = (problem.session, &mut problem.body.contacts, equations.system);
         self.start.copy_from(equations.velocity)?;
         // An attempt that ended with an error may have left them fixed.
-        frictions(contacts).for_each(|friction| friction.fix_speeds(false));
+        for friction in frictions(contacts) {
+            friction.fix_speeds(false);
+            if system.awaits_pressure {
+                [friction.first_bounds] = session.sum([friction.bounds()]);
+            }
+        }
         let multiply = |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
         self.obstacles.start(session, contacts, equations.velocity, system.tolerance, multiply)?;
         self.set_linear_tolerances(equations, 1.0)?;
@@ -429,6 +434,7 @@ impl Newton {
             linear_solver: krylov,
             session: problem.session,
             stop_at_cycles: search.follows_branches(),
+            lacks_hold: system.awaits_pressure && search.follows_branches(),
             halves: search == Search::HalfSteps,
             patience,
             equilibrated: is_equilibrated,

@@ -57,6 +57,8 @@ pub(super) struct System<'a> {
     pub floor: Floor,
     /// The residual below which rounding errors may hide that nothing holds a body yet: equations are given up soon.
     pub hiding_floor: Floor,
+    /// Whether contact alone holds a body.
+    pub awaits_pressure: bool,
     /// The number of fallbacks that are tried.
     pub fallbacks: usize,
     /// The velocity of the converged state.

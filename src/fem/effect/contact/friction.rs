@@ -47,6 +47,8 @@ pub struct Friction<const D: usize> {
     pub scale: f64,
     /// Velocity per traction in m/(Pa s) that is added to the sliding velocity of the law, see `TangentialPoint::resolve`; 0 in solutions.
     pub give: f64,
+    /// The sum over all points of the bounds in N at the start of a step, see [`Friction::sizes`].
+    pub first_bounds: f64,
     /// Whether the bound depends on the pressure while a step is solved.
     pub(super) follows: bool,
     pub(super) points: Vec<TangentialPoint<D>>,
@@ -127,6 +129,7 @@ impl<const D: usize> Friction<D> {
             context: SlidingContext::default(),
             scale: 1.0,
             give: 0.0,
+            first_bounds: 0.0,
             follows,
             points: out,
             slip: None,
@@ -347,9 +350,38 @@ impl<const D: usize> Friction<D> {
                     toward: unknown.map(|x| x / length),
                     theta: [scale * found.derivative, found.speed / length],
                     slopes: [found.slope, found.traction / found.speed],
+                    lengths: [length, found.traction / scale],
                     coefficient: if self.follows { found.coefficient } else { 0.0 },
                 }
             };
+        }
+    }
+
+    /// The sum of the bounds in N of the points on this rank at rest.
+    pub fn bounds(&self) -> f64 {
+        self.points.iter().map(|point| point.weight * point.bound(&self.law, 0.0)).sum()
+    }
+
+    /// Sums over the points on this rank at the last linearisation: the number that stick, the number that this change of the unknowns, which
+    /// is subtracted from them, lets slide the other way, the number of all, the bounds in N, and the sliding speeds and their changes times
+    /// the areas in m^D/s.
+    pub fn sizes(&self, change: &[f64]) -> [f64; 6] {
+        self.points.iter().fold([0.0; 6], |[sticking, turning, all, bounds, speeds, changes], point| {
+            let bound = point.weight * self.scale * point.tangent.lengths[1];
+            let [sticks, turns] =
+                [point.tangent.sticks, point.beyond(change) > 0.0].map(|is| f64::from(u8::from(is)));
+            let [speed, moved] = [point.speed, norm(&point.along(Newton, change))].map(|v| point.weight * v);
+            let sums = [sticking + sticks, turning + turns, all + 1.0, bounds + bound];
+            [sums[0], sums[1], sums[2], sums[3], speeds + speed, changes + moved]
+        })
+    }
+
+    /// Lets sliding points resist by at least this slope in Pa s/m in the derivatives.
+    pub fn raise_slopes(&mut self, least: f64) {
+        let scale = self.scale;
+        let tangents = self.points.iter_mut().map(|point| &mut point.tangent);
+        for Tangent { theta, slopes, .. } in tangents.filter(|t| !t.sticks && t.slopes[0] < least) {
+            (slopes[0], theta[0]) = (least, scale / (scale + least));
         }
     }
 
@@ -444,6 +476,25 @@ impl<const D: usize> Friction<D> {
                 let pressed =
                     normal_scale * normal.free_length * (1.0 - normal.theta) * normal.along(Newton, values);
                 point.add(Newton, 1.0 / self.scale, &point.sliding_change(values, pressed), values);
+            }
+        }
+    }
+
+    /// The number of points that stick after this change of the unknowns, which is subtracted from them, on this rank.
+    pub fn count_sticking(&self, change: &[f64]) -> usize {
+        let sticks = |point: &&TangentialPoint<D>| {
+            let Tangent { sticks, toward, lengths: [length, bound], .. } = point.tangent;
+            sticks || norm(&add_scaled(&point.along(Newton, change), -length, &toward)) < bound
+        };
+        self.points.iter().filter(sticks).count()
+    }
+
+    /// Lets points that slide, and would slide the other way after this change of the unknowns, which is subtracted from them, stick first.
+    pub fn hold_turning(&self, change: &mut [f64]) {
+        for point in &self.points {
+            let Tangent { toward, lengths: [length, bound], .. } = point.tangent;
+            if point.beyond(change) > 0.0 {
+                point.set(&toward.map(|x| (length + 0.5 * bound) * x), change);
             }
         }
     }
@@ -645,6 +696,7 @@ mod tests {
             context: SlidingContext::default(),
             scale: 1.0,
             give: 0.0,
+            first_bounds: 0.0,
             follows: true,
             points: vec![point],
             slip: None,

@@ -64,13 +64,22 @@ pub(super) struct Tangent<const D: usize> {
     pub theta: [f64; 2],
     /// `g'` and `g / V`.
     pub slopes: [f64; 2],
+    /// `|s| / c` of a point that slides, and `g / c`.
+    pub lengths: [f64; 2],
     /// `mu`: change of the bound with the contact pressure; zero if it does not depend on the pressure.
     pub coefficient: f64,
 }
 
 impl<const D: usize> Tangent<D> {
     pub(super) fn free() -> Self {
-        Self { sticks: false, toward: [0.0; D], theta: [1.0; 2], slopes: [0.0; 2], coefficient: 0.0 }
+        Self {
+            sticks: false,
+            toward: [0.0; D],
+            theta: [1.0; 2],
+            slopes: [0.0; 2],
+            lengths: [0.0; 2],
+            coefficient: 0.0,
+        }
     }
 }
 
@@ -194,6 +203,13 @@ impl<const D: usize> TangentialPoint<D> {
     pub(super) fn sliding(&self, vectors: Vectors, velocity: &[f64]) -> Vector<D> {
         let free = add_scaled(&self.along(vectors, velocity), -1.0, &self.free_part(&self.obstacle));
         add_scaled(&free, 1.0, &self.held_sliding(vectors, velocity))
+    }
+
+    /// How far beyond rest a point that slides would slide the other way after this change of the unknowns, which is subtracted from them;
+    /// not positive if it does not.
+    pub(super) fn beyond(&self, change: &[f64]) -> f64 {
+        let Tangent { toward, lengths: [length, bound], .. } = self.tangent;
+        dot(&self.along(Newton, change), &toward) - length - bound
     }
 
     /// The parts of a nodal traction of the body along free and along held tangents.

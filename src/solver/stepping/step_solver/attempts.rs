@@ -490,7 +490,17 @@ impl Accuracy {
         let [floor, hiding_floor] =
             if awaits_pressure { [Floor::default(), hiding(floor)] } else { [floor, Floor::default()] };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
-        System { matrix, right_hand_side, tolerance, floor, hiding_floor, fallbacks, converged, scales }
+        System {
+            matrix,
+            right_hand_side,
+            tolerance,
+            floor,
+            hiding_floor,
+            awaits_pressure,
+            fallbacks,
+            converged,
+            scales,
+        }
     }
 }
 
