@@ -15,5 +15,22 @@ pub fn share(launcher: &mut Command) -> tempfile::TempDir {
         // Open MPI refuses to start as root otherwise, and ignores these for others.
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+    if has_kernels_of_haswell() && std::env::var_os(KERNELS).is_none() {
+        launcher.env(KERNELS, "Haswell");
+    }
     own
+}
+
+/// The environment variable with the processor whose kernels OpenBLAS takes. Rounding errors depend on them, and on these the counts of
+/// iterations where bonds fail or cells flow: those of one kind, so that counts are the same on newer processors, too.
+const KERNELS: &str = "OPENBLAS_CORETYPE";
+
+#[cfg(target_arch = "x86_64")]
+fn has_kernels_of_haswell() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn has_kernels_of_haswell() -> bool {
+    false
 }

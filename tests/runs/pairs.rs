@@ -1366,8 +1366,8 @@ fn pairs_that_cannot_be_solved_are_refused_with_names_and_places() {
             "contact between bodies acts at nodes",
         ),
         (
-            Case::of("indented_block").set("contact.0.sliding", "'finite'"),
-            "only contact `against` another body",
+            Case::of("rigid_wall").set("contact.0.sliding", "'finite'"),
+            "only along an obstacle or another body can the boundary slide far",
         ),
         (
             Case::of("pressed_blocks").set("contact.0.side", "'on'").set(

@@ -210,7 +210,9 @@ real!(f64, 8, dpotrf_, cblas_dtrsm, cblas_dsyrk, cblas_dgemm, double);
 /// The failure of a factorisation.
 pub(super) fn not_positive_definite() -> Error {
     Error::Failed(
-        "the matrix of the step is not positive definite: check densities, viscosities and moduli".into(),
+        "the matrix of the step is not positive definite: check densities, viscosities and moduli, and whether supports, springs or friction \
+         hold each body in each direction, also bodies that touch and could move together"
+            .into(),
     )
 }
 

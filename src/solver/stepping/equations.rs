@@ -142,8 +142,8 @@ const HIDDEN_PATIENCE: usize = 5;
 /// approached, not met.
 const RECURRENCE: f64 = 1e-3;
 
-/// Points of a contact that slide and would move so many times as fast after a step move with a body that nothing holds.
-const FAR: f64 = 1e6;
+/// The share to which one more step of linear equations lowers their residual at least, unless rounding errors hide that they are singular.
+const FALL: f64 = 1e-2;
 
 /// A line search is stuck where residuals fall to more than this share in this number of iterations: its steps end at a corner of the graphs.
 const STUCK: f64 = 0.995;
@@ -423,7 +423,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         Ok(())
     }
 
-    /// Lets points of contacts resist that all slide, and some of which this step turns round or moves far, where friction alone may hold a body: the
+    /// Lets points of contacts resist that all slide, and some of which this step turns round, where friction alone may hold a body: the
     /// equations are singular, and nothing tells how far the body moves until so many points slide the other way that friction is
     /// balanced. If sliding speeds are spread evenly, as those of a body that is heated, it is as far as with a viscous resistance of half
     /// the mean bound divided by the mean speed. The resistance vanishes with the residual, once that is less than friction at one point
@@ -432,12 +432,10 @@ impl<const D: usize> ContactEquations<'_, D> {
         let mut is_resisted = false;
         let values = step.unwrap_or(&self.scratch.velocity).owned()?;
         for friction in self.contacts.iter_mut().flat_map(|contact| &mut contact.friction) {
-            let [sticking, turning, points, bounds, speeds, changes] =
-                self.session.sum(friction.sizes(&values));
+            let [sticking, turning, points, bounds, speeds] = self.session.sum(friction.sizes(&values));
             // The velocity from which a step starts may take all pressure away.
             let bounds = larger(bounds, friction.first_bounds);
-            if sticking == 0.0 && (turning > 0.0 || changes > FAR * speeds || step.is_none()) && speeds > 0.0
-            {
+            if sticking == 0.0 && (turning > 0.0 || step.is_none()) && speeds > 0.0 {
                 let share = (self.scratch.residuals[0] * points.powf(1.5) / bounds).min(1.0);
                 friction.raise_slopes(0.5 * share * bounds / speeds);
                 is_resisted = true;
@@ -529,7 +527,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         };
         // With the same derivatives the equations are linear: residuals fall to the rounding errors, or do not fall.
         let falls =
-            self.counts.has_settled(1) && self.scratch.residuals[0] < STAGNATION * self.scratch.residuals[1];
+            self.counts.has_settled(1) && self.scratch.residuals[0] < FALL * self.scratch.residuals[1];
         is_stuck || !falls && self.counts.sets.len() >= patience.saturating_add(after)
     }
 

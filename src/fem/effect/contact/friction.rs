@@ -363,16 +363,20 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Sums over the points on this rank at the last linearisation: the number that stick, the number that this change of the unknowns, which
-    /// is subtracted from them, lets slide the other way, the number of all, the bounds in N, and the sliding speeds and their changes times
-    /// the areas in m^D/s.
-    pub fn sizes(&self, change: &[f64]) -> [f64; 6] {
-        self.points.iter().fold([0.0; 6], |[sticking, turning, all, bounds, speeds, changes], point| {
+    /// is subtracted from them, lets slide the other way, the number of all, the bounds in N, and the sliding speeds times the areas in
+    /// m^D/s.
+    pub fn sizes(&self, change: &[f64]) -> [f64; 5] {
+        self.points.iter().fold([0.0; 5], |[sticking, turning, all, bounds, speeds], point| {
             let bound = point.weight * self.scale * point.tangent.lengths[1];
             let [sticks, turns] =
                 [point.tangent.sticks, point.beyond(change) > 0.0].map(|is| f64::from(u8::from(is)));
-            let [speed, moved] = [point.speed, norm(&point.along(Newton, change))].map(|v| point.weight * v);
-            let sums = [sticking + sticks, turning + turns, all + 1.0, bounds + bound];
-            [sums[0], sums[1], sums[2], sums[3], speeds + speed, changes + moved]
+            [
+                sticking + sticks,
+                turning + turns,
+                all + 1.0,
+                bounds + bound,
+                speeds + point.weight * point.speed,
+            ]
         })
     }
 

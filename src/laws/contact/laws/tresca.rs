@@ -4,7 +4,8 @@ use crate::laws::contact::friction_law::{FrictionBound, SlidingContext};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Tresca friction.
+/// Tresca friction: the largest traction is given, whatever the contact pressure. It also acts across an open gap, so that boundaries that may
+/// part need another law; only nodes that face nothing are free.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tresca {

@@ -35,7 +35,8 @@ pub struct Perzyna<N = f64> {
     /// centre of each cell.
     #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "minimum" = 0), example = 19.0)]
     pub yield_stress: N,
-    /// Exponent of the overstress. 1: the law of Wang and Cheng (2022). Above 1 the yield stress must be positive, and with scheme
+    /// Exponent of the overstress, relative to the yield stress with its hardening. 1: the law of Wang and Cheng (2022). Above 1 the yield
+    /// stress must be positive, and with scheme
     /// lagged_euler explicit_step_bound holds only while the von Mises norm is at most twice the yield stress.
     #[serde(default = "one")]
     #[schemars(range(min = 1), example = 3.0)]
