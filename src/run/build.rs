@@ -34,17 +34,16 @@ use std::collections::BTreeSet;
 pub(super) fn body<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
-    mesh: Mesh<D>,
+    (mesh, materials): (Mesh<D>, &Materials),
     pairs: Vec<Pair<D>>,
 ) -> Result<(Body<D, S>, State)> {
-    let materials = Materials::new(session, job, &mesh)?;
     let geometry = Geometry::by_cells(&mesh, |cell| materials.of_cell(&mesh, cell));
     let mut state = session.agree(State::at_rest(&mesh))?;
     let supports = Supports::of_body(session, &mesh, &job.support, &state.velocity)?;
     let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
     let load = load(session, job, &mesh, &materials.all)?;
-    let elastic_support = elastic_support::<D, S>(session, job, &mesh, &supports.held, &materials)?;
+    let elastic_support = elastic_support::<D, S>(session, job, &mesh, &supports.held, materials)?;
     let coupling = coupling(session, &mesh, &pairs, &supports.held)?;
     let (mut contacts, parts) = contacts(session, job, &mesh, &pairs, &supports)?;
     let Supports { held, motion } = supports;
@@ -73,7 +72,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
     let mut body = Body::new(mesh, geometry, effects, held, evaluation(job.time.scheme));
-    body.material_tables = materials.tables;
+    body.material_tables.clone_from(&materials.tables);
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
     (body.support_motion, body.elastic_support) = (motion, elastic_support);
     if pairs.iter().any(|pair| pair.slides) {

@@ -2,7 +2,7 @@
 
 use super::{
     parts::part_of,
-    sides::{Circumstances, conflict, rubs},
+    sides::{Circumstances, conflict, names_of_sides, rubs},
 };
 use crate::{
     error::{Error, Result},
@@ -25,7 +25,7 @@ pub(super) fn find<const D: usize>(
     session: &Session,
     job: &Job,
     mesh: &mut Mesh<D>,
-    circumstances: &Circumstances<D>,
+    circumstances: &Circumstances<'_, D>,
 ) -> Result<Vec<Pair<D>>, Agreed> {
     let mut pairs = Vec::new();
     let is_fault = |contact: &job::Contact| {
@@ -186,17 +186,11 @@ fn leave_shared_nodes<const D: usize>(
                 "contact.{}: all nodes of the boundary {} belong to other contacts, too, so that none is left for the law; refine the mesh \
                  there, or state the other `side`",
                 pair.contact,
-                side_names(job, pair).join(", ")
+                names_of_sides(job, pair)[0]
             )))
         })?;
     }
     Ok(())
-}
-
-/// The boundaries at whose nodes the law of a pair acts.
-fn side_names<'a, const D: usize>(job: &'a Job, pair: &Pair<D>) -> &'a [String] {
-    let contact = &job.contact[pair.contact];
-    if pair.exchange.is_some() { &contact.against } else { &contact.on }
 }
 
 /// Why a node of two contacts is refused.
@@ -294,7 +288,7 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
             Err(Error::Refused(format!(
                 "contact.{pair}: the node at {:?} m of the boundary {} faces another body, and {why}; {remedy}",
                 mesh.nodes[node],
-                pair_of(pairs, pair).map_or(&contact.on[..], |pair| side_names(job, pair)).join(", ")
+                pair_of(pairs, pair).map_or_else(|| contact.on.join(", "), |pair| names_of_sides(job, pair)[0].clone())
             )))
         }
     })

@@ -3,6 +3,7 @@
 use super::{
     bonds, build,
     estimate::MemoryEstimate,
+    materials::Materials,
     memory::require_for_run,
     obstacles, pairs, parts,
     restored::{StartState, sides_before, start_file, transfer},
@@ -49,11 +50,12 @@ pub(super) fn setup<const D: usize, const S: usize>(
         session.agree(set_option(name, value))?;
     }
     let from = start_file(session, loaded)?;
-    let circumstances =
-        Circumstances::of(session, job, &mesh, sides_before(session, loaded, from.as_deref())?)?;
+    let materials = Materials::new(session, job, &mesh)?;
+    let earlier = sides_before(session, loaded, from.as_deref())?;
+    let circumstances = Circumstances::of(session, job, (&mesh, &materials), earlier)?;
     let paired = pairs::find(session, job, &mut mesh, &circumstances)?;
     let probes = session.agree(Probes::locate(session, &mesh, &job.output))?;
-    let (mut body, mut state) = build::body::<D, S>(session, job, mesh, paired)?;
+    let (mut body, mut state) = build::body::<D, S>(session, job, (mesh, &materials), paired)?;
     let fault = probed::fault(&job.output, &body);
     let fault = fault.map(|(key, [message, help])| loaded.fault(key, message, help));
     session.agree(fault.map_or(Ok(()), Err))?;

@@ -37,27 +37,26 @@ const STIFFER: f64 = 100.0;
 
 /// What the choice of a side depends on besides the meshes of both.
 #[derive(Debug)]
-pub(super) struct Circumstances<const D: usize> {
+pub(super) struct Circumstances<'a, const D: usize> {
     /// What supports hold on this rank.
     held: Held<D>,
     /// The directions in which they hold nodes of pairs on all ranks, orthonormal, by global numbers.
     directions: BTreeMap<u32, Vec<Vector<D>>>,
-    /// The materials of the body, where a choice is free.
-    materials: Option<Materials>,
+    materials: &'a Materials,
     /// The contacts that another run had from whose state this one starts, each with whether its sides were exchanged.
     earlier: BTreeMap<usize, bool>,
 }
 
-impl<const D: usize> Circumstances<D> {
+impl<'a, const D: usize> Circumstances<'a, D> {
     /// Those of the contacts of a job between bodies. Collective.
     pub(super) fn of(
         session: &Session,
         job: &Job,
-        mesh: &Mesh<D>,
+        (mesh, materials): (&Mesh<D>, &'a Materials),
         earlier: BTreeMap<usize, bool>,
     ) -> Result<Self, Agreed> {
         if job.contact.iter().all(|contact| contact.against.is_empty() || contact.side != Side::Auto) {
-            return Ok(Self { held: Held::default(), directions: BTreeMap::new(), materials: None, earlier });
+            return Ok(Self { held: Held::default(), directions: BTreeMap::new(), materials, earlier });
         }
         let layout = session.agree(DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts))?;
         let held = session.agree(Supports::of_body(session, mesh, &job.support, &layout))?.held;
@@ -81,7 +80,6 @@ impl<const D: usize> Circumstances<D> {
                 of_node.push(direction);
             }
         }
-        let materials = Some(Materials::new(session, job, mesh)?);
         Ok(Self { held, directions, materials, earlier })
     }
 
@@ -126,10 +124,10 @@ impl<const D: usize> Circumstances<D> {
         let [own, faced] = [&first.on, &first.against].map(|facets| self.stiffness(session, mesh, facets));
         let reason = if own > STIFFER * faced {
             Some(Exchange::Stiffer)
-        } else if faced <= STIFFER * own || own.is_nan() || faced.is_nan() {
-            is_coarser(session, &first)?.then_some(Exchange::Coarser)
-        } else {
+        } else if faced > STIFFER * own {
             None
+        } else {
+            is_coarser(session, &first)?.then_some(Exchange::Coarser)
         };
         if let Some(reason) = reason
             && !meets_another(session, mesh, job, &first)?
@@ -145,10 +143,10 @@ impl<const D: usize> Circumstances<D> {
     /// The mean Young's modulus in Pa of the cells of these facets of all ranks, of orthotropic ones the largest; NaN where a cell has none.
     /// Collective.
     fn stiffness(&self, session: &Session, mesh: &Mesh<D>, facets: &[u32]) -> f64 {
-        let Some(materials) = &self.materials else { return f64::NAN };
         let modulus = |facet: &u32| {
             let cell = mesh.facet_cells[*facet as usize] as usize;
-            let Material { elasticity, orthotropic, .. } = &materials.all[materials.of_cell(mesh, cell)];
+            let Material { elasticity, orthotropic, .. } =
+                &self.materials.all[self.materials.of_cell(mesh, cell)];
             let isotropic = elasticity.as_ref().map(|law| law.youngs_modulus);
             let largest =
                 || orthotropic.as_ref().map(|law| law.youngs_moduli.iter().copied().fold(0.0, f64::max));
@@ -298,17 +296,19 @@ pub(super) fn warnings_of_carriers<const D: usize>(
     mesh: &Mesh<D>,
     pairs: &[Pair<D>],
 ) -> Vec<String> {
-    let names = |pair: &Pair<D>| {
-        let job::Contact { on, against, .. } = &job.contact[pair.contact];
-        if pair.exchange.is_some() { [against, on] } else { [on, against] }.map(|names| names.join(", "))
-    };
     let mut out = Vec::new();
     for (at, pair) in pairs.iter().enumerate() {
-        let [own, other] = names(pair);
-        if pair.slides && pair.exchange.is_some() && job.contact[pair.contact].wear.is_some() {
+        let [own, other] = names_of_sides(job, pair);
+        if let Some(reason) =
+            pair.exchange.filter(|_| pair.slides && job.contact[pair.contact].wear.is_some())
+        {
+            let remedy = match reason {
+                Exchange::Held => format!("let no support hold nodes of {other}"),
+                Exchange::Requested => "delete `side`".into(),
+                _ => "state side = \"on\"".into(),
+            };
             out.push(format!(
-                "contact.{}: nodes of {own} carry the law and keep the wear, so that {own} wears, not {other}: let no support hold nodes of \
-                 {other}",
+                "contact.{}: nodes of {own} carry the law and keep the wear, so that {own} wears, not {other}: {remedy}",
                 pair.contact
             ));
         }
@@ -321,7 +321,7 @@ pub(super) fn warnings_of_carriers<const D: usize>(
             let [spanning] =
                 session.largest([f64::from(u8::from(pair.on.iter().any(|facet| spans(&facet))))]);
             if spanning > 0.0 {
-                let others = names(second)[1].clone();
+                let [_, others] = names_of_sides(job, second);
                 out.push(format!(
                     "contact.{} and contact.{}: facets of {own} that face both {other} and {others} carry no law, so that pressures beside them \
                      may be wrong by half; give both one table with on = [...], or let nodes of {own} lie where they meet",
@@ -340,9 +340,7 @@ pub(super) fn pressed_by_edge<const D: usize>(job: &Job, pair: &Pair<D>) -> Stri
 
 /// A warning about corners and edges over faces, with what they do there and what to do about it.
 fn words_of_edges<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<&str>)) -> String {
-    let job::Contact { on, against, .. } = &job.contact[pair.contact];
-    let [own, other] =
-        if pair.exchange.is_some() { [against, on] } else { [on, against] }.map(|names| names.join(", "));
+    let [own, other] = names_of_sides(job, pair);
     let side = if pair.exchange.is_some() { "on" } else { "against" };
     let remedy = remedy.map_or_else(
         || {
@@ -418,6 +416,12 @@ fn meets_another<const D: usize>(
         .collect();
     let others = nodes_of(&facets(mesh, &names));
     Ok(session.total(others.iter().filter(|node| own.contains(node)).count()) > 0)
+}
+
+/// The boundaries of a pair at whose nodes the law acts, and those that they face.
+pub(super) fn names_of_sides<const D: usize>(job: &Job, pair: &Pair<D>) -> [String; 2] {
+    let job::Contact { on, against, .. } = &job.contact[pair.contact];
+    if pair.exchange.is_some() { [against, on] } else { [on, against] }.map(|names| names.join(", "))
 }
 
 /// The lines of the log about exchanged sides.

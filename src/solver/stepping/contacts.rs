@@ -44,7 +44,6 @@ pub(super) fn stored_where_following<const D: usize, const S: usize>(
     state: &State,
 ) -> Result<f64> {
     let displacement = state.displacement.local()?;
-    let displacement = body.seen_by_contacts(&displacement);
     let following = body.contacts.iter().filter(|contact| contact.follows_surface);
     following.map(|contact| contact.stored_energy(state.time, &displacement)).sum()
 }
@@ -61,10 +60,10 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         return Ok(());
     }
     let (converged, start, velocity) = (state.displacement.local()?, start.local()?, state.velocity.local()?);
-    let [converged, start, velocity] =
-        [&converged, &start, &velocity].map(|values| body.seen_by_contacts(values));
+    let (converged, start) = (body.seen_by_contacts(&converged), body.seen_by_contacts(&start));
     for (number, contact) in body.contacts.iter_mut().enumerate() {
-        if let Some((friction, heat)) = contact.friction.as_mut().zip(body.heat.as_ref()) {
+        let friction = contact.friction.as_mut().filter(|friction| friction.law.sees_temperature());
+        if let Some((friction, heat)) = friction.zip(body.heat.as_ref()) {
             let seen = |node: usize| heat.seen()[node];
             match exchanged(&body.pairs, number) {
                 Some(pair) => friction.set_temperatures(|node| pair.across(&body.mesh, node, seen)),

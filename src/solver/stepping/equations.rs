@@ -220,6 +220,8 @@ pub struct Scratch {
     open: DistributedVector,
     /// The change of the velocities to equilibrium, where steps are solved in this way.
     correction: Option<DistributedVector>,
+    /// What a solution of the linearised equations leaves of their right-hand side, once that was computed.
+    left: Option<DistributedVector>,
     /// Values and forces with ghosts, where some contact reads ghost nodes.
     ghosted: Option<[DistributedVector; 2]>,
 }
@@ -235,6 +237,7 @@ impl Scratch {
             is_hidden: false,
             open: like.like()?,
             correction: None,
+            left: None,
             ghosted: if ghosts { Some([like.like()?, like.like()?]) } else { None },
         })
     }
@@ -424,8 +427,7 @@ impl<const D: usize> ContactEquations<'_, D> {
     }
 
     /// Lets points of contacts resist that all slide, and some of which this step turns round, where friction alone may hold a body: the
-    /// equations are singular, and nothing tells how far the body moves until so many points slide the other way that friction is
-    /// balanced. If sliding speeds are spread evenly, as those of a body that is heated, it is as far as with a viscous resistance of half
+    /// equations are singular, and nothing tells how far the body moves until so many points slide the other way that friction is balanced. If sliding speeds are spread evenly, as those of a body that is heated, it is as far as with a viscous resistance of half
     /// the mean bound divided by the mean speed. The resistance vanishes with the residual, once that is less than friction at one point
     /// if spread over all. Returns whether there are such contacts; without a step, all turn round. Collective.
     fn resist_sliding(&mut self, step: Option<&DistributedVector>) -> Result<bool> {
@@ -646,7 +648,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         direction: &mut DistributedVector,
         (kind, may_be_singular): (ProjectedKind, bool),
     ) -> Result<bool> {
-        let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
+        let Scratch { velocity, open, left, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
         let mut frictions = self.contacts.iter().flat_map(|contact| &contact.friction).peekable();
         let may_couple = cells.is_some() || frictions.peek().is_some();
@@ -690,14 +692,19 @@ impl<const D: usize> ContactEquations<'_, D> {
         let mut outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
         self.linear_solver.limit_iterations(usize::MAX);
         // GMRES measures residuals behind the factor, which may hide those of equations that are nearly singular.
-        let share_left = |operator: &mut ReducedJacobian<'_, D>, velocity: &DistributedVector| {
-            let mut left = open.like()?;
-            operator.apply(velocity, &mut left)?;
-            left.scale(-1.0)?;
-            left.add_scaled(1.0, open)?;
-            Ok::<_, Error>(left.norm()? / open.norm()?)
-        };
-        let is_false = coupled && self.lacks_hold && share_left(&mut operator, velocity)? > FALSE_SOLUTION;
+        let mut leaves_at_most =
+            |share: f64, operator: &mut ReducedJacobian<'_, D>, x: &DistributedVector| {
+                let left = match &mut *left {
+                    Some(left) => left,
+                    none => none.insert(open.like()?),
+                };
+                operator.apply(x, left)?;
+                left.scale(-1.0)?;
+                left.add_scaled(1.0, open)?;
+                Ok::<_, Error>(left.norm()? <= share * open.norm()?)
+            };
+        let is_false =
+            coupled && self.lacks_hold && !leaves_at_most(FALSE_SOLUTION, &mut operator, velocity)?;
         if most.is_some() && (outcome.linear.ran_out() || is_false) {
             let rebuilt =
                 self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?;
@@ -705,7 +712,7 @@ impl<const D: usize> ContactEquations<'_, D> {
             let first = outcome.linear;
             outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
             outcome.linear = first.followed_by(outcome.linear);
-            is_solved = share_left(&mut operator, velocity)? <= LARGEST_LINEAR_RESIDUAL;
+            is_solved = leaves_at_most(LARGEST_LINEAR_RESIDUAL, &mut operator, velocity)?;
         }
         is_solved &= outcome.linear.converged();
         let is_on_springs = most.is_some()

@@ -109,10 +109,7 @@ impl<const D: usize> Friction<D> {
                 is_carried: false,
                 obstacle: [0.0; D],
                 obstacle_speed: 0.0,
-                context: SlidingContext {
-                    place: std::array::from_fn(|i| if i < D { place[i] } else { 0.0 }),
-                    ..SlidingContext::default()
-                },
+                context: SlidingContext::default(),
                 history: law.first_histories(),
                 pressure: 0.0,
                 speed: 0.0,
@@ -124,7 +121,7 @@ impl<const D: usize> Friction<D> {
             });
         }
         let follows = law.follows_pressure();
-        Ok(Self {
+        let mut found = Self {
             law,
             context: SlidingContext::default(),
             scale: 1.0,
@@ -135,7 +132,9 @@ impl<const D: usize> Friction<D> {
             slip: None,
             owned: mesh.owned,
             partly_held,
-        })
+        };
+        found.update_places(points);
+        Ok(found)
     }
 
     /// Keeps the accumulated slip distance from now on, if the law does not.
@@ -219,11 +218,11 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Sets the undeformed places of the points in m, given those at their nodes.
-    pub(super) fn set_places(&mut self, place: impl Fn(usize) -> Vector<D>) {
+    /// Lets the law see the undeformed places of `points`.
+    pub(super) fn update_places(&mut self, points: &[Point<D>]) {
         for point in &mut self.points {
-            let there = place(point.node());
-            point.context.place = std::array::from_fn(|i| if i < D { there[i] } else { 0.0 });
+            let place = &points[point.at].place;
+            point.context.place = std::array::from_fn(|i| if i < D { place[i] } else { 0.0 });
         }
     }
 

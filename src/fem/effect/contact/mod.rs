@@ -129,12 +129,6 @@ pub struct Contact<const D: usize> {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Sets the undeformed places in m at which its laws act, given those of its nodes.
-    pub fn set_places(&mut self, place: impl Fn(usize) -> [f64; D]) {
-        self.normal.points.iter_mut().for_each(|point| point.place = place(point.node()));
-        self.friction.iter_mut().for_each(|friction| friction.set_places(&place));
-    }
-
     /// Applies the law to these facets of this rank, where `held` is what supports hold. Collective.
     pub fn new(
         session: &Session,

@@ -10,8 +10,8 @@ use crate::{
 
 impl<const D: usize> Contact<D> {
     /// Starts a step of this blend: evaluates the gap and the motion of the obstacle, given the displacements of the converged state and of
-    /// the blend and the velocities of the converged state, all with ghosts. Histories of friction and wear start from the same blend of earlier ones, and the velocity of the
-    /// obstacle follows from its positions by the same formula. If the end of the step is extrapolated, pressures of laws with a potential
+    /// the blend and the velocities of the converged state, all with ghosts. Histories of friction and wear start from the same blend of
+    /// earlier ones, and the velocity of the obstacle follows from its positions by the same formula. If the end of the step is extrapolated, pressures of laws with a potential
     /// are their means over the step, which conserve energy.
     pub fn prepare(
         &mut self,

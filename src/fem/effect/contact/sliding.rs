@@ -18,7 +18,7 @@ use crate::{
         space::Held,
     },
     laws::contact::{FrictionLaw, LawsOfContact, NodeContext, Wear, slip_after},
-    linear_algebra::tensor::norm,
+    linear_algebra::tensor::{Vector, norm},
     mesh::Mesh,
 };
 
@@ -35,6 +35,12 @@ impl<const D: usize> Contact<D> {
         self.friction =
             Some(Friction::new(law, &self.normal.points, self.obstacle.surface_may_move(), mesh, held)?);
         Ok(())
+    }
+
+    /// Lets its laws act at these undeformed places in m of its nodes.
+    pub fn set_places(&mut self, place: impl Fn(usize) -> Vector<D>) {
+        self.normal.points.iter_mut().for_each(|point| point.place = place(point.node()));
+        self.friction.iter_mut().for_each(|friction| friction.update_places(&self.normal.points));
     }
 
     /// Fixes the friction bounds at the pressures of the points. The unknowns of points without a bound do not follow an obstacle that
