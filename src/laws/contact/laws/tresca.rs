@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Tresca friction: the largest traction is given, whatever the contact pressure. It also acts across an open gap, so that boundaries that may
-/// part need another law; only nodes that face nothing are free.
+/// part need another law; only nodes that face neither an obstacle nor a body are free.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tresca {
