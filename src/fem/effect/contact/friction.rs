@@ -331,6 +331,8 @@ impl<const D: usize> Friction<D> {
     /// generalised derivatives at rest.
     pub(super) fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
         let (scale, follows) = (self.scale, self.follows);
+        // Exactly 1 without a slope.
+        let theta = |slope: f64| 1.0 / (1.0 + slope / scale);
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
             let (length, held) = (norm(&unknown), norm(&point.held_sliding(Newton, values)));
@@ -341,14 +343,15 @@ impl<const D: usize> Friction<D> {
                 Tangent { sticks: true, theta: [0.0; 2], ..Tangent::free() }
             } else if at_rest {
                 // Without a bound, or with one that grows from zero with the velocity.
-                let theta = 1.0 / (1.0 + found.slope / scale);
-                Tangent { theta: [theta; 2], slopes: [found.slope; 2], ..Tangent::free() }
+                let slopes = [found.slope; 2];
+                Tangent { theta: slopes.map(theta), slopes, ..Tangent::free() }
             } else {
+                let slopes = [found.slope, found.traction / found.speed];
                 Tangent {
                     sticks: false,
                     toward: unknown.map(|x| x / length),
-                    theta: [scale * found.derivative, found.speed / length],
-                    slopes: [found.slope, found.traction / found.speed],
+                    theta: slopes.map(theta),
+                    slopes,
                     lengths: [length, found.traction / scale],
                     coefficient: if self.follows { found.coefficient } else { 0.0 },
                 }

@@ -115,8 +115,7 @@ impl<const D: usize> Contact<D> {
         let (law, scale, softening) = (&self.normal.law, self.normal.scale, self.normal.softening);
         for point in self.normal.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let derivative = point.resolve(law, scale, point.along(Newton, unknowns)).derivative;
-            point.theta = scale * derivative;
-            point.slope = if derivative > 0.0 { 1.0 / derivative - scale } else { 0.0 };
+            point.linearise(scale, derivative);
             if softening < 1.0 && point.slope < 0.0 {
                 point.slope *= softening;
                 point.theta = scale / (scale + point.slope);

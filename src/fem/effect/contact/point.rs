@@ -469,6 +469,16 @@ impl<const D: usize> Point<D> {
         law.resolve_worn(scale * self.free_length * along + scale * self.carried, scale, self.context)
     }
 
+    /// Sets slope and ratio of changes, given the scale `c` and the derivative of the velocity with respect to the parameter of the graph in
+    /// m/(Pa s). Where the graph has no slope, nothing holds the point: neither do rounding errors of the derivative.
+    pub(super) fn linearise(&mut self, scale: f64, derivative: f64) {
+        self.theta = scale * derivative;
+        self.slope = if derivative > 0.0 { 1.0 / derivative - scale } else { 0.0 };
+        if derivative > 0.0 && self.slope.abs() <= ROUNDING * scale {
+            (self.theta, self.slope) = (1.0, 0.0);
+        }
+    }
+
     /// The magnitude of the normal velocity in m/s that would close the gap in the step; 0 for laws without a gap.
     pub(super) fn context_velocity(&self) -> f64 {
         if self.context.step_length > 0.0 && self.can_touch() {
@@ -596,5 +606,21 @@ mod tests {
         // 2 Pa s/m times -0.01 m/s.
         let off = [-0.006, 0.008];
         assert!((point.pressure_at(&law, Vectors::Body, &off) + 0.02).abs() < 1e-15);
+    }
+
+    #[test]
+    fn nothing_holds_a_point_whose_graph_has_no_slope_and_little_one_with_a_small_slope() {
+        let place = SurfacePoint { node: 0, normal: [0.0, -1.0], weight: 1.0 };
+        let mut point = Point::nodal(place, &Held::<2>::from(vec![false; 2]));
+        // The inverse of 49 times 49 is not 1.
+        let scale: f64 = 49.0;
+        assert!(scale * (1.0 / scale) != 1.0);
+        point.linearise(scale, 1.0 / scale);
+        assert_eq!([point.theta, point.slope], [1.0, 0.0]);
+        let slope = 1e-9 * scale;
+        point.linearise(scale, 1.0 / (scale + slope));
+        assert!(point.theta < 1.0 && (point.slope / slope - 1.0).abs() < 1e-5, "{:e}", point.slope);
+        point.linearise(scale, 0.0);
+        assert_eq!([point.theta, point.slope], [0.0, 0.0], "it is held");
     }
 }
