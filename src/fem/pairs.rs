@@ -110,6 +110,13 @@ pub struct Pair<const D: usize> {
     /// The nodes of the slave side, by global numbers, whose part of the surface others of their facets stand for: they belong to other
     /// contacts, too. The same on all ranks.
     pub lawless: BTreeSet<u32>,
+    /// Nodes of the slave side, by global numbers, that carry the law of another pair with the same slave side. The same on all ranks.
+    pub of_others: BTreeSet<u32>,
+    /// All contacts whose pairs have this slave side, each with the nodes of its own other side, by global numbers; none if it is the only
+    /// one. Nodes face what any of them has there. The same on all ranks.
+    pub sharing: Vec<(usize, BTreeSet<u32>)>,
+    /// Whether facets of this rank face the other side of which none of the nodes carries a law, because of `lawless`.
+    pub is_bare: bool,
     /// The nodes owned here that carry the law, ascending.
     pub nodes: Vec<PairedNode<D>>,
 }
@@ -117,9 +124,20 @@ pub struct Pair<const D: usize> {
 impl<const D: usize> Pair<D> {
     /// A contact of the job between these facets, before it is formed.
     pub fn of(contact: usize, [on, against]: [Vec<u32>; 2]) -> Self {
-        let (slides, is_closed) = (false, false);
-        let (exchange, lawless, nodes) = (None, BTreeSet::new(), Vec::new());
-        Self { contact, on, against, exchange, slides, axes: axes_of_space(), is_closed, lawless, nodes }
+        Self {
+            contact,
+            on,
+            against,
+            exchange: None,
+            slides: false,
+            axes: axes_of_space(),
+            is_closed: false,
+            lawless: BTreeSet::new(),
+            of_others: BTreeSet::new(),
+            sharing: Vec::new(),
+            is_bare: false,
+            nodes: Vec::new(),
+        }
     }
 
     /// The pair with its sides exchanged, before it is formed, for this reason if its slave side becomes `against` in the job.
@@ -127,6 +145,11 @@ impl<const D: usize> Pair<D> {
     pub fn exchanged(self, why: Exchange) -> Self {
         let exchange = if self.exchange.is_some() { None } else { Some(why) };
         Self { on: self.against, against: self.on, exchange, nodes: Vec::new(), ..self }
+    }
+
+    /// Whether another pair has the same slave side, whose nodes carry the law of one or the other.
+    pub fn shares_with(&self, other: &Self) -> bool {
+        self.sharing.iter().any(|(contact, _)| *contact == other.contact)
     }
 
     /// Lets nodes face those at the same place on the other side, of a mesh that was split; nodes that both sides have carry no law.
@@ -194,12 +217,14 @@ impl<const D: usize> Pair<D> {
 
     /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
     pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
-        let mut found = self.paired_nodes(session, mesh, places)?;
+        let is_own = |node: u32| !self.of_others.contains(&mesh.global_node(node));
+        let (mut found, is_bare) = self.paired_nodes(session, mesh, places)?;
+        found.retain(|node| is_own(node.node));
         if self.is_closed {
             found.iter_mut().for_each(|node| node.distance = 0.0);
         }
         if !self.slides {
-            self.nodes = found;
+            (self.nodes, self.is_bare) = (found, is_bare);
             return Ok(());
         }
         self.axes = axes_along_first(session, mesh, places, &self.against)?;
@@ -207,7 +232,7 @@ impl<const D: usize> Pair<D> {
             found.into_iter().map(|node| (node.node, node)).collect();
         let mut all: BTreeMap<u32, SurfacePoint<D>> = BTreeMap::new();
         let carries = |point: &SurfacePoint<D>| {
-            point.weight > 0.0 && !self.lawless.contains(&mesh.global_node(point.node))
+            point.weight > 0.0 && !self.lawless.contains(&mesh.global_node(point.node)) && is_own(point.node)
         };
         for point in surface_points(session, mesh, &self.on)?.into_iter().filter(carries) {
             let kept = all.entry(point.node).or_insert(point);
@@ -222,7 +247,7 @@ impl<const D: usize> Pair<D> {
                 PairedNode { node, normal, weight, distance, masters, neighbours, stretch, sharpness }
             })
         };
-        self.nodes = all.into_values().map(node_at).collect();
+        (self.nodes, self.is_bare) = (all.into_values().map(node_at).collect(), is_bare);
         Ok(())
     }
 
@@ -241,13 +266,13 @@ impl<const D: usize> Pair<D> {
     }
 
     /// The nodes owned here of the slave facets that face those of the other side on all ranks, ascending, with the local nodes of the mesh
-    /// at `places` in m. Collective.
+    /// at `places` in m; and whether nodes without a law leave facets of this rank bare. Collective.
     fn paired_nodes(
         &self,
         session: &Session,
         mesh: &Mesh<D>,
         places: &[Vector<D>],
-    ) -> Result<Vec<PairedNode<D>>, Agreed> {
+    ) -> Result<(Vec<PairedNode<D>>, bool), Agreed> {
         let slaves: Vec<Facet<D>> = self.on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
         let masters = gather_facets(session, mesh, places, &self.against)?;
         let depth = DEEPEST * longest_side(session, places);
@@ -257,6 +282,11 @@ impl<const D: usize> Pair<D> {
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
         let own: BTreeSet<u32> = slaves.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
+        let is_bare = |of_facet: &[Contribution<D>]| {
+            let [covered, whole] = of_facet.iter().fold([0.0; 2], |[c, w], one| [c + one.weight, w + one.whole]);
+            of_facet.iter().all(|one| self.lawless.contains(&one.node)) && covered > LEAST_STRETCH * whole
+        };
+        let is_bare = all.chunks_exact(per_facet(mesh)).any(is_bare);
         let mut lawless = self.lawless.clone();
         loop {
             let sums = sum_of_contributions(session, mesh, (&all, &own), &lawless)?;
@@ -265,7 +295,7 @@ impl<const D: usize> Pair<D> {
                 covered.filter(|(_, sum)| !sum.carries_a_law()).map(|(node, _)| *node).collect();
             let further = gather(session.world(), &bearing)?;
             if further.is_empty() {
-                return Ok(paired(mesh, sums, &at, self.slides));
+                return Ok((paired(mesh, sums, &at, self.slides), is_bare));
             }
             lawless.extend(further);
         }
@@ -505,6 +535,11 @@ impl<const D: usize> Sum<D> {
 /// The share of the facets around a node that face the other side from which on it faces it with all of them.
 const COVERED: f64 = 0.999;
 
+/// How many nodes of a facet carry a law: both corners of linear segments, of all other facets three nodes.
+fn per_facet<const D: usize>(mesh: &Mesh<D>) -> usize {
+    if D == 2 && mesh.order() == 1 { 2 } else { 3 }
+}
+
 /// The sums of the contributions to the nodes of this rank, by global numbers, those of `lawless` left out, from those of the facets of each
 /// rank with the nodes of these facets. Collective.
 fn sum_of_contributions<const D: usize>(
@@ -514,9 +549,7 @@ fn sum_of_contributions<const D: usize>(
     lawless: &BTreeSet<u32>,
 ) -> Result<BTreeMap<u32, Sum<D>>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
-    // Of linear segments both corners carry a law, of all other facets three nodes.
-    let per_facet = if D == 2 && mesh.order() == 1 { 2 } else { 3 };
-    for of_facet in all.chunks_exact(per_facet) {
+    for of_facet in all.chunks_exact(per_facet(mesh)) {
         let (of_facet, passed) = pass_on(of_facet, lawless);
         for contribution in of_facet.iter().filter(|one| !lawless.contains(&one.node)) {
             let Contribution { node, normal, weight, whole, gap, corners, normals, masters } = contribution;

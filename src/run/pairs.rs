@@ -9,7 +9,7 @@ use crate::{
     fem::{
         body::Body,
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Pair, is_exchanged, pair_of, shares},
+        pairs::{Exchange, Pair, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
     job::{self, Job, Scalar, Side, Sliding},
@@ -75,6 +75,8 @@ pub(super) fn find<const D: usize>(
         return Ok(pairs);
     }
     circumstances.untangle(session, mesh, job, &mut pairs)?;
+    circumstances.follow(session, mesh, job, &mut pairs)?;
+    share_sides(session, job, mesh, &mut pairs)?;
     leave_shared_nodes(session, job, mesh, &mut pairs)?;
     let shares = shares(mesh, &pairs);
     let global =
@@ -143,6 +145,118 @@ fn refuse_joined<const D: usize>(
     })
 }
 
+/// Whether two pairs have the same slave side. Collective.
+fn has_side_of<const D: usize>(session: &Session, [one, other]: [&Pair<D>; 2]) -> bool {
+    session.total(usize::from(one.on != other.on)) == 0
+}
+
+/// Lets the nodes of a slave side that several pairs have face the other sides of all of them: each carries the law of the pair that has the
+/// largest part of what it faces, where the laws allow it. Collective.
+fn share_sides<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &mut [Pair<D>],
+) -> Result<(), Agreed> {
+    for at in 0..pairs.len() {
+        let first = &pairs[at];
+        if job.contact[first.contact].against.is_empty() || !first.sharing.is_empty() {
+            continue;
+        }
+        let mut group = vec![at];
+        for other in at + 1..pairs.len() {
+            let second = &pairs[other];
+            let is_between_bodies = !job.contact[second.contact].against.is_empty();
+            if !is_between_bodies || !has_side_of(session, [first, second]) {
+                continue;
+            }
+            let [one, two] = [first, second].map(|pair| &job.contact[pair.contact]);
+            let are_same = one.has_the_laws_of(two) && first.exchange.is_some() == second.exchange.is_some();
+            let are_alike = one.is_without_scale()
+                && two.is_without_scale()
+                && !first.slides
+                && one.redistribute_mass == two.redistribute_mass;
+            if are_same || (are_alike && !second.slides) {
+                group.push(other);
+            } else if first.slides && second.slides {
+                session.agree(Err(refusal_of_laws(job, [first, second])))?;
+            }
+        }
+        if group.len() > 1 {
+            share_side(session, mesh, pairs, &group)?;
+        }
+    }
+    Ok(())
+}
+
+/// Two pairs with one slave side whose laws differ, where bodies slide.
+fn refusal_of_laws<const D: usize>(job: &Job, pairs: [&Pair<D>; 2]) -> Error {
+    let [own, _] = names_of_sides(job, pairs[0]);
+    let held = pairs.into_iter().find(|pair| pair.exchange == Some(Exchange::Held));
+    let remedy = held.map_or_else(
+        || "state the other `side` in both".into(),
+        |pair| format!("let no support hold nodes of {}", names_of_sides(job, pair)[1]),
+    );
+    Error::Refused(format!(
+        "contact.{} and contact.{}: nodes of {own} carry the laws of both, which differ, so that a node that slides from one body to the \
+         other has no law of its own; {remedy}, or give both the same laws",
+        pairs[0].contact, pairs[1].contact
+    ))
+}
+
+/// The same for pairs, given by their positions, that have one slave side. Collective.
+fn share_side<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    pairs: &mut [Pair<D>],
+    group: &[usize],
+) -> Result<(), Agreed> {
+    let all = |nodes: Vec<u32>| -> Result<BTreeSet<u32>, Agreed> {
+        Ok(gather(session.world(), &nodes)?.into_iter().collect())
+    };
+    let nodes_of = |facets: &[u32]| -> Vec<u32> {
+        facets.iter().flat_map(|facet| mesh.facet_nodes(*facet)).map(|node| mesh.global_node(node)).collect()
+    };
+    // Of each node, the position of the pair of which it faces the largest part.
+    let mut most: BTreeMap<u32, (usize, f64)> = BTreeMap::new();
+    for &at in group {
+        for node in pairs[at].nodes.iter().filter(|node| !node.masters.is_empty()) {
+            let kept = most.entry(mesh.global_node(node.node)).or_insert((at, node.weight));
+            // Halves of what a node faces differ by rounding errors.
+            if node.weight > LARGER * kept.1 {
+                *kept = (at, node.weight);
+            }
+        }
+    }
+    let (mut sharing, mut carrying) = (Vec::new(), Vec::new());
+    for &at in group {
+        sharing.push((pairs[at].contact, all(nodes_of(&pairs[at].against))?));
+        carrying.push(all(most.iter().filter(|(_, (of, _))| *of == at).map(|(node, _)| *node).collect())?);
+    }
+    let on = all(nodes_of(&pairs[group[0]].on))?;
+    let mut against: Vec<u32> = group.iter().flat_map(|at| pairs[*at].against.iter().copied()).collect();
+    against.sort_unstable();
+    against.dedup();
+    for (place, &at) in group.iter().enumerate() {
+        // Nodes that face nothing carry the law of the first pair.
+        let of_others = carrying.iter().enumerate().filter(|(other, _)| *other != place);
+        let of_others = of_others.flat_map(|(_, nodes)| nodes).copied();
+        let is_first = place == 0;
+        let of_others = match is_first {
+            true => of_others.collect(),
+            false => &on - &carrying[place],
+        };
+        let pair = &mut pairs[at];
+        (pair.of_others, pair.sharing) = (of_others, sharing.clone());
+        pair.against.clone_from(&against);
+        pair.form(session, mesh, &mesh.nodes)?;
+    }
+    Ok(())
+}
+
+/// By what factor a part of the surface is larger than another one but for rounding errors.
+const LARGER: f64 = 1.0 + 1e-9;
+
 /// Lets nodes of pairs whose law would act there, and that belong to other contacts, too, leave their part of the surface to neighbours,
 /// where the law allows it. Collective.
 fn leave_shared_nodes<const D: usize>(
@@ -166,20 +280,23 @@ fn leave_shared_nodes<const D: usize>(
         }
     }
     let of_obstacles: BTreeSet<u32> = gather(session.world(), &of_obstacles)?.into_iter().collect();
-    for (at, pair) in pairs.iter_mut().enumerate() {
-        let contact = &job.contact[pair.contact];
+    for at in 0..pairs.len() {
+        let contact = &job.contact[pairs[at].contact];
         if contact.against.is_empty() || !contact.is_without_scale() {
             continue;
         }
-        let others = || both.iter().enumerate().filter(|(other, _)| *other != at);
+        let is_together = |other: usize| other == at || pairs[at].shares_with(&pairs[other]);
+        let (own, others): (Vec<usize>, Vec<usize>) = (0..pairs.len()).partition(|other| is_together(*other));
         let is_shared =
-            |node: &u32| of_obstacles.contains(node) || others().any(|(_, nodes)| nodes.contains(node));
-        pair.lawless = slaves[at].iter().copied().filter(is_shared).collect();
+            |node: &u32| of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node));
+        let lawless = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared).collect();
+        let pair = &mut pairs[at];
+        pair.lawless = lawless;
         if pair.lawless.is_empty() {
             continue;
         }
         pair.form(session, mesh, &mesh.nodes)?;
-        session.agree(if session.total(pair.nodes.len()) > 0 {
+        session.agree(if session.total(pair.nodes.len()) > 0 || !pair.sharing.is_empty() {
             Ok(())
         } else {
             Err(Error::Refused(format!(

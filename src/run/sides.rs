@@ -173,17 +173,55 @@ impl<'a, const D: usize> Circumstances<'a, D> {
             if least == 0 || !is_free || self.earlier.contains_key(&number) {
                 continue;
             }
-            let mut other = pairs[at].clone().exchanged(Exchange::Faced);
-            other.form(session, mesh, &mesh.nodes)?;
-            let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
-            if session.total(facing) == 0 || session.total(self.conflicts(contact, &other)) > 0 {
-                continue;
-            }
+            let Some(other) = self.exchanged(session, mesh, contact, &pairs[at])? else { continue };
             let kept = std::mem::replace(&mut pairs[at], other);
             let left = tangled(session, mesh, job, pairs)?;
             if left < least { least = left } else { pairs[at] = kept }
         }
         Ok(())
+    }
+
+    /// Exchanges the sides of pairs whose choice is free and whose nodes face those that carry the law of another pair, where supports or the
+    /// job prevent that it is carried on their side: the nodes of both then face the bodies of both. Collective.
+    pub(super) fn follow(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        job: &Job,
+        pairs: &mut [Pair<D>],
+    ) -> Result<(), Agreed> {
+        for at in 0..pairs.len() {
+            let (pair, contact) = (&pairs[at], &job.contact[pairs[at].contact]);
+            let is_free = contact.side == Side::Auto && !contact.against.is_empty();
+            if !is_free || pair.exchange.is_some() || self.earlier.contains_key(&pair.contact) {
+                continue;
+            }
+            let is_faced = pairs.iter().any(|other| {
+                let stays = matches!(other.exchange, Some(Exchange::Held | Exchange::Requested));
+                stays && session.total(usize::from(other.on != pair.against)) == 0
+            });
+            if is_faced
+                && let Some(other) = self.exchanged(session, mesh, contact, pair)?
+            {
+                pairs[at] = other;
+            }
+        }
+        Ok(())
+    }
+
+    /// A pair with its sides exchanged because of another one, if supports allow that. Collective.
+    fn exchanged(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        contact: &job::Contact,
+        pair: &Pair<D>,
+    ) -> Result<Option<Pair<D>>, Agreed> {
+        let mut other = pair.clone().exchanged(Exchange::Faced);
+        other.form(session, mesh, &mesh.nodes)?;
+        let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
+        let is_possible = session.total(facing) > 0 && session.total(self.conflicts(contact, &other)) == 0;
+        Ok(is_possible.then_some(other))
     }
 
     /// The number of nodes owned here whose law supports prevent.
@@ -288,16 +326,15 @@ pub(super) fn warnings_of_edges<const D: usize>(
     Ok(out)
 }
 
-/// Warnings about wear that stays with the nodes of the other body, and about facets of which two contacts leave all nodes without a law.
+/// Warnings about wear that stays with the nodes of the other body, and about facets of which contacts leave all nodes without a law.
 /// Collective, with the same warnings on all ranks.
 pub(super) fn warnings_of_carriers<const D: usize>(
     session: &Session,
     job: &Job,
-    mesh: &Mesh<D>,
     pairs: &[Pair<D>],
 ) -> Vec<String> {
     let mut out = Vec::new();
-    for (at, pair) in pairs.iter().enumerate() {
+    for pair in pairs {
         let [own, other] = names_of_sides(job, pair);
         if let Some(reason) =
             pair.exchange.filter(|_| pair.slides && job.contact[pair.contact].wear.is_some())
@@ -312,22 +349,13 @@ pub(super) fn warnings_of_carriers<const D: usize>(
                 pair.contact
             ));
         }
-        for second in &pairs[at + 1..] {
-            let is_left = |node: &u32| {
-                let node = mesh.global_node(*node);
-                pair.lawless.contains(&node) && second.lawless.contains(&node)
-            };
-            let spans = |facet: &&u32| mesh.facet_nodes(**facet).all(|node| is_left(&node));
-            let [spanning] =
-                session.largest([f64::from(u8::from(pair.on.iter().any(|facet| spans(&facet))))]);
-            if spanning > 0.0 {
-                let [_, others] = names_of_sides(job, second);
-                out.push(format!(
-                    "contact.{} and contact.{}: facets of {own} that face both {other} and {others} carry no law, so that pressures beside them \
-                     may be wrong by half; give both one table with on = [...], or let nodes of {own} lie where they meet",
-                    pair.contact, second.contact
-                ));
-            }
+        if session.total(usize::from(pair.is_bare)) > 0 {
+            out.push(format!(
+                "contact.{}: facets of {own} that face {other} carry no law, because all their nodes belong to other contacts, too, so that \
+                 pressures beside them may be wrong by half; give contacts that meet there one table with on = [...], or let nodes of {own} \
+                 lie where they meet",
+                pair.contact
+            ));
         }
     }
     out

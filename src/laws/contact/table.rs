@@ -176,6 +176,12 @@ impl Contact {
         is_constraint && has_bound && !keeps_more
     }
 
+    /// Whether its laws are those of another contact, whatever the boundaries.
+    pub fn has_the_laws_of(&self, other: &Self) -> bool {
+        let Self { on, against, side, part, .. } = self.clone();
+        self == &Self { on, against, side, part, ..other.clone() }
+    }
+
     /// The shares of the heat of friction that enter the body of `on` and, if there is one, that of `against`.
     pub fn shares_of_heat(&self) -> [f64; 2] {
         match (self.friction_heat, self.against.is_empty()) {
