@@ -87,6 +87,21 @@ pub enum Exchange {
     Stiffer,
     /// Another contact has the side `on` on its other side.
     Faced,
+    /// All nodes of the side `on` belong to other contacts, too.
+    Shared,
+}
+
+/// A contact that shares facets of its slave side with another one, with the facets of this rank on both sides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sharing {
+    /// The position of the contact among those of the job.
+    pub contact: usize,
+    /// The slave side.
+    pub on: Vec<u32>,
+    /// The other side.
+    pub against: Vec<u32>,
+    /// The nodes of the other side on all ranks, by global numbers.
+    pub faced: BTreeSet<u32>,
 }
 
 /// A contact between bodies, with the facets of this rank on both sides.
@@ -110,11 +125,11 @@ pub struct Pair<const D: usize> {
     /// The nodes of the slave side, by global numbers, whose part of the surface others of their facets stand for: they belong to other
     /// contacts, too. The same on all ranks.
     pub lawless: BTreeSet<u32>,
-    /// Nodes of the slave side, by global numbers, that carry the law of another pair with the same slave side. The same on all ranks.
+    /// Nodes of the slave side, by global numbers, that carry the law of another pair that shares it. The same on all ranks.
     pub of_others: BTreeSet<u32>,
-    /// All contacts whose pairs have this slave side, each with the nodes of its own other side, by global numbers; none if it is the only
-    /// one. Nodes face what any of them has there. The same on all ranks.
-    pub sharing: Vec<(usize, BTreeSet<u32>)>,
+    /// The contacts that share facets of the slave side, with this one; none if there is no other. `on` and `against` are then those of all of
+    /// them, and each facet faces the other sides of all those that have it. The same on all ranks.
+    pub sharing: Vec<Sharing>,
     /// Whether facets of this rank face the other side of which none of the nodes carries a law, because of `lawless`.
     pub is_bare: bool,
     /// The nodes owned here that carry the law, ascending.
@@ -147,9 +162,50 @@ impl<const D: usize> Pair<D> {
         Self { on: self.against, against: self.on, exchange, nodes: Vec::new(), ..self }
     }
 
-    /// Whether another pair has the same slave side, whose nodes carry the law of one or the other.
+    /// Whether another pair shares facets of the slave side, whose nodes carry the law of one or the other.
     pub fn shares_with(&self, other: &Self) -> bool {
-        self.sharing.iter().any(|(contact, _)| *contact == other.contact)
+        self.sharing.iter().any(|sharing| sharing.contact == other.contact)
+    }
+
+    /// The contact with a node of the other side, by its global number.
+    pub fn contact_with(&self, master: u32) -> usize {
+        let sharing = self.sharing.iter().find(|sharing| sharing.faced.contains(&master));
+        sharing.map_or(self.contact, |sharing| sharing.contact)
+    }
+
+    /// What the slave facets of this rank contribute to their nodes. Collective.
+    fn contributions(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        places: &[Vector<D>],
+    ) -> Result<Vec<Contribution<D>>, Agreed> {
+        let depth = DEEPEST * longest_side(session, places);
+        let of_facets = |on: &[u32], masters: &[Facet<D>]| {
+            let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
+            contributions(&slaves, masters, [depth, f64::INFINITY])
+        };
+        if self.sharing.is_empty() {
+            return Ok(of_facets(&self.on, &gather_facets(session, mesh, places, &self.against)?));
+        }
+        let mut masters = Vec::new();
+        for sharing in &self.sharing {
+            masters.push(gather_facets(session, mesh, places, &sharing.against)?);
+        }
+        // Facets by which of the contacts have them.
+        let mut kinds: BTreeMap<Vec<bool>, Vec<u32>> = BTreeMap::new();
+        for facet in &self.on {
+            let kind = self.sharing.iter().map(|sharing| sharing.on.binary_search(facet).is_ok());
+            kinds.entry(kind.collect()).or_default().push(*facet);
+        }
+        let of_kind = |(kind, on): (Vec<bool>, Vec<u32>)| {
+            let masters = masters.iter().zip(kind).filter(|(_, has_them)| *has_them);
+            let mut masters: Vec<Facet<D>> = masters.flat_map(|(masters, _)| masters).cloned().collect();
+            let mut known = BTreeSet::new();
+            masters.retain(|facet| known.insert(facet.nodes.clone()));
+            of_facets(&on, &masters)
+        };
+        Ok(kinds.into_iter().flat_map(of_kind).collect())
     }
 
     /// Lets nodes face those at the same place on the other side, of a mesh that was split; nodes that both sides have carry no law.
@@ -273,15 +329,13 @@ impl<const D: usize> Pair<D> {
         mesh: &Mesh<D>,
         places: &[Vector<D>],
     ) -> Result<(Vec<PairedNode<D>>, bool), Agreed> {
-        let slaves: Vec<Facet<D>> = self.on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
-        let masters = gather_facets(session, mesh, places, &self.against)?;
-        let depth = DEEPEST * longest_side(session, places);
-        let mut all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
+        let mut all = self.contributions(session, mesh, places)?;
         let at = gather_places(session, mesh, places, [&self.on, &self.against])?;
         if mesh.order() == 2 {
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
-        let own: BTreeSet<u32> = slaves.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
+        let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+        let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
         let is_bare = |of_facet: &[Contribution<D>]| {
             let [covered, whole] = of_facet.iter().fold([0.0; 2], |[c, w], one| [c + one.weight, w + one.whole]);
             of_facet.iter().all(|one| self.lawless.contains(&one.node)) && covered > LEAST_STRETCH * whole

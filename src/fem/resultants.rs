@@ -2,8 +2,8 @@
 
 use super::{
     body::Body,
-    effect::{ContactAreas, Form, Supports, SurfaceForce},
     coupling::Coupling,
+    effect::{ContactAreas, Form, Supports, SurfaceForce},
     pairs::{Pair, is_exchanged, pair_of},
     space::Held,
     state::State,
@@ -363,10 +363,7 @@ impl<const D: usize> Sums<'_, D> {
         (node, force): (u32, &Vector<D>),
     ) {
         let Some(paired) = pair.node(node as usize) else { return };
-        let sides_at = |master: u32| {
-            let contact = pair.sharing.iter().find(|(_, nodes)| nodes.contains(&master));
-            Self::sides(body, contact.map_or(pair.contact, |(contact, _)| *contact))
-        };
+        let sides_at = |master: u32| Self::sides(body, pair.contact_with(master));
         let whole: f64 = paired.faced().map(|(_, share)| share).sum();
         for (faced, share) in paired.faced() {
             self.add_and_react(sides_at(*faced)[0], node, &force.map(|f| f * share / whole));

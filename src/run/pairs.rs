@@ -2,14 +2,14 @@
 
 use super::{
     parts::part_of,
-    sides::{Circumstances, conflict, names_of_sides, rubs},
+    sides::{Circumstances, conflict, meet, names_of_sides, rubs},
 };
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Exchange, Pair, is_exchanged, pair_of, shares},
+        pairs::{Exchange, Pair, Sharing, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
     job::{self, Job, Scalar, Side, Sliding},
@@ -77,7 +77,7 @@ pub(super) fn find<const D: usize>(
     circumstances.untangle(session, mesh, job, &mut pairs)?;
     circumstances.follow(session, mesh, job, &mut pairs)?;
     share_sides(session, job, mesh, &mut pairs)?;
-    leave_shared_nodes(session, job, mesh, &mut pairs)?;
+    leave_shared_nodes(session, job, (mesh, circumstances), &mut pairs)?;
     let shares = shares(mesh, &pairs);
     let global =
         |facet: &u32| mesh.facet_nodes(*facet).map(|node| mesh.global_node(node)).collect::<Vec<_>>();
@@ -145,13 +145,8 @@ fn refuse_joined<const D: usize>(
     })
 }
 
-/// Whether two pairs have the same slave side. Collective.
-fn has_side_of<const D: usize>(session: &Session, [one, other]: [&Pair<D>; 2]) -> bool {
-    session.total(usize::from(one.on != other.on)) == 0
-}
-
-/// Lets the nodes of a slave side that several pairs have face the other sides of all of them: each carries the law of the pair that has the
-/// largest part of what it faces, where the laws allow it. Collective.
+/// Lets the nodes of facets that are on the slave side of several pairs face the other sides of all of them: each node carries the law of the
+/// pair that has the largest part of what it faces, where the laws allow it. Collective.
 fn share_sides<const D: usize>(
     session: &Session,
     job: &Job,
@@ -159,28 +154,32 @@ fn share_sides<const D: usize>(
     pairs: &mut [Pair<D>],
 ) -> Result<(), Agreed> {
     for at in 0..pairs.len() {
-        let first = &pairs[at];
-        if job.contact[first.contact].against.is_empty() || !first.sharing.is_empty() {
+        if job.contact[pairs[at].contact].against.is_empty() || !pairs[at].sharing.is_empty() {
             continue;
         }
         let mut group = vec![at];
-        for other in at + 1..pairs.len() {
-            let second = &pairs[other];
-            let is_between_bodies = !job.contact[second.contact].against.is_empty();
-            if !is_between_bodies || !has_side_of(session, [first, second]) {
-                continue;
+        let mut seen = 0;
+        while seen < group.len() {
+            for other in at + 1..pairs.len() {
+                let (first, second) = (&pairs[group[seen]], &pairs[other]);
+                let is_apart = !meet(session, &first.on, &second.on);
+                if is_apart || group.contains(&other) || job.contact[second.contact].against.is_empty() {
+                    continue;
+                }
+                let [one, two] = [first, second].map(|pair| &job.contact[pair.contact]);
+                let are_same =
+                    one.has_the_laws_of(two) && first.exchange.is_some() == second.exchange.is_some();
+                let slide = [first.slides, second.slides];
+                let are_alike = one.is_without_scale()
+                    && two.is_without_scale()
+                    && one.redistribute_mass == two.redistribute_mass;
+                if are_same || (are_alike && slide == [false; 2]) {
+                    group.push(other);
+                } else if slide == [true; 2] {
+                    session.agree(Err(refusal_of_laws(job, [first, second])))?;
+                }
             }
-            let [one, two] = [first, second].map(|pair| &job.contact[pair.contact]);
-            let are_same = one.has_the_laws_of(two) && first.exchange.is_some() == second.exchange.is_some();
-            let are_alike = one.is_without_scale()
-                && two.is_without_scale()
-                && !first.slides
-                && one.redistribute_mass == two.redistribute_mass;
-            if are_same || (are_alike && !second.slides) {
-                group.push(other);
-            } else if first.slides && second.slides {
-                session.agree(Err(refusal_of_laws(job, [first, second])))?;
-            }
+            seen += 1;
         }
         if group.len() > 1 {
             share_side(session, mesh, pairs, &group)?;
@@ -189,7 +188,7 @@ fn share_sides<const D: usize>(
     Ok(())
 }
 
-/// Two pairs with one slave side whose laws differ, where bodies slide.
+/// Refuses two pairs that share a slave side and whose laws differ, where bodies slide.
 fn refusal_of_laws<const D: usize>(job: &Job, pairs: [&Pair<D>; 2]) -> Error {
     let [own, _] = names_of_sides(job, pairs[0]);
     let held = pairs.into_iter().find(|pair| pair.exchange == Some(Exchange::Held));
@@ -230,24 +229,26 @@ fn share_side<const D: usize>(
     }
     let (mut sharing, mut carrying) = (Vec::new(), Vec::new());
     for &at in group {
-        sharing.push((pairs[at].contact, all(nodes_of(&pairs[at].against))?));
+        let Pair { contact, on, against, .. } = pairs[at].clone();
+        let faced = all(nodes_of(&against))?;
+        sharing.push(Sharing { contact, on, against, faced });
         carrying.push(all(most.iter().filter(|(_, (of, _))| *of == at).map(|(node, _)| *node).collect())?);
     }
-    let on = all(nodes_of(&pairs[group[0]].on))?;
-    let mut against: Vec<u32> = group.iter().flat_map(|at| pairs[*at].against.iter().copied()).collect();
-    against.sort_unstable();
-    against.dedup();
+    let of_all = |facets: fn(&Sharing) -> &Vec<u32>| -> Vec<u32> {
+        sharing.iter().flat_map(facets).copied().collect::<BTreeSet<u32>>().into_iter().collect()
+    };
+    let (on, against) = (of_all(|sharing| &sharing.on), of_all(|sharing| &sharing.against));
+    let own = all(nodes_of(&on))?;
     for (place, &at) in group.iter().enumerate() {
-        // Nodes that face nothing carry the law of the first pair.
-        let of_others = carrying.iter().enumerate().filter(|(other, _)| *other != place);
-        let of_others = of_others.flat_map(|(_, nodes)| nodes).copied();
-        let is_first = place == 0;
-        let of_others = match is_first {
-            true => of_others.collect(),
-            false => &on - &carrying[place],
-        };
         let pair = &mut pairs[at];
-        (pair.of_others, pair.sharing) = (of_others, sharing.clone());
+        // Nodes that face nothing carry the law of the first pair.
+        let others = carrying.iter().enumerate().filter(|(other, _)| *other != place);
+        pair.of_others = match place {
+            0 => others.flat_map(|(_, nodes)| nodes).copied().collect(),
+            _ => &own - &carrying[place],
+        };
+        pair.sharing.clone_from(&sharing);
+        pair.on.clone_from(&on);
         pair.against.clone_from(&against);
         pair.form(session, mesh, &mesh.nodes)?;
     }
@@ -262,7 +263,7 @@ const LARGER: f64 = 1.0 + 1e-9;
 fn leave_shared_nodes<const D: usize>(
     session: &Session,
     job: &Job,
-    mesh: &Mesh<D>,
+    (mesh, circumstances): (&Mesh<D>, &Circumstances<'_, D>),
     pairs: &mut [Pair<D>],
 ) -> Result<(), Agreed> {
     let (mut slaves, mut both) = (Vec::new(), Vec::new());
@@ -296,12 +297,22 @@ fn leave_shared_nodes<const D: usize>(
             continue;
         }
         pair.form(session, mesh, &mesh.nodes)?;
-        session.agree(if session.total(pair.nodes.len()) > 0 || !pair.sharing.is_empty() {
+        if !pair.sharing.is_empty() || session.total(pair.nodes.len()) > 0 {
+            continue;
+        }
+        let exchanged = circumstances.exchanged(session, (mesh, contact), (&*pair, Exchange::Shared))?;
+        if let Some(mut other) = exchanged {
+            let [own, _] = other.nodes_of_all(session, mesh)?;
+            other.lawless = own.into_iter().filter(is_shared).collect();
+            other.form(session, mesh, &mesh.nodes)?;
+            *pair = other;
+        }
+        session.agree(if session.total(pair.nodes.len()) > 0 {
             Ok(())
         } else {
             Err(Error::Refused(format!(
                 "contact.{}: all nodes of the boundary {} belong to other contacts, too, so that none is left for the law; refine the mesh \
-                 there, or state the other `side`",
+                 there",
                 pair.contact,
                 names_of_sides(job, pair)[0]
             )))

@@ -167,13 +167,12 @@ impl<'a, const D: usize> Circumstances<'a, D> {
     ) -> Result<(), Agreed> {
         let mut least = tangled(session, mesh, job, pairs)?;
         for at in 0..pairs.len() {
-            let number = pairs[at].contact;
-            let contact = &job.contact[number];
-            let is_free = contact.side == Side::Auto && !contact.against.is_empty();
-            if least == 0 || !is_free || self.earlier.contains_key(&number) {
+            let contact = &job.contact[pairs[at].contact];
+            if least == 0 {
                 continue;
             }
-            let Some(other) = self.exchanged(session, mesh, contact, &pairs[at])? else { continue };
+            let exchanged = self.exchanged(session, (mesh, contact), (&pairs[at], Exchange::Faced))?;
+            let Some(other) = exchanged else { continue };
             let kept = std::mem::replace(&mut pairs[at], other);
             let left = tangled(session, mesh, job, pairs)?;
             if left < least { least = left } else { pairs[at] = kept }
@@ -181,8 +180,8 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         Ok(())
     }
 
-    /// Exchanges the sides of pairs whose choice is free and whose nodes face those that carry the law of another pair, where supports or the
-    /// job prevent that it is carried on their side: the nodes of both then face the bodies of both. Collective.
+    /// Exchanges the sides of pairs whose choice is free and some of whose nodes face those that carry the law of another pair, where supports
+    /// allow it: the facets of the latter can then face the bodies of both. Collective.
     pub(super) fn follow(
         &self,
         session: &Session,
@@ -190,34 +189,50 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         job: &Job,
         pairs: &mut [Pair<D>],
     ) -> Result<(), Agreed> {
-        for at in 0..pairs.len() {
-            let (pair, contact) = (&pairs[at], &job.contact[pairs[at].contact]);
-            let is_free = contact.side == Side::Auto && !contact.against.is_empty();
-            if !is_free || pair.exchange.is_some() || self.earlier.contains_key(&pair.contact) {
+        // An exchange may let others follow.
+        let mut at = 0;
+        while at < pairs.len() {
+            let pair = &pairs[at];
+            at += 1;
+            let contact = &job.contact[pair.contact];
+            if !self.is_free(contact, pair) || pair.exchange.is_some() {
                 continue;
             }
-            let is_faced = pairs.iter().any(|other| {
-                let stays = matches!(other.exchange, Some(Exchange::Held | Exchange::Requested));
-                stays && session.total(usize::from(other.on != pair.against)) == 0
-            });
+            let [_, faced] = pair.nodes_of_all(session, mesh)?;
+            let mut is_faced = false;
+            for other in pairs.iter().filter(|other| other.contact != pair.contact) {
+                if meet(session, &other.on, &pair.against) {
+                    let [own, _] = other.nodes_of_all(session, mesh)?;
+                    is_faced |= own.intersection(&faced).next().is_some();
+                }
+            }
             if is_faced
-                && let Some(other) = self.exchanged(session, mesh, contact, pair)?
+                && let Some(other) = self.exchanged(session, (mesh, contact), (pair, Exchange::Faced))?
             {
-                pairs[at] = other;
+                pairs[at - 1] = other;
+                at = 0;
             }
         }
         Ok(())
     }
 
-    /// A pair with its sides exchanged because of another one, if supports allow that. Collective.
-    fn exchanged(
+    /// Whether the choice of the side of a pair is free.
+    fn is_free(&self, contact: &job::Contact, pair: &Pair<D>) -> bool {
+        contact.side == Side::Auto && !contact.against.is_empty() && !self.earlier.contains_key(&pair.contact)
+    }
+
+    /// A pair with its sides exchanged for this reason, if the choice is free and supports allow it. Collective.
+    pub(super) fn exchanged(
         &self,
         session: &Session,
-        mesh: &Mesh<D>,
-        contact: &job::Contact,
-        pair: &Pair<D>,
+        (mesh, contact): (&Mesh<D>, &job::Contact),
+        (pair, why): (&Pair<D>, Exchange),
     ) -> Result<Option<Pair<D>>, Agreed> {
-        let mut other = pair.clone().exchanged(Exchange::Faced);
+        if !self.is_free(contact, pair) {
+            return Ok(None);
+        }
+        let mut other = pair.clone().exchanged(why);
+        other.lawless.clear();
         other.form(session, mesh, &mesh.nodes)?;
         let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
         let is_possible = session.total(facing) > 0 && session.total(self.conflicts(contact, &other)) == 0;
@@ -253,6 +268,11 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         };
         changed.map(words).collect()
     }
+}
+
+/// Whether two lists of facets, ascending, have any in common. Collective.
+pub(super) fn meet(session: &Session, one: &[u32], other: &[u32]) -> bool {
+    session.total(one.iter().filter(|facet| other.binary_search(facet).is_ok()).count()) > 0
 }
 
 /// Whether the law of a contact depends on velocities or displacements along the boundary.
@@ -465,6 +485,7 @@ pub(super) fn lines<const D: usize>(job: &Job, pairs: &[Pair<D>]) -> Vec<String>
             Exchange::Coarser => format!("because the mesh of {on} is coarser"),
             Exchange::Stiffer => format!("because {on} is more than {STIFFER} times as stiff"),
             Exchange::Faced => format!("because {on} is faced in another contact"),
+            Exchange::Shared => format!("because all nodes of {on} belong to other contacts, too"),
         };
         Some(format!("contact    contact.{}: nodes of {against} carry the law, {why}", pair.contact))
     };
