@@ -123,7 +123,7 @@ pub struct Pair<const D: usize> {
     /// Whether the undeformed surfaces count as touching wherever they face each other.
     pub is_closed: bool,
     /// The nodes of the slave side, by global numbers, whose part of the surface others of their facets stand for: they belong to other
-    /// contacts, too. The same on all ranks.
+    /// contacts, too, or supports prevent their law. The same on all ranks.
     pub lawless: BTreeSet<u32>,
     /// Nodes of the slave side, by global numbers, that carry the law of another pair that shares it. The same on all ranks.
     pub of_others: BTreeSet<u32>,
@@ -336,11 +336,6 @@ impl<const D: usize> Pair<D> {
         }
         let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
         let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
-        let is_bare = |of_facet: &[Contribution<D>]| {
-            let [covered, whole] = of_facet.iter().fold([0.0; 2], |[c, w], one| [c + one.weight, w + one.whole]);
-            of_facet.iter().all(|one| self.lawless.contains(&one.node)) && covered > LEAST_STRETCH * whole
-        };
-        let is_bare = all.chunks_exact(per_facet(mesh)).any(is_bare);
         let mut lawless = self.lawless.clone();
         loop {
             let sums = sum_of_contributions(session, mesh, (&all, &own), &lawless)?;
@@ -349,6 +344,12 @@ impl<const D: usize> Pair<D> {
                 covered.filter(|(_, sum)| !sum.carries_a_law()).map(|(node, _)| *node).collect();
             let further = gather(session.world(), &bearing)?;
             if further.is_empty() {
+                let is_bare = |of_facet: &[Contribution<D>]| {
+                    let sum = |part: fn(&Contribution<D>) -> f64| of_facet.iter().map(part).sum::<f64>();
+                    of_facet.iter().all(|one| lawless.contains(&one.node))
+                        && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
+                };
+                let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
                 return Ok((paired(mesh, sums, &at, self.slides), is_bare));
             }
             lawless.extend(further);

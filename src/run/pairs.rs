@@ -239,6 +239,7 @@ fn share_side<const D: usize>(
     };
     let (on, against) = (of_all(|sharing| &sharing.on), of_all(|sharing| &sharing.against));
     let own = all(nodes_of(&on))?;
+    let lawless: BTreeSet<u32> = group.iter().flat_map(|at| pairs[*at].lawless.clone()).collect();
     for (place, &at) in group.iter().enumerate() {
         let pair = &mut pairs[at];
         // Nodes that face nothing carry the law of the first pair.
@@ -247,6 +248,7 @@ fn share_side<const D: usize>(
             0 => others.flat_map(|(_, nodes)| nodes).copied().collect(),
             _ => &own - &carrying[place],
         };
+        pair.lawless.clone_from(&lawless);
         pair.sharing.clone_from(&sharing);
         pair.on.clone_from(&on);
         pair.against.clone_from(&against);
@@ -290,9 +292,9 @@ fn leave_shared_nodes<const D: usize>(
         let (own, others): (Vec<usize>, Vec<usize>) = (0..pairs.len()).partition(|other| is_together(*other));
         let is_shared =
             |node: &u32| of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node));
-        let lawless = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared).collect();
+        let shared = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared);
         let pair = &mut pairs[at];
-        pair.lawless = lawless;
+        pair.lawless.extend(shared);
         if pair.lawless.is_empty() {
             continue;
         }
@@ -303,7 +305,7 @@ fn leave_shared_nodes<const D: usize>(
         let exchanged = circumstances.exchanged(session, (mesh, contact), (&*pair, Exchange::Shared))?;
         if let Some(mut other) = exchanged {
             let [own, _] = other.nodes_of_all(session, mesh)?;
-            other.lawless = own.into_iter().filter(is_shared).collect();
+            other.lawless.extend(own.into_iter().filter(is_shared));
             other.form(session, mesh, &mesh.nodes)?;
             *pair = other;
         }

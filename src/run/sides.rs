@@ -106,7 +106,7 @@ impl<'a, const D: usize> Circumstances<'a, D> {
             Some(true) => pair.exchanged(Exchange::Continued),
             _ => pair,
         })?;
-        let is_held = |pair: &Pair<D>| session.total(self.conflicts(contact, pair)) > 0;
+        let is_held = |pair: &Pair<D>| session.total(self.conflicts(mesh, contact, pair).len()) > 0;
         if is_held(&first) {
             let other = formed(first.clone().exchanged(Exchange::Held))?;
             return Ok(if is_held(&other) { first } else { other });
@@ -221,7 +221,8 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         contact.side == Side::Auto && !contact.against.is_empty() && !self.earlier.contains_key(&pair.contact)
     }
 
-    /// A pair with its sides exchanged for this reason, if the choice is free and supports allow it. Collective.
+    /// A pair with its sides exchanged for this reason, if the choice is free and supports allow it, where the law allows it by leaving what
+    /// they hold to neighbours. Collective.
     pub(super) fn exchanged(
         &self,
         session: &Session,
@@ -234,13 +235,19 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         let mut other = pair.clone().exchanged(why);
         other.lawless.clear();
         other.form(session, mesh, &mesh.nodes)?;
+        let held = self.conflicts(mesh, contact, &other);
+        let is_held = session.total(held.len()) > 0;
+        if is_held && contact.is_without_scale() {
+            other.lawless = gather(session.world(), &held)?.into_iter().collect();
+            other.form(session, mesh, &mesh.nodes)?;
+        }
         let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
-        let is_possible = session.total(facing) > 0 && session.total(self.conflicts(contact, &other)) == 0;
-        Ok(is_possible.then_some(other))
+        let is_left = is_held && (other.lawless.is_empty() || session.total(usize::from(other.is_bare)) > 0);
+        Ok((session.total(facing) > 0 && !is_left).then_some(other))
     }
 
-    /// The number of nodes owned here whose law supports prevent.
-    fn conflicts(&self, contact: &job::Contact, pair: &Pair<D>) -> usize {
+    /// The nodes owned here whose law supports prevent, by global numbers.
+    fn conflicts(&self, mesh: &Mesh<D>, contact: &job::Contact, pair: &Pair<D>) -> Vec<u32> {
         let free = |master: &u32, direction: &Vector<D>| -> f64 {
             let held = self.directions.get(master).into_iter().flatten();
             norm(&held.fold(*direction, |left, held| add_scaled(&left, -dot(held, direction), held)))
@@ -251,7 +258,7 @@ impl<'a, const D: usize> Circumstances<'a, D> {
             };
             conflict(node, &self.held, rubs(contact), facing).is_some()
         });
-        nodes.count()
+        nodes.map(|node| mesh.global_node(node.node)).collect()
     }
 
     /// What the user should know about a choice that differs from that of the run from whose state this one starts.
