@@ -290,8 +290,9 @@ fn leave_shared_nodes<const D: usize>(
         }
         let is_together = |other: usize| other == at || pairs[at].shares_with(&pairs[other]);
         let (own, others): (Vec<usize>, Vec<usize>) = (0..pairs.len()).partition(|other| is_together(*other));
-        let is_shared =
-            |node: &u32| of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node));
+        let is_shared = |node: &u32| {
+            of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node))
+        };
         let shared = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared);
         let pair = &mut pairs[at];
         pair.lawless.extend(shared);
@@ -330,6 +331,17 @@ const OR_EXCLUDE: &str = "or exclude the facets around it by `where`";
 const SHARED: &str = "use `unilateral` with the friction `coulomb` or `tresca`, without wear, adhesion and memory, which leave such nodes to \
                       their neighbours, or exclude the facets around it by the `where` of one of the tables";
 
+/// The same, given the contacts, where all have such laws.
+fn remedy_of_shared(job: &Job) -> &'static str {
+    let mut pairs = job.contact.iter().filter(|contact| !contact.against.is_empty());
+    if pairs.all(job::Contact::is_without_scale) {
+        "give contacts that meet there one table with several boundaries in `on` or `against`, or exclude the facets around it by the `where` \
+         of one of the tables"
+    } else {
+        SHARED
+    }
+}
+
 /// The same for parts of a fault, whose nodes have no neighbours to which they could be left.
 const PARTS_OF_A_FAULT: &str = "give the parts of the fault one table with a friction coefficient that is a formula of the place, such as \
                                 friction.expression.coefficient = \"if(x < 1, 0.3, 0.6)\"";
@@ -349,10 +361,11 @@ fn refuse_chains<const D: usize>(
     session.agree(match both {
         None => Ok(()),
         Some(&node) => Err(Error::Refused(format!(
-            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {}{SHARED}",
+            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {}{}",
             mesh.nodes[mesh.owned_node(node)],
             // Otherwise all sides have been tried.
-            if job.contact.iter().any(|contact| contact.side != Side::Auto) { "delete `side`, " } else { "" }
+            if job.contact.iter().any(|contact| contact.side != Side::Auto) { "delete `side`, " } else { "" },
+            remedy_of_shared(job)
         ))),
     })
 }
@@ -410,7 +423,7 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
             let contact = &job.contact[pair];
             let remedy = match (contact.side, is_exchanged(pairs, pair)) {
                 _ if why.starts_with(ALSO) && contact.against.is_empty() => PARTS_OF_A_FAULT.into(),
-                _ if why.starts_with(ALSO) => SHARED.into(),
+                _ if why.starts_with(ALSO) => remedy_of_shared(job).into(),
                 (Side::Auto, _) => format!("hold both bodies there in the same directions, or none of them, {OR_EXCLUDE}"),
                 (_, true) => format!("delete `side`, {OR_EXCLUDE}"),
                 (_, false) => format!("delete `side`, or exchange `on` and `against`, {OR_EXCLUDE}"),

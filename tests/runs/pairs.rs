@@ -1078,7 +1078,8 @@ fn uniform_stress_passes_through_facets_that_face_the_bodies_of_two_contacts() {
         ("2", "'small'", one_held, 1),
     ] {
         let case = two_punches(7).set("mesh.order", order).set("support", support);
-        let case = case.set("contact.0.sliding", sliding).set("contact.1.sliding", sliding).run_and_keep(ranks);
+        let case =
+            case.set("contact.0.sliding", sliding).set("contact.1.sliding", sliding).run_and_keep(ranks);
         assert!(!log_of(&case).contains("warning"), "{}", log_of(&case));
         let table = case.results().table("resultants.csv");
         for source in ["contact l.bottom", "contact r.bottom"] {
@@ -1117,7 +1118,8 @@ fn a_side_whose_nodes_all_belong_to_other_contacts_leaves_the_law_to_the_other_s
         .set("traction", "[{ on = ['u.top'], value = [0, -1000] }]")
         .run_and_keep(2);
     assert!(log_of(&case).contains("because all nodes of l.right belong to other contacts"));
-    let found = case.results().table("resultants.csv").only("source", "contact u.bottom").last("largest_pressure");
+    let found =
+        case.results().table("resultants.csv").only("source", "contact u.bottom").last("largest_pressure");
     assert!((found - 1000.0).abs() < 1e-6, "{found} Pa");
 }
 
