@@ -216,9 +216,11 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         Ok(())
     }
 
-    /// Whether the choice of the side of a pair is free.
+    /// Whether the sides of a pair may be exchanged.
     fn is_free(&self, contact: &job::Contact, pair: &Pair<D>) -> bool {
-        contact.side == Side::Auto && !contact.against.is_empty() && !self.earlier.contains_key(&pair.contact)
+        let earlier = self.earlier.get(&pair.contact);
+        let was_other = earlier.is_none_or(|exchanged| *exchanged != pair.exchange.is_some());
+        contact.side == Side::Auto && !contact.against.is_empty() && was_other
     }
 
     /// A pair with its sides exchanged for this reason, if the choice is free and supports allow it, where the law allows it by leaving what
