@@ -87,6 +87,21 @@ pub enum Exchange {
     Stiffer,
     /// Another contact has the side `on` on its other side.
     Faced,
+    /// All nodes of the side `on` belong to other contacts, too.
+    Shared,
+}
+
+/// A contact that shares facets of its slave side with another one, with the facets of this rank on both sides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sharing {
+    /// The position of the contact among those of the job.
+    pub contact: usize,
+    /// The slave side.
+    pub on: Vec<u32>,
+    /// The other side.
+    pub against: Vec<u32>,
+    /// The nodes of the other side on all ranks, by global numbers.
+    pub faced: BTreeSet<u32>,
 }
 
 /// A contact between bodies, with the facets of this rank on both sides.
@@ -108,8 +123,15 @@ pub struct Pair<const D: usize> {
     /// Whether the undeformed surfaces count as touching wherever they face each other.
     pub is_closed: bool,
     /// The nodes of the slave side, by global numbers, whose part of the surface others of their facets stand for: they belong to other
-    /// contacts, too. The same on all ranks.
+    /// contacts, too, or supports prevent their law. The same on all ranks.
     pub lawless: BTreeSet<u32>,
+    /// Nodes of the slave side, by global numbers, that carry the law of another pair that shares it. The same on all ranks.
+    pub of_others: BTreeSet<u32>,
+    /// The contacts that share facets of the slave side, with this one; none if there is no other. `on` and `against` are then those of all of
+    /// them, and each facet faces the other sides of all those that have it. The same on all ranks.
+    pub sharing: Vec<Sharing>,
+    /// Whether facets of this rank face the other side of which none of the nodes carries a law, because of `lawless`.
+    pub is_bare: bool,
     /// The nodes owned here that carry the law, ascending.
     pub nodes: Vec<PairedNode<D>>,
 }
@@ -117,9 +139,20 @@ pub struct Pair<const D: usize> {
 impl<const D: usize> Pair<D> {
     /// A contact of the job between these facets, before it is formed.
     pub fn of(contact: usize, [on, against]: [Vec<u32>; 2]) -> Self {
-        let (slides, is_closed) = (false, false);
-        let (exchange, lawless, nodes) = (None, BTreeSet::new(), Vec::new());
-        Self { contact, on, against, exchange, slides, axes: axes_of_space(), is_closed, lawless, nodes }
+        Self {
+            contact,
+            on,
+            against,
+            exchange: None,
+            slides: false,
+            axes: axes_of_space(),
+            is_closed: false,
+            lawless: BTreeSet::new(),
+            of_others: BTreeSet::new(),
+            sharing: Vec::new(),
+            is_bare: false,
+            nodes: Vec::new(),
+        }
     }
 
     /// The pair with its sides exchanged, before it is formed, for this reason if its slave side becomes `against` in the job.
@@ -127,6 +160,52 @@ impl<const D: usize> Pair<D> {
     pub fn exchanged(self, why: Exchange) -> Self {
         let exchange = if self.exchange.is_some() { None } else { Some(why) };
         Self { on: self.against, against: self.on, exchange, nodes: Vec::new(), ..self }
+    }
+
+    /// Whether another pair shares facets of the slave side, whose nodes carry the law of one or the other.
+    pub fn shares_with(&self, other: &Self) -> bool {
+        self.sharing.iter().any(|sharing| sharing.contact == other.contact)
+    }
+
+    /// The contact with a node of the other side, by its global number.
+    pub fn contact_with(&self, master: u32) -> usize {
+        let sharing = self.sharing.iter().find(|sharing| sharing.faced.contains(&master));
+        sharing.map_or(self.contact, |sharing| sharing.contact)
+    }
+
+    /// What the slave facets of this rank contribute to their nodes. Collective.
+    fn contributions(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        places: &[Vector<D>],
+    ) -> Result<Vec<Contribution<D>>, Agreed> {
+        let depth = DEEPEST * longest_side(session, places);
+        let of_facets = |on: &[u32], masters: &[Facet<D>]| {
+            let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
+            contributions(&slaves, masters, [depth, f64::INFINITY])
+        };
+        if self.sharing.is_empty() {
+            return Ok(of_facets(&self.on, &gather_facets(session, mesh, places, &self.against)?));
+        }
+        let mut masters = Vec::new();
+        for sharing in &self.sharing {
+            masters.push(gather_facets(session, mesh, places, &sharing.against)?);
+        }
+        // Facets by which of the contacts have them.
+        let mut kinds: BTreeMap<Vec<bool>, Vec<u32>> = BTreeMap::new();
+        for facet in &self.on {
+            let kind = self.sharing.iter().map(|sharing| sharing.on.binary_search(facet).is_ok());
+            kinds.entry(kind.collect()).or_default().push(*facet);
+        }
+        let of_kind = |(kind, on): (Vec<bool>, Vec<u32>)| {
+            let masters = masters.iter().zip(kind).filter(|(_, has_them)| *has_them);
+            let mut masters: Vec<Facet<D>> = masters.flat_map(|(masters, _)| masters).cloned().collect();
+            let mut known = BTreeSet::new();
+            masters.retain(|facet| known.insert(facet.nodes.clone()));
+            of_facets(&on, &masters)
+        };
+        Ok(kinds.into_iter().flat_map(of_kind).collect())
     }
 
     /// Lets nodes face those at the same place on the other side, of a mesh that was split; nodes that both sides have carry no law.
@@ -194,12 +273,14 @@ impl<const D: usize> Pair<D> {
 
     /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
     pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
-        let mut found = self.paired_nodes(session, mesh, places)?;
+        let is_own = |node: u32| !self.of_others.contains(&mesh.global_node(node));
+        let (mut found, is_bare) = self.paired_nodes(session, mesh, places)?;
+        found.retain(|node| is_own(node.node));
         if self.is_closed {
             found.iter_mut().for_each(|node| node.distance = 0.0);
         }
         if !self.slides {
-            self.nodes = found;
+            (self.nodes, self.is_bare) = (found, is_bare);
             return Ok(());
         }
         self.axes = axes_along_first(session, mesh, places, &self.against)?;
@@ -207,7 +288,7 @@ impl<const D: usize> Pair<D> {
             found.into_iter().map(|node| (node.node, node)).collect();
         let mut all: BTreeMap<u32, SurfacePoint<D>> = BTreeMap::new();
         let carries = |point: &SurfacePoint<D>| {
-            point.weight > 0.0 && !self.lawless.contains(&mesh.global_node(point.node))
+            point.weight > 0.0 && !self.lawless.contains(&mesh.global_node(point.node)) && is_own(point.node)
         };
         for point in surface_points(session, mesh, &self.on)?.into_iter().filter(carries) {
             let kept = all.entry(point.node).or_insert(point);
@@ -222,7 +303,7 @@ impl<const D: usize> Pair<D> {
                 PairedNode { node, normal, weight, distance, masters, neighbours, stretch, sharpness }
             })
         };
-        self.nodes = all.into_values().map(node_at).collect();
+        (self.nodes, self.is_bare) = (all.into_values().map(node_at).collect(), is_bare);
         Ok(())
     }
 
@@ -241,22 +322,20 @@ impl<const D: usize> Pair<D> {
     }
 
     /// The nodes owned here of the slave facets that face those of the other side on all ranks, ascending, with the local nodes of the mesh
-    /// at `places` in m. Collective.
+    /// at `places` in m; and whether nodes without a law leave facets of this rank bare. Collective.
     fn paired_nodes(
         &self,
         session: &Session,
         mesh: &Mesh<D>,
         places: &[Vector<D>],
-    ) -> Result<Vec<PairedNode<D>>, Agreed> {
-        let slaves: Vec<Facet<D>> = self.on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
-        let masters = gather_facets(session, mesh, places, &self.against)?;
-        let depth = DEEPEST * longest_side(session, places);
-        let mut all = contributions(&slaves, &masters, [depth, f64::INFINITY]);
+    ) -> Result<(Vec<PairedNode<D>>, bool), Agreed> {
+        let mut all = self.contributions(session, mesh, places)?;
         let at = gather_places(session, mesh, places, [&self.on, &self.against])?;
         if mesh.order() == 2 {
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
-        let own: BTreeSet<u32> = slaves.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
+        let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+        let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
         let mut lawless = self.lawless.clone();
         loop {
             let sums = sum_of_contributions(session, mesh, (&all, &own), &lawless)?;
@@ -265,7 +344,13 @@ impl<const D: usize> Pair<D> {
                 covered.filter(|(_, sum)| !sum.carries_a_law()).map(|(node, _)| *node).collect();
             let further = gather(session.world(), &bearing)?;
             if further.is_empty() {
-                return Ok(paired(mesh, sums, &at, self.slides));
+                let is_bare = |of_facet: &[Contribution<D>]| {
+                    let sum = |part: fn(&Contribution<D>) -> f64| of_facet.iter().map(part).sum::<f64>();
+                    of_facet.iter().all(|one| lawless.contains(&one.node))
+                        && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
+                };
+                let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
+                return Ok((paired(mesh, sums, &at, self.slides), is_bare));
             }
             lawless.extend(further);
         }
@@ -505,6 +590,11 @@ impl<const D: usize> Sum<D> {
 /// The share of the facets around a node that face the other side from which on it faces it with all of them.
 const COVERED: f64 = 0.999;
 
+/// How many nodes of a facet carry a law: both corners of linear segments, of all other facets three nodes.
+fn per_facet<const D: usize>(mesh: &Mesh<D>) -> usize {
+    if D == 2 && mesh.order() == 1 { 2 } else { 3 }
+}
+
 /// The sums of the contributions to the nodes of this rank, by global numbers, those of `lawless` left out, from those of the facets of each
 /// rank with the nodes of these facets. Collective.
 fn sum_of_contributions<const D: usize>(
@@ -514,9 +604,7 @@ fn sum_of_contributions<const D: usize>(
     lawless: &BTreeSet<u32>,
 ) -> Result<BTreeMap<u32, Sum<D>>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
-    // Of linear segments both corners carry a law, of all other facets three nodes.
-    let per_facet = if D == 2 && mesh.order() == 1 { 2 } else { 3 };
-    for of_facet in all.chunks_exact(per_facet) {
+    for of_facet in all.chunks_exact(per_facet(mesh)) {
         let (of_facet, passed) = pass_on(of_facet, lawless);
         for contribution in of_facet.iter().filter(|one| !lawless.contains(&one.node)) {
             let Contribution { node, normal, weight, whole, gap, corners, normals, masters } = contribution;

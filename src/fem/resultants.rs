@@ -2,8 +2,9 @@
 
 use super::{
     body::Body,
+    coupling::Coupling,
     effect::{ContactAreas, Form, Supports, SurfaceForce},
-    pairs::{is_exchanged, nodes_of},
+    pairs::{Pair, is_exchanged, pair_of},
     space::Held,
     state::State,
 };
@@ -345,6 +346,39 @@ impl<const D: usize> Sums<'_, D> {
         }
     }
 
+    /// The sides of a contact in the job: that of the nodes with the law, and the other one.
+    fn sides<const S: usize>(body: &Body<D, S>, contact: usize) -> [Source; 2] {
+        let mut sides = [Source::Contact(contact), Source::Against(contact)];
+        if is_exchanged(&body.pairs, contact) {
+            sides.reverse();
+        }
+        sides
+    }
+
+    /// Adds the force of a contact at a node that faces the bodies of several contacts: the part of each body to the contact with it.
+    fn add_to_each<const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        (pair, coupling): (&Pair<D>, &Coupling<D>),
+        (node, force): (u32, &Vector<D>),
+    ) {
+        let Some(paired) = pair.node(node as usize) else { return };
+        let sides_at = |master: u32| Self::sides(body, pair.contact_with(master));
+        let whole: f64 = paired.faced().map(|(_, share)| share).sum();
+        for (faced, share) in paired.faced() {
+            self.add_and_react(sides_at(*faced)[0], node, &force.map(|f| f * share / whole));
+        }
+        coupling.opposites(&body.held, node, force, |master, force| {
+            let global = self.mesh.global_node(master);
+            if !paired.is_beside(global) {
+                return self.add_and_react(sides_at(global)[1], master, &force);
+            }
+            for (faced, share) in paired.faced() {
+                self.add_and_react(sides_at(*faced)[0], master, &force.map(|f| f * share / whole));
+            }
+        });
+    }
+
     /// Adds the force of a contact at a node, with the opposite ones on the body that it may face there, each to the side of the job.
     fn add_both<const S: usize>(
         &mut self,
@@ -352,16 +386,16 @@ impl<const D: usize> Sums<'_, D> {
         contact: usize,
         (node, force): (u32, &Vector<D>),
     ) {
-        let (mut own, mut other) = (Source::Contact(contact), Source::Against(contact));
-        if is_exchanged(&body.pairs, contact) {
-            std::mem::swap(&mut own, &mut other);
+        let [own, other] = Self::sides(body, contact);
+        let coupled = body.coupling.as_ref().zip(pair_of(&body.pairs, contact));
+        if let Some((coupling, pair)) = coupled.filter(|(_, pair)| !pair.sharing.is_empty()) {
+            return self.add_to_each(body, (pair, coupling), (node, force));
         }
         self.add_and_react(own, node, force);
-        if let Some(coupling) = body.coupling.as_ref().filter(|_| body.contacts[contact].is_paired) {
-            let paired = nodes_of(&body.pairs, contact).unwrap_or_default();
-            let paired = paired.binary_search_by_key(&node, |paired| paired.node).map(|at| &paired[at]);
+        if let Some((coupling, pair)) = coupled {
+            let paired = pair.node(node as usize);
             let is_own =
-                |master: u32| paired.is_ok_and(|paired| paired.is_beside(self.mesh.global_node(master)));
+                |master: u32| paired.is_some_and(|paired| paired.is_beside(self.mesh.global_node(master)));
             coupling.opposites(&body.held, node, force, |master, force| {
                 self.add_and_react(if is_own(master) { own } else { other }, master, &force);
             });

@@ -2,14 +2,14 @@
 
 use super::{
     parts::part_of,
-    sides::{Circumstances, conflict, names_of_sides, rubs},
+    sides::{Circumstances, conflict, meet, names_of_sides, rubs},
 };
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Pair, is_exchanged, pair_of, shares},
+        pairs::{Exchange, Pair, Sharing, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
     job::{self, Job, Scalar, Side, Sliding},
@@ -75,7 +75,9 @@ pub(super) fn find<const D: usize>(
         return Ok(pairs);
     }
     circumstances.untangle(session, mesh, job, &mut pairs)?;
-    leave_shared_nodes(session, job, mesh, &mut pairs)?;
+    circumstances.follow(session, mesh, job, &mut pairs)?;
+    share_sides(session, job, mesh, &mut pairs)?;
+    leave_shared_nodes(session, job, (mesh, circumstances), &mut pairs)?;
     let shares = shares(mesh, &pairs);
     let global =
         |facet: &u32| mesh.facet_nodes(*facet).map(|node| mesh.global_node(node)).collect::<Vec<_>>();
@@ -143,12 +145,127 @@ fn refuse_joined<const D: usize>(
     })
 }
 
+/// Lets the nodes of facets that are on the slave side of several pairs face the other sides of all of them: each node carries the law of the
+/// pair that has the largest part of what it faces, where the laws allow it. Collective.
+fn share_sides<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &mut [Pair<D>],
+) -> Result<(), Agreed> {
+    for at in 0..pairs.len() {
+        if job.contact[pairs[at].contact].against.is_empty() || !pairs[at].sharing.is_empty() {
+            continue;
+        }
+        let mut group = vec![at];
+        let mut seen = 0;
+        while seen < group.len() {
+            for other in at + 1..pairs.len() {
+                let (first, second) = (&pairs[group[seen]], &pairs[other]);
+                let is_apart = !meet(session, &first.on, &second.on);
+                if is_apart || group.contains(&other) || job.contact[second.contact].against.is_empty() {
+                    continue;
+                }
+                let [one, two] = [first, second].map(|pair| &job.contact[pair.contact]);
+                let are_same =
+                    one.has_the_laws_of(two) && first.exchange.is_some() == second.exchange.is_some();
+                let slide = [first.slides, second.slides];
+                let are_alike = one.is_without_scale()
+                    && two.is_without_scale()
+                    && one.redistribute_mass == two.redistribute_mass;
+                if are_same || (are_alike && slide == [false; 2]) {
+                    group.push(other);
+                } else if slide == [true; 2] {
+                    session.agree(Err(refusal_of_laws(job, [first, second])))?;
+                }
+            }
+            seen += 1;
+        }
+        if group.len() > 1 {
+            share_side(session, mesh, pairs, &group)?;
+        }
+    }
+    Ok(())
+}
+
+/// Refuses two pairs that share a slave side and whose laws differ, where bodies slide.
+fn refusal_of_laws<const D: usize>(job: &Job, pairs: [&Pair<D>; 2]) -> Error {
+    let [own, _] = names_of_sides(job, pairs[0]);
+    let held = pairs.into_iter().find(|pair| pair.exchange == Some(Exchange::Held));
+    let remedy = held.map_or_else(
+        || "state the other `side` in both".into(),
+        |pair| format!("let no support hold nodes of {}", names_of_sides(job, pair)[1]),
+    );
+    Error::Refused(format!(
+        "contact.{} and contact.{}: nodes of {own} carry the laws of both, which differ, so that a node that slides from one body to the \
+         other has no law of its own; {remedy}, or give both the same laws",
+        pairs[0].contact, pairs[1].contact
+    ))
+}
+
+/// The same for pairs, given by their positions, that have one slave side. Collective.
+fn share_side<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    pairs: &mut [Pair<D>],
+    group: &[usize],
+) -> Result<(), Agreed> {
+    let all = |nodes: Vec<u32>| -> Result<BTreeSet<u32>, Agreed> {
+        Ok(gather(session.world(), &nodes)?.into_iter().collect())
+    };
+    let nodes_of = |facets: &[u32]| -> Vec<u32> {
+        facets.iter().flat_map(|facet| mesh.facet_nodes(*facet)).map(|node| mesh.global_node(node)).collect()
+    };
+    // Of each node, the position of the pair of which it faces the largest part.
+    let mut most: BTreeMap<u32, (usize, f64)> = BTreeMap::new();
+    for &at in group {
+        for node in pairs[at].nodes.iter().filter(|node| !node.masters.is_empty()) {
+            let kept = most.entry(mesh.global_node(node.node)).or_insert((at, node.weight));
+            // Halves of what a node faces differ by rounding errors.
+            if node.weight > LARGER * kept.1 {
+                *kept = (at, node.weight);
+            }
+        }
+    }
+    let (mut sharing, mut carrying) = (Vec::new(), Vec::new());
+    for &at in group {
+        let Pair { contact, on, against, .. } = pairs[at].clone();
+        let faced = all(nodes_of(&against))?;
+        sharing.push(Sharing { contact, on, against, faced });
+        carrying.push(all(most.iter().filter(|(_, (of, _))| *of == at).map(|(node, _)| *node).collect())?);
+    }
+    let of_all = |facets: fn(&Sharing) -> &Vec<u32>| -> Vec<u32> {
+        sharing.iter().flat_map(facets).copied().collect::<BTreeSet<u32>>().into_iter().collect()
+    };
+    let (on, against) = (of_all(|sharing| &sharing.on), of_all(|sharing| &sharing.against));
+    let own = all(nodes_of(&on))?;
+    let lawless: BTreeSet<u32> = group.iter().flat_map(|at| pairs[*at].lawless.clone()).collect();
+    for (place, &at) in group.iter().enumerate() {
+        let pair = &mut pairs[at];
+        // Nodes that face nothing carry the law of the first pair.
+        let others = carrying.iter().enumerate().filter(|(other, _)| *other != place);
+        pair.of_others = match place {
+            0 => others.flat_map(|(_, nodes)| nodes).copied().collect(),
+            _ => &own - &carrying[place],
+        };
+        pair.lawless.clone_from(&lawless);
+        pair.sharing.clone_from(&sharing);
+        pair.on.clone_from(&on);
+        pair.against.clone_from(&against);
+        pair.form(session, mesh, &mesh.nodes)?;
+    }
+    Ok(())
+}
+
+/// By what factor a part of the surface is larger than another one but for rounding errors.
+const LARGER: f64 = 1.0 + 1e-9;
+
 /// Lets nodes of pairs whose law would act there, and that belong to other contacts, too, leave their part of the surface to neighbours,
 /// where the law allows it. Collective.
 fn leave_shared_nodes<const D: usize>(
     session: &Session,
     job: &Job,
-    mesh: &Mesh<D>,
+    (mesh, circumstances): (&Mesh<D>, &Circumstances<'_, D>),
     pairs: &mut [Pair<D>],
 ) -> Result<(), Agreed> {
     let (mut slaves, mut both) = (Vec::new(), Vec::new());
@@ -166,25 +283,39 @@ fn leave_shared_nodes<const D: usize>(
         }
     }
     let of_obstacles: BTreeSet<u32> = gather(session.world(), &of_obstacles)?.into_iter().collect();
-    for (at, pair) in pairs.iter_mut().enumerate() {
-        let contact = &job.contact[pair.contact];
+    for at in 0..pairs.len() {
+        let contact = &job.contact[pairs[at].contact];
         if contact.against.is_empty() || !contact.is_without_scale() {
             continue;
         }
-        let others = || both.iter().enumerate().filter(|(other, _)| *other != at);
-        let is_shared =
-            |node: &u32| of_obstacles.contains(node) || others().any(|(_, nodes)| nodes.contains(node));
-        pair.lawless = slaves[at].iter().copied().filter(is_shared).collect();
+        let is_together = |other: usize| other == at || pairs[at].shares_with(&pairs[other]);
+        let (own, others): (Vec<usize>, Vec<usize>) = (0..pairs.len()).partition(|other| is_together(*other));
+        let is_shared = |node: &u32| {
+            of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node))
+        };
+        let shared = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared);
+        let pair = &mut pairs[at];
+        pair.lawless.extend(shared);
         if pair.lawless.is_empty() {
             continue;
         }
         pair.form(session, mesh, &mesh.nodes)?;
+        if !pair.sharing.is_empty() || session.total(pair.nodes.len()) > 0 {
+            continue;
+        }
+        let exchanged = circumstances.exchanged(session, (mesh, contact), (&*pair, Exchange::Shared))?;
+        if let Some(mut other) = exchanged {
+            let [own, _] = other.nodes_of_all(session, mesh)?;
+            other.lawless.extend(own.into_iter().filter(is_shared));
+            other.form(session, mesh, &mesh.nodes)?;
+            *pair = other;
+        }
         session.agree(if session.total(pair.nodes.len()) > 0 {
             Ok(())
         } else {
             Err(Error::Refused(format!(
                 "contact.{}: all nodes of the boundary {} belong to other contacts, too, so that none is left for the law; refine the mesh \
-                 there, or state the other `side`",
+                 there",
                 pair.contact,
                 names_of_sides(job, pair)[0]
             )))
@@ -199,6 +330,17 @@ const OR_EXCLUDE: &str = "or exclude the facets around it by `where`";
 /// What to do about a node of two contacts.
 const SHARED: &str = "use `unilateral` with the friction `coulomb` or `tresca`, without wear, adhesion and memory, which leave such nodes to \
                       their neighbours, or exclude the facets around it by the `where` of one of the tables";
+
+/// The same, given the contacts, where all have such laws.
+fn remedy_of_shared(job: &Job) -> &'static str {
+    let mut pairs = job.contact.iter().filter(|contact| !contact.against.is_empty());
+    if pairs.all(job::Contact::is_without_scale) {
+        "give contacts that meet there one table with several boundaries in `on` or `against`, or exclude the facets around it by the `where` \
+         of one of the tables"
+    } else {
+        SHARED
+    }
+}
 
 /// The same for parts of a fault, whose nodes have no neighbours to which they could be left.
 const PARTS_OF_A_FAULT: &str = "give the parts of the fault one table with a friction coefficient that is a formula of the place, such as \
@@ -219,10 +361,11 @@ fn refuse_chains<const D: usize>(
     session.agree(match both {
         None => Ok(()),
         Some(&node) => Err(Error::Refused(format!(
-            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {}{SHARED}",
+            "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {}{}",
             mesh.nodes[mesh.owned_node(node)],
             // Otherwise all sides have been tried.
-            if job.contact.iter().any(|contact| contact.side != Side::Auto) { "delete `side`, " } else { "" }
+            if job.contact.iter().any(|contact| contact.side != Side::Auto) { "delete `side`, " } else { "" },
+            remedy_of_shared(job)
         ))),
     })
 }
@@ -280,7 +423,7 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
             let contact = &job.contact[pair];
             let remedy = match (contact.side, is_exchanged(pairs, pair)) {
                 _ if why.starts_with(ALSO) && contact.against.is_empty() => PARTS_OF_A_FAULT.into(),
-                _ if why.starts_with(ALSO) => SHARED.into(),
+                _ if why.starts_with(ALSO) => remedy_of_shared(job).into(),
                 (Side::Auto, _) => format!("hold both bodies there in the same directions, or none of them, {OR_EXCLUDE}"),
                 (_, true) => format!("delete `side`, {OR_EXCLUDE}"),
                 (_, false) => format!("delete `side`, or exchange `on` and `against`, {OR_EXCLUDE}"),

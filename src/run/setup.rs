@@ -67,7 +67,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);
     warnings.extend(circumstances.warnings(&body.pairs));
     warnings.extend(sides::warnings_of_edges(session, job, &body.mesh, &body.pairs)?);
-    warnings.extend(sides::warnings_of_carriers(session, job, &body.mesh, &body.pairs));
+    warnings.extend(sides::warnings_of_carriers(session, job, &body.pairs));
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };

@@ -106,7 +106,7 @@ impl<'a, const D: usize> Circumstances<'a, D> {
             Some(true) => pair.exchanged(Exchange::Continued),
             _ => pair,
         })?;
-        let is_held = |pair: &Pair<D>| session.total(self.conflicts(contact, pair)) > 0;
+        let is_held = |pair: &Pair<D>| session.total(self.conflicts(mesh, contact, pair).len()) > 0;
         if is_held(&first) {
             let other = formed(first.clone().exchanged(Exchange::Held))?;
             return Ok(if is_held(&other) { first } else { other });
@@ -167,18 +167,12 @@ impl<'a, const D: usize> Circumstances<'a, D> {
     ) -> Result<(), Agreed> {
         let mut least = tangled(session, mesh, job, pairs)?;
         for at in 0..pairs.len() {
-            let number = pairs[at].contact;
-            let contact = &job.contact[number];
-            let is_free = contact.side == Side::Auto && !contact.against.is_empty();
-            if least == 0 || !is_free || self.earlier.contains_key(&number) {
+            let contact = &job.contact[pairs[at].contact];
+            if least == 0 {
                 continue;
             }
-            let mut other = pairs[at].clone().exchanged(Exchange::Faced);
-            other.form(session, mesh, &mesh.nodes)?;
-            let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
-            if session.total(facing) == 0 || session.total(self.conflicts(contact, &other)) > 0 {
-                continue;
-            }
+            let exchanged = self.exchanged(session, (mesh, contact), (&pairs[at], Exchange::Faced))?;
+            let Some(other) = exchanged else { continue };
             let kept = std::mem::replace(&mut pairs[at], other);
             let left = tangled(session, mesh, job, pairs)?;
             if left < least { least = left } else { pairs[at] = kept }
@@ -186,8 +180,76 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         Ok(())
     }
 
-    /// The number of nodes owned here whose law supports prevent.
-    fn conflicts(&self, contact: &job::Contact, pair: &Pair<D>) -> usize {
+    /// Exchanges the sides of pairs whose choice is free and some of whose nodes face those that carry the law of another pair, where supports
+    /// allow it: the facets of the latter can then face the bodies of both. Collective.
+    pub(super) fn follow(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        job: &Job,
+        pairs: &mut [Pair<D>],
+    ) -> Result<(), Agreed> {
+        // An exchange may let others follow.
+        let mut at = 0;
+        while at < pairs.len() {
+            let pair = &pairs[at];
+            at += 1;
+            let contact = &job.contact[pair.contact];
+            if !self.is_free(contact, pair) || pair.exchange.is_some() {
+                continue;
+            }
+            let [_, faced] = pair.nodes_of_all(session, mesh)?;
+            let mut is_faced = false;
+            for other in pairs.iter().filter(|other| other.contact != pair.contact) {
+                if meet(session, &other.on, &pair.against) {
+                    let [own, _] = other.nodes_of_all(session, mesh)?;
+                    is_faced |= own.intersection(&faced).next().is_some();
+                }
+            }
+            if is_faced
+                && let Some(other) = self.exchanged(session, (mesh, contact), (pair, Exchange::Faced))?
+            {
+                pairs[at - 1] = other;
+                at = 0;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the sides of a pair may be exchanged.
+    fn is_free(&self, contact: &job::Contact, pair: &Pair<D>) -> bool {
+        let earlier = self.earlier.get(&pair.contact);
+        let was_other = earlier.is_none_or(|exchanged| *exchanged != pair.exchange.is_some());
+        contact.side == Side::Auto && !contact.against.is_empty() && was_other
+    }
+
+    /// A pair with its sides exchanged for this reason, if the choice is free and supports allow it, where the law allows it by leaving what
+    /// they hold to neighbours. Collective.
+    pub(super) fn exchanged(
+        &self,
+        session: &Session,
+        (mesh, contact): (&Mesh<D>, &job::Contact),
+        (pair, why): (&Pair<D>, Exchange),
+    ) -> Result<Option<Pair<D>>, Agreed> {
+        if !self.is_free(contact, pair) {
+            return Ok(None);
+        }
+        let mut other = pair.clone().exchanged(why);
+        other.lawless.clear();
+        other.form(session, mesh, &mesh.nodes)?;
+        let held = self.conflicts(mesh, contact, &other);
+        let is_held = session.total(held.len()) > 0;
+        if is_held && contact.is_without_scale() {
+            other.lawless = gather(session.world(), &held)?.into_iter().collect();
+            other.form(session, mesh, &mesh.nodes)?;
+        }
+        let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
+        let is_left = is_held && (other.lawless.is_empty() || session.total(usize::from(other.is_bare)) > 0);
+        Ok((session.total(facing) > 0 && !is_left).then_some(other))
+    }
+
+    /// The nodes owned here whose law supports prevent, by global numbers.
+    fn conflicts(&self, mesh: &Mesh<D>, contact: &job::Contact, pair: &Pair<D>) -> Vec<u32> {
         let free = |master: &u32, direction: &Vector<D>| -> f64 {
             let held = self.directions.get(master).into_iter().flatten();
             norm(&held.fold(*direction, |left, held| add_scaled(&left, -dot(held, direction), held)))
@@ -198,7 +260,7 @@ impl<'a, const D: usize> Circumstances<'a, D> {
             };
             conflict(node, &self.held, rubs(contact), facing).is_some()
         });
-        nodes.count()
+        nodes.map(|node| mesh.global_node(node.node)).collect()
     }
 
     /// What the user should know about a choice that differs from that of the run from whose state this one starts.
@@ -215,6 +277,11 @@ impl<'a, const D: usize> Circumstances<'a, D> {
         };
         changed.map(words).collect()
     }
+}
+
+/// Whether two lists of facets, ascending, have any in common. Collective.
+pub(super) fn meet(session: &Session, one: &[u32], other: &[u32]) -> bool {
+    session.total(one.iter().filter(|facet| other.binary_search(facet).is_ok()).count()) > 0
 }
 
 /// Whether the law of a contact depends on velocities or displacements along the boundary.
@@ -288,16 +355,15 @@ pub(super) fn warnings_of_edges<const D: usize>(
     Ok(out)
 }
 
-/// Warnings about wear that stays with the nodes of the other body, and about facets of which two contacts leave all nodes without a law.
+/// Warnings about wear that stays with the nodes of the other body, and about facets of which contacts leave all nodes without a law.
 /// Collective, with the same warnings on all ranks.
 pub(super) fn warnings_of_carriers<const D: usize>(
     session: &Session,
     job: &Job,
-    mesh: &Mesh<D>,
     pairs: &[Pair<D>],
 ) -> Vec<String> {
     let mut out = Vec::new();
-    for (at, pair) in pairs.iter().enumerate() {
+    for pair in pairs {
         let [own, other] = names_of_sides(job, pair);
         if let Some(reason) =
             pair.exchange.filter(|_| pair.slides && job.contact[pair.contact].wear.is_some())
@@ -312,22 +378,13 @@ pub(super) fn warnings_of_carriers<const D: usize>(
                 pair.contact
             ));
         }
-        for second in &pairs[at + 1..] {
-            let is_left = |node: &u32| {
-                let node = mesh.global_node(*node);
-                pair.lawless.contains(&node) && second.lawless.contains(&node)
-            };
-            let spans = |facet: &&u32| mesh.facet_nodes(**facet).all(|node| is_left(&node));
-            let [spanning] =
-                session.largest([f64::from(u8::from(pair.on.iter().any(|facet| spans(&facet))))]);
-            if spanning > 0.0 {
-                let [_, others] = names_of_sides(job, second);
-                out.push(format!(
-                    "contact.{} and contact.{}: facets of {own} that face both {other} and {others} carry no law, so that pressures beside them \
-                     may be wrong by half; give both one table with on = [...], or let nodes of {own} lie where they meet",
-                    pair.contact, second.contact
-                ));
-            }
+        if session.total(usize::from(pair.is_bare)) > 0 {
+            out.push(format!(
+                "contact.{}: facets of {own} that face {other} carry no law, because all their nodes belong to other contacts, too, so that \
+                 pressures beside them may be wrong by half; give contacts that meet there one table with on = [...], or let nodes of {own} \
+                 lie where they meet",
+                pair.contact
+            ));
         }
     }
     out
@@ -437,6 +494,7 @@ pub(super) fn lines<const D: usize>(job: &Job, pairs: &[Pair<D>]) -> Vec<String>
             Exchange::Coarser => format!("because the mesh of {on} is coarser"),
             Exchange::Stiffer => format!("because {on} is more than {STIFFER} times as stiff"),
             Exchange::Faced => format!("because {on} is faced in another contact"),
+            Exchange::Shared => format!("because all nodes of {on} belong to other contacts, too"),
         };
         Some(format!("contact    contact.{}: nodes of {against} carry the law, {why}", pair.contact))
     };

@@ -1043,41 +1043,104 @@ fn the_side_of_a_much_softer_body_carries_the_law() {
     }
 }
 
-#[test]
-fn facets_that_two_contacts_leave_without_a_law_and_wear_of_the_other_body_are_warned_of() {
-    let blocks = |cells: u32| {
-        let table = |of: &str| {
-            format!(
-                "[[contact]]\non = [\"{of}.bottom\"]\nagainst = [\"p.top\"]\nnormal.unilateral = {{}}\n\
-                 friction.coulomb.coefficient = 0.3\n"
-            )
-        };
-        Case::written_as(&format!(
-            "[[mesh.rectangle]]\nname = \"p\"\nsize = [2, 1]\ncells = [{cells}, 2]\n\
-             [[mesh.rectangle]]\nname = \"l\"\ncorner = [0, 1]\nsize = [1, 1]\ncells = [6, 2]\n\
-             [[mesh.rectangle]]\nname = \"r\"\ncorner = [1, 1]\nsize = [1, 1]\ncells = [8, 2]\n\
-             [material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0 }}\n\
-             [[support]]\non = [\"p.bottom\"]\nfix = \"all\"\n[[support]]\non = [\"l.left\", \"r.right\"]\nfix = [\"x\"]\n\
-             [[traction]]\non = [\"l.top\", \"r.top\"]\nvalue = [0, -1000]\n{}{}\
-             [time]\nscheme = \"implicit_euler\"\nend = 1\nstep = 1\n",
-            table("l"),
-            table("r")
-        ))
+/// Two blocks side by side, pressed by 1 kPa on a plate with this number of cells, each with a contact; supports hold their outer sides.
+fn two_punches(cells: u32) -> Case {
+    let table = |of: &str| {
+        format!(
+            "[[contact]]\non = [\"{of}.bottom\"]\nagainst = [\"p.top\"]\nnormal.unilateral = {{}}\n\
+             friction.coulomb.coefficient = 0.3\n"
+        )
     };
+    Case::written_as(&format!(
+        "[[mesh.rectangle]]\nname = \"p\"\nsize = [2, 1]\ncells = [{cells}, 2]\n\
+         [[mesh.rectangle]]\nname = \"l\"\ncorner = [0, 1]\nsize = [1, 1]\ncells = [6, 2]\n\
+         [[mesh.rectangle]]\nname = \"r\"\ncorner = [1, 1]\nsize = [1, 1]\ncells = [8, 2]\n\
+         [material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0 }}\n\
+         [[support]]\non = [\"p.bottom\"]\nfix = \"all\"\n[[support]]\non = [\"l.left\", \"r.right\"]\nfix = [\"x\"]\n\
+         [[traction]]\non = [\"l.top\", \"r.top\"]\nvalue = [0, -1000]\n{}{}\
+         [time]\nscheme = \"implicit_euler\"\nend = 1\nstep = 1\n",
+        table("l"),
+        table("r")
+    ))
+}
+
+/// A facet under both blocks faces both, also where a support of the plate prevents the law at an end of it, and where bodies slide.
+#[test]
+fn uniform_stress_passes_through_facets_that_face_the_bodies_of_two_contacts() {
+    let one_held = "[{ on = ['p.bottom'], fix = ['y'] }, { on = ['p.left', 'r.right'], fix = ['x'] }]";
+    let both_held = "[{ on = ['p.bottom'], fix = 'all' }, { on = ['l.left', 'r.right'], fix = ['x'] }]";
+    for (order, sliding, support, ranks) in [
+        ("1", "'small'", both_held, 1),
+        ("2", "'small'", both_held, 2),
+        ("1", "'finite'", both_held, 2),
+        ("2", "'finite'", both_held, 1),
+        ("1", "'small'", one_held, 3),
+        ("2", "'small'", one_held, 1),
+    ] {
+        let case = two_punches(7).set("mesh.order", order).set("support", support);
+        let case =
+            case.set("contact.0.sliding", sliding).set("contact.1.sliding", sliding).run_and_keep(ranks);
+        assert!(!log_of(&case).contains("warning"), "{}", log_of(&case));
+        let table = case.results().table("resultants.csv");
+        for source in ["contact l.bottom", "contact r.bottom"] {
+            for column in ["force_y", "largest_pressure"] {
+                let found = table.only("source", source).last(column);
+                assert!((found - 1000.0).abs() < 1e-6, "order {order}, {sliding}: {source} {column} {found}");
+            }
+        }
+    }
+    let differ = two_punches(7).set("contact.0.friction.coulomb.coefficient", "0.2");
+    differ
+        .set("contact.0.sliding", "'finite'")
+        .set("contact.1.sliding", "'finite'")
+        .run_with(2, &[])
+        .expect(2)
+        .says("nodes of p.top carry the laws of both, which differ");
+}
+
+/// Blocks of which the side of one has a single facet, between a plate and another block.
+#[test]
+fn a_side_whose_nodes_all_belong_to_other_contacts_leaves_the_law_to_the_other_side() {
+    let case = two_punches(7)
+        .set(
+            "mesh.rectangle",
+            "[{ name = 'p', size = [2, 1], cells = [7, 2] }, { name = 'l', corner = [0, 1], size = [1, 1], cells = [6, 1] }, \
+              { name = 'r', corner = [1, 1], size = [1, 1], cells = [8, 3] }, { name = 'u', corner = [0, 2], size = [2, 1], cells = [5, 2] }]",
+        )
+        .set(
+            "contact",
+            "[{ on = ['l.bottom'], against = ['p.top'], normal.unilateral = {} }, \
+              { on = ['r.bottom'], against = ['p.top'], normal.unilateral = {} }, \
+              { on = ['u.bottom'], against = ['l.top', 'r.top'], normal.unilateral = {} }, \
+              { on = ['l.right'], against = ['r.left'], normal.unilateral = {} }]",
+        )
+        .set("support", "[{ on = ['p.bottom'], fix = 'all' }, { on = ['l.left', 'r.right', 'u.left'], fix = ['x'] }]")
+        .set("traction", "[{ on = ['u.top'], value = [0, -1000] }]")
+        .run_and_keep(2);
+    assert!(log_of(&case).contains("because all nodes of l.right belong to other contacts"));
+    let found =
+        case.results().table("resultants.csv").only("source", "contact u.bottom").last("largest_pressure");
+    assert!((found - 1000.0).abs() < 1e-6, "{found} Pa");
+}
+
+#[test]
+fn facets_that_contacts_leave_without_a_law_and_wear_of_the_other_body_are_warned_of() {
     let said = |case: &Case, ranks: usize| {
         let job = case.written();
         launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0)
     };
-    let words = "facets of p.top that face both l.bottom and r.bottom carry no law";
+    let words = "facets of p.top that face l.bottom carry no law";
+    let held = "[{ on = ['p.bottom'], fix = 'all' }, { on = ['l.left', 'r.top'], fix = ['x'] }]";
+    let mixed = |cells: u32| two_punches(cells).set("contact.1.side", "'on'").set("support", held);
     for ranks in [1, 2, 3] {
-        said(&blocks(7), ranks).says(words);
+        said(&mixed(7), ranks).says(words);
     }
     // Where a node lies between the blocks each facet faces one of them.
-    let text = launch::unwrapped(&said(&blocks(8), 2).stdout);
+    let text = launch::unwrapped(&said(&mixed(8), 2).stdout);
     assert!(!text.contains("carry no law"), "{text}");
     let worn = "[{ on = ['l.bottom'], against = ['p.top'], sliding = 'finite', normal = { unilateral = {} }, \
                 friction = { coulomb = { coefficient = 0.3 } }, wear = { coefficient = 1e-9 } }]";
-    let wears = blocks(8)
+    let wears = two_punches(8)
         .set("contact", worn)
         .set("support", "[{ on = ['p.bottom', 'r.top'], fix = 'all' }, { on = ['l.left'], fix = ['x'] }]");
     said(&wears, 2).says("nodes of p.top carry the law and keep the wear, so that p.top wears, not l.bottom");
@@ -1100,6 +1163,12 @@ fn a_stage_keeps_the_side_that_carries_the_law() {
     );
     let outcome = second(&format!("{table}, side = 'on'")).run_with(1, &[]).expect(0);
     outcome.says("contact.0: the other side carried the law in the run from which this one starts");
+    // Also where the side is that of another contact, too, and a support of it holds a node.
+    let held = "[{ on = ['p.bottom'], fix = ['y'] }, { on = ['p.left', 'r.right'], fix = ['x'] }]";
+    let punches = || two_punches(7).set("support", held);
+    let first = punches().set("checkpoint.every", "1").run_and_keep(1);
+    let log = log_of(&punches().set("initial.from", &from(&first)).run_and_keep(2));
+    assert!(!log.contains("warning") && log.contains("l.bottom is faced in another contact"), "{log}");
 }
 
 /// Three blocks that touch each other and meet at an edge, the lower and the right one on a rigid plane; each contact has the entries `law`.

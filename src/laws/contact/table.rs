@@ -52,7 +52,8 @@ impl Sliding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
-    /// Those in `on`, unless supports hold nodes there and not what they face, or, with `sliding = "finite"`, corners or edges of `against` lie
+    /// Those in `on`, unless supports hold nodes there and not what they face, or the law of another contact acts at what they face, or all
+    /// their nodes belong to other contacts, too, or, with `sliding = "finite"`, corners or edges of `against` lie
     /// over them where the bodies are nearest to each other, or their body is more than 100 times as stiff, or, of bodies that are not,
     /// their mesh is clearly coarser: they face more than twice as many nodes of `against` as they have themselves, in 3D more than four
     /// times as many. Then those in `against`, if supports do not hold nodes there in the same way and, for a stiffer body or a coarser
@@ -86,7 +87,9 @@ pub struct Contact {
     /// the undeformed bodies; friction, adhesion, memory and wear as against an obstacle. The better side is that of the softer body, or with
     /// the finer mesh, with corners and without supports. The distance of the undeformed surfaces is that of the mesh, whose facets are
     /// straight; `gap` of the normal law adds to it, so that a negative one is an interference, whose work counts as negative contact
-    /// dissipation. Absent: an obstacle or `gap`.
+    /// dissipation. Several contacts may have one boundary, as of a plate under two blocks: where their laws act at its nodes, a node has
+    /// the law of the contact that it faces most, on its velocity relative to all that it faces, if the laws are the same or, with
+    /// `sliding = "small"`, `unilateral` with the friction `coulomb` or `tresca`. Absent: an obstacle or `gap`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1), example = ["top"])]
     pub against: Vec<String>,
@@ -174,6 +177,12 @@ impl Contact {
             matches!(self.friction, None | Some(FrictionLaw::Tresca(_) | FrictionLaw::Coulomb(_)));
         let keeps_more = self.wear.is_some() || self.adhesion.is_some() || self.memory.is_some();
         is_constraint && has_bound && !keeps_more
+    }
+
+    /// Whether its laws are those of another contact, whatever the boundaries.
+    pub fn has_the_laws_of(&self, other: &Self) -> bool {
+        let Self { on, against, side, part, .. } = self.clone();
+        self == &Self { on, against, side, part, ..other.clone() }
     }
 
     /// The shares of the heat of friction that enter the body of `on` and, if there is one, that of `against`.
