@@ -69,6 +69,30 @@ fn multigrid_takes_as_many_iterations_as_it_did() {
     ]);
 }
 
+/// A pressed pair of curved blocks whose nodes touch and part in turn under full steps, where a line search takes fifty short ones.
+#[test]
+fn a_pair_of_quadratic_cells_that_full_steps_turn_round_takes_few_iterations() {
+    let case = Case::written_as(
+        "
+        mesh.order = 2
+        mesh.rectangle = [{name = 'l', size = [1.0, 0.5], cells = [12, 6]},
+                          {name = 'u', corner = [0.0, 0.5], size = [1.0, 0.5], cells = [30, 10]}]
+        time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+        support = [{on = ['l.bottom'], fix = 'all'}, {on = ['u.left', 'l.left'], fix = ['x']}]
+        traction = [{on = ['u.top'], value = [0.0, -7.5e5]}]
+        region = [{name = 'l', material.elasticity = {youngs_modulus = 3e9, poisson_ratio = 0.2}}]
+        [material]
+        hypothesis = 'plane_strain'
+        elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.3}
+        [[contact]]
+        on = ['l.top']
+        against = ['u.bottom']
+        normal.unilateral.gap = '0.25*x^2'",
+    );
+    let found = case.run(1).number("newton_iterations");
+    assert!(found <= 30.0, "{found} iterations");
+}
+
 /// A force moves an obstacle at about the cost of its motion if it is prescribed.
 #[test]
 fn an_obstacle_moved_by_a_force_takes_as_many_iterations_as_one_whose_motion_is_given() {
