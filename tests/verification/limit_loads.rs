@@ -65,6 +65,30 @@ fn cantilever(session: &Session, order: usize) {
     }
 }
 
+/// A strip that only its bonds hold, under a support that lifts its tip by more than they bear where it follows as a rigid body.
+fn held_by_bonds(session: &Session, law: &str) {
+    let job = |step: f64| {
+        format!(
+            "{}[time]\nscheme = \"implicit_euler\"\nend = 1\nstep = {step}\n[solver]\naccept = [\"uniqueness\"]\n\
+             [material]\nhypothesis = \"plane_stress\"\nelasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0 }}\n\
+             [[support]]\non = [\"right\"]\nfix = [\"y\"]\ndisplacement = [\"2e-4*t\"]\n\
+             [[support]]\non = [\"left\"]\nfix = [\"x\"]\n\
+             [[contact]]\non = [\"bottom\"]\nwhere = \"x < 0.15\"\n{law}",
+            any_mesh::<2>()
+        )
+    };
+    let whole = plate([0.2, 0.01], [20, 2]);
+    let ends = [1.0, 0.25].map(|step| {
+        let what = format!("strip held by bonds, steps of {step} s, {law}");
+        let (totals, _) = run(session, &job(step), &whole, &what);
+        println!("{what}: {} J, numerical {}", totals.energy[ELASTIC], totals.energy[NUMERICAL]);
+        assert!(totals.energy[NUMERICAL] > 0.0, "{what}: energy out of nothing");
+        totals.energy[ELASTIC]
+    });
+    assert!(ends[0] > 1e-3);
+    assert_close(ends[0], ends[1], 1e-8, law);
+}
+
 /// A block hangs on springs and is drawn from a foundation whose tension falls with the distance, by a growing force: beyond the limit
 /// load it springs back onto the springs. There its shift is that of the springs under the mean traction.
 fn snap_through(session: &Session, order: usize) {
@@ -118,6 +142,13 @@ fn all(session: &Session) {
         cantilever(session, order);
         snap_through(session, order);
     }
+    let graph = "[[-1e-4, 0], [-2e-6, -2e5], [0, 0]]";
+    held_by_bonds(
+        session,
+        &format!("normal.displacement_graph = {{ points = {graph}, slope_after = inf }}\n"),
+    );
+    let bonds = "adhesion = { stiffness = 1e11, energy = 10, strength = 2e5 }";
+    held_by_bonds(session, &format!("normal.unilateral = {{}}\n{bonds}\n"));
     pad(session, 0.03, 1e-4, 0.03);
     pad(session, 0.1, 1e-5, 0.003);
 }

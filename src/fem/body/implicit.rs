@@ -92,6 +92,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         !self.is_explicit() && self.surface_effects.iter().any(|e| e.softens())
     }
 
+    /// Whether the body may come loose in a step from what holds it at its surface: forces of bonds or of contact fall as it moves away.
+    pub fn may_come_loose(&self) -> bool {
+        self.softens_at_surface() || self.contacts.iter().any(|c| c.monotonicity_constant() > 0.0)
+    }
+
     /// Energies of a solved step that is not yet committed; writes trial histories, unless they are those of this displacement.
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
         let evaluation = self.evaluation;

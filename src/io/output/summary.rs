@@ -335,28 +335,27 @@ impl Summary {
                 self.peaks.strain
             )
         });
+        // Explicit stresses have a limit of their own.
+        let is_implicit = self.certificates.explicit_step_bound.is_none();
+        let generated = (is_implicit && self.energy_of_scheme > LARGEST_GENERATION).then(|| {
+            let share = Digits(100.0 * self.energy_of_scheme);
+            format!("the time scheme {} has generated {share} % of the energy that was supplied", self.scheme)
+        });
         let unresolved = (self.unresolved_steps > 0).then(|| {
+            let generated = generated.as_ref().map_or_else(String::new, |generated| format!("; {generated}"));
             format!(
-                "steps in which damage or bonds fail faster than the steps resolve: {}, named in run.log; their dissipated energy is too \
-                 large, and where they end may depend on the steps: let [time.adaptive] choose these, with a smaller tolerance and \
-                 smallest_step if it does",
+                "steps in which damage or bonds fail faster than the steps resolve: {}, named in run.log; their dissipated energy is too                  large, and where they end may depend on the steps: let [time.adaptive] choose these, with a smaller tolerance and                  smallest_step if it does{generated}",
                 self.unresolved_steps
             )
         });
-        // Explicit stresses have a limit of their own.
-        let is_implicit = self.certificates.explicit_step_bound.is_none();
-        let generated = (is_implicit && self.energy_of_scheme > LARGEST_GENERATION && self.unresolved_steps == 0).then(|| {
+        let generated = generated.filter(|_| unresolved.is_none()).map(|generated| {
             let cause = if self.effects.contains(&"inertia") {
                 "vibrations and impacts without damping can cause: implicit_euler and [material.damping] stiffness damp them, and midpoint \
                  conserves energy"
             } else {
                 "laws can cause that change much within a step: use a smaller [time] step"
             };
-            format!(
-                "the time scheme {} has generated {:.1} % of the energy that was supplied, which {cause}",
-                self.scheme,
-                100.0 * self.energy_of_scheme
-            )
+            format!("{generated}, which {cause}")
         });
         slip.into_iter().chain(rate).chain(strain).chain(unresolved).chain(generated)
     }

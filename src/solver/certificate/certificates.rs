@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Certificates {
-    /// Below 1: the continuous problem has one solution. `m_j sup |w_nu|^2 / (A e(w), e(w))`.
+    /// Below 1: the continuous problem has one solution. `m_j sup |w_nu|^2 / (A e(w), e(w))`; null if it is infinite, too, because the supports do
+    /// not prevent a rigid motion against the contact.
     pub theta: Option<f64>,
     /// Below 1: each step has one solution. The same with the matrix of a step, and with the sums over its quadrature points.
     pub theta_step: Option<f64>,

@@ -103,7 +103,13 @@ impl Certificates {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
             known.theta_step = Some(if falling { suprema.find(Supremum::ThetaStep)? } else { 0.0 });
             if viscous && decrease.is_none() {
-                known.theta = Some(if falling { suprema.find(Supremum::Theta)? } else { 0.0 });
+                known.theta = Some(match falling {
+                    true if moves_rigidly(session, body, falling_directions(body, length), false)? => {
+                        f64::INFINITY
+                    }
+                    true => suprema.find(Supremum::Theta)?,
+                    false => 0.0,
+                });
             }
             let normals = body.contacts.iter().flat_map(|contact| contact.normal.boundary().directions());
             if !moves_rigidly(session, body, normals, false)? {
@@ -166,6 +172,19 @@ impl Certificates {
         let range = matrix.range;
         Ok(Some(1.0 / Suprema::new(session, body, state, matrix, range).find(Supremum::UniqueStep)?))
     }
+}
+
+/// The nodes at which laws of contact and friction fall, with the directions in which they do.
+fn falling_directions<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    length: f64,
+) -> impl Iterator<Item = (usize, Vector<D>)> {
+    body.contacts.iter().flat_map(move |contact| {
+        let [along, across] = contact.laws().monotonicity_constants(length).map(|fall| fall > 0.0);
+        let normals = contact.normal.boundary().directions().filter(move |_| along);
+        let friction = contact.friction.iter().filter(move |_| across);
+        normals.chain(friction.flat_map(Friction::directions))
+    })
 }
 
 /// Whether a rigid motion of a body moves these nodes along these directions without resistance of the supports, and of the inertia

@@ -23,6 +23,8 @@ const LAGGING_FALL: f64 = 2e-3;
 const LAGGING_STEP: f64 = 0.02;
 /// The share of a step below which the stability bound is a rounding error of 0.
 const NOTHING: f64 = 1e-9;
+/// Why a supremum is infinite.
+const RIGID: &str = "(the supports do not prevent a rigid motion against the contact)";
 
 impl Certificates {
     /// Evaluates the certificates for a fixed step of this length. `unique_step` is the largest step for which `theta_step` is
@@ -35,17 +37,19 @@ impl Certificates {
         }
         let covered = if self.not_covered.is_empty() { "" } else { ", except for what is not covered" };
         if let Some(theta) = self.theta {
+            let size =
+                if theta == f64::INFINITY { format!("infinite {RIGID}") } else { Digits(theta).to_string() };
             let meaning = if theta < 1.0 {
                 "below 1: the continuous problem has one solution"
             } else {
                 verdict.warnings.push(format!(
-                    "theta = {} is not below 1: the continuous problem may have several solutions; to \
-                     exclude this, increase the viscosity or use a contact law that decreases less steeply",
-                    Digits(theta)
+                    "theta = {size} is not below 1: the continuous problem may have several solutions; to \
+                     exclude this, {} or use a contact law that decreases less steeply",
+                    if theta == f64::INFINITY { "add supports" } else { "increase the viscosity" }
                 ));
                 "not below 1: the continuous problem may have several solutions"
             };
-            verdict.words.push(format!("theta = {}, {meaning}{covered}", Digits(theta)));
+            verdict.words.push(format!("theta = {size}, {meaning}{covered}"));
         }
         let fall = self.monotonicity_constant.filter(|_| self.decrease_with_displacement.is_none());
         if let (Some(modulus), Some(fall)) = (self.viscosity_modulus, fall) {
@@ -58,7 +62,7 @@ impl Certificates {
             let size = if product < f64::INFINITY {
                 format!("{} Pa s", Digits(product))
             } else {
-                "infinite (the supports do not prevent a rigid motion against the contact)".to_owned()
+                format!("infinite {RIGID}")
             };
             verdict.words.push(format!(
                 "m_A = {} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) of Wang and Cheng (2022) {meaning}",
@@ -317,9 +321,14 @@ mod tests {
 
     #[test]
     fn theta_beyond_one_alone_warns() {
-        let known = Certificates { theta: Some(1.5), ..paper() };
-        let verdict = known.verdict(1.0 / 64.0, None, &[]);
-        assert!(verdict.refusals.is_empty() && verdict.warnings.len() == 1);
+        for (theta, size) in
+            [(1.5, "theta = 1.5 is not"), (f64::INFINITY, "theta = infinite (the supports do not")]
+        {
+            let known = Certificates { theta: Some(theta), ..paper() };
+            let verdict = known.verdict(1.0 / 64.0, None, &[]);
+            assert!(verdict.refusals.is_empty() && verdict.warnings.len() == 1);
+            assert!(verdict.warnings[0].starts_with(size), "{:?}", verdict.warnings);
+        }
     }
 
     #[test]

@@ -331,12 +331,13 @@ impl Stepper {
             let open = supports.write_residual(&self.solver, (&self.trial, &self.right_hand_side))?;
             if open > FAR * scale && !body.has_form(Form::Mass) {
                 let length = self.integrator.matrix_length(step);
-                let following = supports.follow(
-                    &mut self.solver,
-                    body,
-                    (&mut self.trial, &self.right_hand_side),
-                    length,
-                )?;
+                let begin = (&self.trial, &self.right_hand_side);
+                let (followed, following) = supports.follow(&mut self.solver, body, begin, length)?;
+                // That a body comes loose from bonds or a falling law, and follows freely, is a solution, too: the one in which it is still
+                // held is near where it was.
+                if !body.may_come_loose() {
+                    self.trial.copy_from(&followed)?;
+                }
                 (norm, scale) = (supports.known.norm()?.max(following), scale.max(following));
             } else {
                 scale = scale.max(open);

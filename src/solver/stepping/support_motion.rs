@@ -115,24 +115,25 @@ impl MovingSupports {
         self.held.norm()
     }
 
-    /// Lets a velocity whose residual was written follow the supports, as far as contact alone does not hold the body. Returns the norm in N
-    /// of the forces in the body, those of supports among them: they are not those with which supports that move ahead would press it.
-    /// Collective.
+    /// A velocity whose residual was written, after it has followed the supports, as far as contact alone does not hold the body, and the
+    /// norm in N of the forces in the body, those of supports among them: they are not those with which supports that move ahead would
+    /// press it. Collective.
     pub(super) fn follow<const D: usize, const S: usize>(
         &mut self,
         solver: &mut StepSolver,
         body: &Body<D, S>,
-        (velocity, forces): (&mut DistributedVector, &DistributedVector),
+        (velocity, forces): (&DistributedVector, &DistributedVector),
         length: f64,
-    ) -> Result<f64> {
-        let mut change = velocity.like()?;
+    ) -> Result<(DistributedVector, f64)> {
+        let (mut followed, mut change) = (velocity.like()?, velocity.like()?);
+        followed.copy_from(velocity)?;
         let mut open = self.held.norm()?;
         for _ in 0..MOST_CORRECTIONS {
             solver.precondition(&self.held, &mut change)?;
-            velocity.add_scaled(-1.0, &change)?;
-            let left = self.write_residual(solver, (velocity, forces))?;
+            followed.add_scaled(-1.0, &change)?;
+            let left = self.write_residual(solver, (&followed, forces))?;
             if left.is_nan() || left > open {
-                velocity.add_scaled(1.0, &change)?;
+                followed.add_scaled(1.0, &change)?;
                 break;
             }
             let is_slow = left > LEAST_REDUCTION * open;
@@ -141,7 +142,7 @@ impl MovingSupports {
                 break;
             }
         }
-        change.copy_from(velocity)?;
+        change.copy_from(&followed)?;
         match &body.coupling {
             Some(coupling) => coupling.make_absolute(&body.held, &mut change)?,
             None => change.update_ghosts()?,
@@ -153,7 +154,8 @@ impl MovingSupports {
             body.add_matrix_product(length, &velocity, &mut self.values, &mut sum);
         }
         sum.add_ghosts_to_owners()?;
-        Ok(sum.norm()?.max(open))
+        let forces = sum.norm()?.max(open);
+        Ok((followed, forces))
     }
 
     /// The work in J of the supports in a step that was solved, with this velocity with ghosts, and not yet committed. Collective.
