@@ -1,8 +1,8 @@
 //! What effects and formulas cost: `cargo bench --bench effects -- [--write]`.
 //!
 //! Runs scenes of `jobs/`, most of them on finer meshes, with all their effects and without one of them at a time
-//! (`solver study --ablate`), and scenes with built-in laws and with the same laws written as formulas. `--write` puts the tables into
-//! docs/speed.md.
+//! (`solver study --ablate`), and scenes with built-in laws and with the same laws written as formulas. `--write` puts the table of effects
+//! into docs/speed.md.
 
 #[path = "table/mod.rs"]
 mod table;
@@ -237,15 +237,15 @@ fn study(job: &str, set: &[&str], rest: &str, options: &[&str]) -> Value {
     serde_json::from_str(&results).expect("an object")
 }
 
-/// The rows of the table of formulas.
-fn formulas() -> String {
-    let mut rows = String::from(
+/// Prints what laws cost as formulas, and how far their answers are from those of the built-in laws.
+fn print_formulas() {
+    println!(
         "| law | job, changed by | s of steps: built-in, formula | ratio | Newton iterations | difference of velocity, stress |\n\
-         |---|---|--:|--:|--:|--:|\n",
+         |---|---|--:|--:|--:|--:|"
     );
-    print!("{rows}");
     for Formula { law, job, set, formula } in &FORMULAS {
-        let norm = |of: &str, space: &str| format!("[[norm]]\nof = \"{of}\"\nin = \"{space}\"\nover = \"max\"\n");
+        let norm =
+            |of: &str, space: &str| format!("[[norm]]\nof = \"{of}\"\nin = \"{space}\"\nover = \"max\"\n");
         let rest = format!(
             "[[run]]\nname = \"built_in\"\n[[run]]\nname = \"formula\"\nset = [{formula:?}]\n[reference.run]\n{}{}",
             norm("velocity", "H"),
@@ -262,7 +262,7 @@ fn formulas() -> String {
             let relative = &found["runs"][1]["errors"][at]["relative"];
             format!("{:.0e}", relative.as_f64().unwrap_or_else(|| panic!("{law}: {found}")))
         };
-        let row = format!(
+        println!(
             "| {law} | `{job}` {} | {:.2}, {:.2} | {:.2} | {} | {} |",
             set[..set.len() - 1].join(" ").replace('|', "\\|"),
             seconds[0],
@@ -271,17 +271,14 @@ fn formulas() -> String {
             newton.join(", "),
             [0, 1].map(difference).join(", ")
         );
-        println!("{row}");
-        writeln!(rows, "{row}").expect("text");
     }
-    rows
 }
 
 fn main() {
     let writes = std::env::args().any(|word| word == "--write");
     let mut triad = Triad::new();
     let bandwidth = BYTES as f64 / fastest(&mut || triad.run());
-    let formulas = formulas();
+    print_formulas();
     let mut rows = String::from(
         "| effect | job, changed by | s with it | s without | ratio | change of displacement, stress |\n|---|---|--:|--:|--:|---|\n",
     );
@@ -312,8 +309,6 @@ fn main() {
         }
     }
     if writes {
-        let command = "make bench-effects ARGS=--write";
-        table::write("docs/speed.md", "effects", command, bandwidth, &rows);
-        table::write("docs/speed.md", "formulas", command, bandwidth, &formulas);
+        table::write("docs/speed.md", "effects", "make bench-effects ARGS=--write", bandwidth, &rows);
     }
 }

@@ -1,9 +1,10 @@
 //! Points that may slide along an obstacle any distance.
 //!
 //! In each step such a point faces a plane, whose distance is that from where the point is at the end of the step if it goes on at its
-//! velocity, along the normal that it sees in the middle of this way: on a circle it is then at right angles to the chord along which the
-//! point moves, and without friction its speed stays the same. A formula of two steps, whose equations hold at the end, requires the normal
-//! there. Distance and normal follow from displacement and velocity at the start of the step. Nothing else is kept.
+//! velocity, along the normal that it sees where the equations of the step hold. At the end of the step the forces of a smooth obstacle on a
+//! surface that slides under it are then in equilibrium, so that without friction there is no drag. In its middle the normal is on a circle at
+//! right angles to the chord along which the point moves, and without friction its speed stays the same. Distance and normal follow from
+//! displacement and velocity at the start of the step. Nothing else is kept.
 
 use super::{Contact, point::Point};
 use crate::{
@@ -19,7 +20,7 @@ impl<const D: usize> Contact<D> {
         let Some(undeformed) = point.undeformed() else { return };
         let (moved, velocity) = (point.value(displacement), point.value(velocity));
         let ahead = |share: f64| add_scaled(&moved, share * step.length, &velocity);
-        let share = if self.blend.earlier == 0.0 { 0.5 } else { 1.0 };
+        let share = if self.blend.extrapolates() { 0.5 } else { 1.0 };
         let place = add_scaled(&undeformed, 1.0, &ahead(share));
         let [before, after] = [self.obstacle.seen_before(&place), self.obstacle.seen_after(&place)];
         let seen: Vector<D> = std::array::from_fn(|i| before[i] + share * (after[i] - before[i]));

@@ -209,12 +209,22 @@ impl<const D: usize> Obstacle<D> {
 
     /// The gap in m of a point whose surface has `moved` along the normal and that an obstacle which forces move sees at `seen`.
     pub(super) fn gap_of(&self, point: &Point<D>, time: f64, seen: &Vector<D>, moved: f64) -> Result<f64> {
-        Ok(point.stretch * self.gap.of_moved(time, seen, &point.normal, moved)? + point.distance)
+        Ok(point.stretch * self.ray(point, time, (seen, moved))? + point.distance)
+    }
+
+    /// The length in m of the ray to the obstacle along the normal of a point that has `moved` along it. That of a point which slides any
+    /// distance begins where the point is: elsewhere on its line may be the inside of an obstacle from which its surface looks away.
+    fn ray(&self, point: &Point<D>, time: f64, (seen, moved): (&Vector<D>, f64)) -> Result<f64> {
+        let normal = &point.normal;
+        match point.undeformed() {
+            Some(_) => Ok(moved + self.gap.at(time, &add_scaled(seen, moved, normal), normal)?),
+            None => self.gap.of_moved(time, seen, normal, moved),
+        }
     }
 
     /// The gap in m of a point of the undeformed surface without wear from an obstacle that it sees at `seen`, after the point has moved.
     pub(super) fn reach_from(&self, point: &Point<D>, seen: &Vector<D>) -> Result<f64> {
-        self.gap.of_moved(self.rate.time, seen, &point.normal, point.moved)
+        self.ray(point, self.rate.time, (seen, point.moved))
     }
 
     /// The velocity at which the gap of a point at the end of the step grows with that of a translation.
