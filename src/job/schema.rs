@@ -136,6 +136,11 @@ impl Schema {
         self.alternatives().iter().filter_map(|branch| branch.text("const")).collect()
     }
 
+    /// Whether this word may stand in a list of this schema.
+    pub(crate) fn lists(&self, word: &str) -> bool {
+        self.items().is_some_and(|items| items.words().contains(&word))
+    }
+
     /// The tables of which exactly one is allowed, each with its name and the schema of the alternative.
     pub(crate) fn tagged(&self) -> Vec<(&'static str, Schema)> {
         let branches = self.alternatives().into_iter();

@@ -89,6 +89,12 @@ impl Walk<'_> {
         match (&node.value, other) {
             (Value::Text(word), _) if words.contains(&word.as_str()) => return,
             (_, Some(other)) => return self.value(node, *other, path),
+            (Value::Text(word), None) if alternatives.iter().any(|one| one.lists(word)) => {
+                let key = path.rsplit('.').next().unwrap_or(path);
+                let message = format!("`{path}` can't be \"{word}\"");
+                let fault = Fault::new(node.at.clone(), message, "not in a list");
+                self.checked.faults.push(fault.help(format!("write a list: {key} = [\"{word}\"]")));
+            }
             (Value::Text(word), None) if !words.is_empty() => self.unknown_word(node, word, &words, path),
             (Value::Table(_), None) if !tagged.is_empty() => return self.one_of(node, schema, path),
             _ => self.checked.faults.push(self.wrong_type(node, schema, path)),
