@@ -344,7 +344,9 @@ impl Summary {
         let unresolved = (self.unresolved_steps > 0).then(|| {
             let generated = generated.as_ref().map_or_else(String::new, |generated| format!("; {generated}"));
             format!(
-                "steps in which damage or bonds fail faster than the steps resolve: {}, named in run.log; their dissipated energy is too                  large, and where they end may depend on the steps: let [time.adaptive] choose these, with a smaller tolerance and                  smallest_step if it does{generated}",
+                "steps in which damage or bonds fail faster than the steps resolve: {}, named in run.log; their dissipated energy is too \
+                 large, and where they end may depend on the steps: let [time.adaptive] choose these, with a smaller tolerance and \
+                 smallest_step if it does{generated}",
                 self.unresolved_steps
             )
         });
