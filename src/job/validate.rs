@@ -90,10 +90,9 @@ impl Walk<'_> {
             (Value::Text(word), _) if words.contains(&word.as_str()) => return,
             (_, Some(other)) => return self.value(node, *other, path),
             (Value::Text(word), None) if alternatives.iter().any(|one| one.lists(word)) => {
-                let key = path.rsplit('.').next().unwrap_or(path);
                 let message = format!("`{path}` can't be \"{word}\"");
                 let fault = Fault::new(node.at.clone(), message, "not in a list");
-                self.checked.faults.push(fault.help(format!("write a list: {key} = [\"{word}\"]")));
+                self.checked.faults.push(fault.help(as_list(path, word)));
             }
             (Value::Text(word), None) if !words.is_empty() => self.unknown_word(node, word, &words, path),
             (Value::Table(_), None) if !tagged.is_empty() => return self.one_of(node, schema, path),
@@ -444,7 +443,6 @@ impl Walk<'_> {
         let message = format!("`{path}` must be {expected}");
         let mut fault = Fault::new(node.at.clone(), message, format!("found {}", node.value.kind()));
         let item_accepts = |kind| schema.items().is_some_and(|items| items.accepts(kind));
-        let key = path.rsplit('.').next().unwrap_or(path);
         match &node.value {
             Value::Table(_) if schema.accepts("array") && item_accepts("object") => {
                 fault = fault.help(format!(
@@ -458,7 +456,7 @@ impl Walk<'_> {
             Value::Text(text)
                 if schema.accepts("array") && (item_accepts("string") || schema.words().is_empty()) =>
             {
-                fault = fault.help(format!("write a list: {key} = [\"{text}\"]"));
+                fault = fault.help(as_list(path, text));
             }
             Value::Text(_) if schema.accepts("number") || schema.accepts("integer") => {
                 let instead = if self.parameters.is_available() { " except of [parameters]" } else { "" };
@@ -512,6 +510,10 @@ fn json_kind(value: &Value) -> &'static str {
         Value::Array(_) => "array",
         Value::Table(_) => "object",
     }
+}
+
+fn as_list(path: &str, text: &str) -> String {
+    format!("write a list: {} = [\"{text}\"]", path.rsplit('.').next().unwrap_or(path))
 }
 
 fn join(path: &str, key: &str) -> String {

@@ -208,10 +208,9 @@ fn bodies_without_mass_stick_after_a_jump_or_kink_of_their_loads_under_a_two_ste
     }
 }
 
-/// The strip tears off in the first step, in which its bonds lose all strength at once.
+/// A block is pulled off in the first step, to far beyond the end of its law, without any work.
 #[test]
 fn a_body_without_mass_whose_scheme_generates_energy_is_told_of_its_steps_and_not_of_vibrations() {
-    // It is pulled off within a step, far from where the law ends.
     let case = Case::written_as(
         "mesh.rectangle = { size = [0.2, 0.1], cells = [2, 1] }
          support = [{ on = ['top'], fix = 'all', displacement = ['0', '0.01*t'] }]
