@@ -15,6 +15,9 @@ timed() {
     cargo --config "target.'cfg(all())'.runner = ['env', 'RUSTC_BOOTSTRAP=1']" "$@" -- -Zunstable-options --report-time
 }
 
+# More tests than cores at a time: tests wait for launchers of ranks, too, and runs take turns on the cores (tests/cores.rs).
+export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((2 * $(nproc)))}
+
 failed=()
 {
     timed --config scripts/unit-tests.toml test --release --locked --lib &&

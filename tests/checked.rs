@@ -1,6 +1,6 @@
 //! Runs of jobs of the repository.
 
-use crate::cores;
+use crate::cores::{self, Cores};
 use std::{path::Path, process::Command};
 
 /// Runs a job with these keys changed (`time.step=0.01`) on some ranks, with its results in the folder `output`; an error has the
@@ -11,7 +11,7 @@ pub fn run(job: &Path, ranks: usize, output: &Path, changes: &[&str]) -> Result<
     if ranks > 1 {
         command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string(), solver]);
     }
-    let _folder = cores::share(&mut command);
+    let (_cores, _folder) = (Cores::take(ranks), cores::share(&mut command));
     let run = command
         .arg(job)
         .args(["--set", &format!("output.folder={output:?}")])

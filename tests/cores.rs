@@ -1,6 +1,35 @@
 //! Launchers whose ranks share the cores with other tests.
 
-use std::process::Command;
+use std::{
+    process::Command,
+    sync::{Condvar, Mutex},
+};
+
+/// How many cores runs of tests use, and the signal that some were left.
+static USED: Mutex<usize> = Mutex::new(0);
+static LEFT: Condvar = Condvar::new();
+
+/// Cores that a run has for itself until this is dropped, one a rank as far as there are as many. Ranks that wait for each other while
+/// those of other runs compute would use their cores for waiting.
+pub struct Cores(usize);
+
+impl Cores {
+    /// Waits until the cores are free.
+    pub fn take(ranks: usize) -> Self {
+        let all = std::thread::available_parallelism().map_or(1, usize::from);
+        let wanted = ranks.min(all);
+        let used = USED.lock().expect("cores");
+        *LEFT.wait_while(used, |used| *used + wanted > all).expect("cores") += wanted;
+        Self(wanted)
+    }
+}
+
+impl Drop for Cores {
+    fn drop(&mut self) {
+        *USED.lock().expect("cores") -= self.0;
+        LEFT.notify_all();
+    }
+}
 
 /// Sets the environment of a launcher of ranks, for which the folder has to remain as long as it runs: launchers that share one
 /// compete in creating and removing it.

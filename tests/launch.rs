@@ -1,6 +1,6 @@
 //! The solver under `mpirun` with a time limit: a run that hangs is ended with all its processes, and the test fails.
 
-use crate::cores;
+use crate::cores::{self, Cores};
 use std::{
     io::Read,
     os::unix::process::ExitStatusExt,
@@ -67,11 +67,27 @@ pub fn unwrapped(text: &str) -> String {
 
 /// Runs the solver on this many ranks to its end. One rank is started without `mpirun`, which would take longer than many a run.
 pub fn run<A: AsRef<std::ffi::OsStr>>(ranks: usize, arguments: &[A]) -> Outcome {
-    if ranks == 1 { run_alone(arguments) } else { Running::start(ranks, arguments).wait() }
+    if ranks == 1 {
+        return run_alone(arguments);
+    }
+    let _cores = Cores::take(ranks);
+    let mut command = launcher(ranks, arguments);
+    // Where a run fails, Open MPI would wait for two seconds before it ends ranks that have ended by themselves.
+    command.env("OMPI_MCA_odls_base_sigkill_timeout", "0");
+    Running::spawn(command).wait()
+}
+
+/// `mpirun` with the solver on this many ranks.
+fn launcher<A: AsRef<std::ffi::OsStr>>(ranks: usize, arguments: &[A]) -> Command {
+    let mut command = Command::new("mpirun");
+    command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]);
+    command.arg(env!("CARGO_BIN_EXE_solver")).args(arguments);
+    command
 }
 
 /// Runs the solver without `mpirun`.
 pub fn run_alone<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
+    let _cores = Cores::take(1);
     let mut command = Command::new(env!("CARGO_BIN_EXE_solver"));
     command.args(arguments);
     Running::spawn(command).wait()
@@ -130,10 +146,7 @@ pub struct Running {
 
 impl Running {
     pub fn start<A: AsRef<std::ffi::OsStr>>(ranks: usize, arguments: &[A]) -> Self {
-        let mut command = Command::new("mpirun");
-        command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]);
-        command.arg(env!("CARGO_BIN_EXE_solver")).args(arguments);
-        Self::spawn(command)
+        Self::spawn(launcher(ranks, arguments))
     }
 
     /// Starts a command that launches the solver.

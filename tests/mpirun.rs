@@ -1,6 +1,6 @@
 //! Starts scenarios: a test of this program by its path, and words for it.
 
-use crate::cores;
+use crate::cores::{self, Cores};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -39,7 +39,7 @@ pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
     } else {
         launcher.args(["--oversubscribe", "--bind-to", "none", "--timeout", LIMIT, "-n", &ranks.to_string()]);
     }
-    let _folder = cores::share(&mut launcher);
+    let (_cores, _folder) = (Cores::take(ranks), cores::share(&mut launcher));
     launcher
         .arg(program)
         .args(["--include-ignored", "--exact", test, "--nocapture", "--test-threads", "1"])

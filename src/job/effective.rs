@@ -78,7 +78,9 @@ impl Job {
         job.output.folder = Some(PathBuf::from("."));
         let refuse =
             |error: &dyn std::fmt::Display| Error::Internal(format!("the job can't be written: {error}"));
-        let text = toml::to_string(&job).map_err(|error| refuse(&error))?;
+        // By way of values, for which the code that writes text is compiled once in place of for each struct.
+        let values = toml::Table::try_from(&job).map_err(|error| refuse(&error))?;
+        let text = toml::to_string(&values).map_err(|error| refuse(&error))?;
         job.written.restore(text).map_err(|error| refuse(&error))
     }
 

@@ -1,6 +1,6 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{setup::Setup, sides, steps};
+use super::{setup::Setup, side_words, steps};
 use crate::{
     error::Result,
     io::output::{
@@ -48,7 +48,7 @@ pub(super) fn lines<const D: usize, const S: usize>(
         lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
     }
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
-    lines.extend(sides::lines(job, &body.pairs));
+    lines.extend(side_words::lines(job, &body.pairs));
     let lengths = match &job.time.adaptive {
         Some(a) => format!("{} s to {} s, {} s first,", a.smallest_step, a.largest_step, job.time.step),
         None => format!("{} s", job.time.step),

@@ -23,6 +23,8 @@ mod restored;
 mod rotation;
 mod scene;
 mod setup;
+mod shared_sides;
+mod side_words;
 mod sides;
 mod simulation;
 mod start;

@@ -1,7 +1,7 @@
 //! The position of a body relative to its obstacles: warnings about that at the start and about contacts that are not as they seem, and
 //! the gaps of all contacts.
 
-use super::sides::{EDGE, pressed_by_edge};
+use super::side_words::{EDGE, pressed_by_edge};
 use crate::{
     error::Result,
     fem::{

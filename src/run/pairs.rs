@@ -1,15 +1,17 @@
 //! Contact between bodies: finds what boundaries face, before the body is built, and refuses what cannot be solved.
 
 use super::{
+    materials::Materials,
     parts::part_of,
-    sides::{Circumstances, conflict, meet, names_of_sides, rubs},
+    side_words::names_of_sides,
+    sides::{Sides, conflict, rubs},
 };
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Exchange, Pair, Sharing, is_exchanged, pair_of, shares},
+        pairs::{Pair, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
     job::{self, Job, Scalar, Side, Sliding},
@@ -20,14 +22,15 @@ use crate::{
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The contacts of a job between bodies, with the side of each that carries the law; the mesh gets the ghosts that their equations need.
-/// Collective.
+/// `earlier` has the contacts of the run from whose state this one starts, each with whether its sides were exchanged. Collective.
 pub(super) fn find<const D: usize>(
     session: &Session,
     job: &Job,
     mesh: &mut Mesh<D>,
-    circumstances: &Circumstances<'_, D>,
+    (materials, earlier): (&Materials, &BTreeMap<usize, bool>),
 ) -> Result<Vec<Pair<D>>, Agreed> {
     let mut pairs = Vec::new();
+    let sides = Sides::of(session, job, (&*mesh, materials), earlier)?;
     let is_fault = |contact: &job::Contact| {
         contact.against.is_empty() && contact.on.iter().any(|name| mesh.boundary(&other_side(name)).is_some())
     };
@@ -57,7 +60,7 @@ pub(super) fn find<const D: usize>(
         refuse_joined(session, mesh, (number, contact), [&on, &against])?;
         let slides = contact.sliding == Sliding::Finite;
         let pair = Pair { slides, is_closed: contact.closed, ..Pair::of(number, [on, against]) };
-        let pair = circumstances.form(session, mesh, job, pair)?;
+        let pair = sides.form(pair)?;
         let names = [&contact.on, &contact.against].map(|names| names.join(", "));
         let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
         session.agree(if session.total(facing) == 0 && !slides {
@@ -74,10 +77,7 @@ pub(super) fn find<const D: usize>(
     if pairs.is_empty() {
         return Ok(pairs);
     }
-    circumstances.untangle(session, mesh, job, &mut pairs)?;
-    circumstances.follow(session, mesh, job, &mut pairs)?;
-    share_sides(session, job, mesh, &mut pairs)?;
-    leave_shared_nodes(session, job, (mesh, circumstances), &mut pairs)?;
+    sides.settle(&mut pairs)?;
     let shares = shares(mesh, &pairs);
     let global =
         |facet: &u32| mesh.facet_nodes(*facet).map(|node| mesh.global_node(node)).collect::<Vec<_>>();
@@ -143,185 +143,6 @@ fn refuse_joined<const D: usize>(
             &at[2..]
         ))),
     })
-}
-
-/// Lets the nodes of facets that are on the slave side of several pairs face the other sides of all of them: each node carries the law of the
-/// pair that has the largest part of what it faces, where the laws allow it. Collective.
-fn share_sides<const D: usize>(
-    session: &Session,
-    job: &Job,
-    mesh: &Mesh<D>,
-    pairs: &mut [Pair<D>],
-) -> Result<(), Agreed> {
-    for at in 0..pairs.len() {
-        if job.contact[pairs[at].contact].against.is_empty() || !pairs[at].sharing.is_empty() {
-            continue;
-        }
-        let mut group = vec![at];
-        let mut seen = 0;
-        while seen < group.len() {
-            for other in at + 1..pairs.len() {
-                let (first, second) = (&pairs[group[seen]], &pairs[other]);
-                let is_apart = !meet(session, &first.on, &second.on);
-                if is_apart || group.contains(&other) || job.contact[second.contact].against.is_empty() {
-                    continue;
-                }
-                let [one, two] = [first, second].map(|pair| &job.contact[pair.contact]);
-                let are_same =
-                    one.has_the_laws_of(two) && first.exchange.is_some() == second.exchange.is_some();
-                let slide = [first.slides, second.slides];
-                let are_alike = one.is_without_scale()
-                    && two.is_without_scale()
-                    && one.redistribute_mass == two.redistribute_mass;
-                if are_same || (are_alike && slide == [false; 2]) {
-                    group.push(other);
-                } else if slide == [true; 2] {
-                    session.agree(Err(refusal_of_laws(job, [first, second])))?;
-                }
-            }
-            seen += 1;
-        }
-        if group.len() > 1 {
-            share_side(session, mesh, pairs, &group)?;
-        }
-    }
-    Ok(())
-}
-
-/// Refuses two pairs that share a slave side and whose laws differ, where bodies slide.
-fn refusal_of_laws<const D: usize>(job: &Job, pairs: [&Pair<D>; 2]) -> Error {
-    let [own, _] = names_of_sides(job, pairs[0]);
-    let held = pairs.into_iter().find(|pair| pair.exchange == Some(Exchange::Held));
-    let remedy = held.map_or_else(
-        || "state the other `side` in both".into(),
-        |pair| format!("let no support hold nodes of {}", names_of_sides(job, pair)[1]),
-    );
-    Error::Refused(format!(
-        "contact.{} and contact.{}: nodes of {own} carry the laws of both, which differ, so that a node that slides from one body to the \
-         other has no law of its own; {remedy}, or give both the same laws",
-        pairs[0].contact, pairs[1].contact
-    ))
-}
-
-/// The same for pairs, given by their positions, that have one slave side. Collective.
-fn share_side<const D: usize>(
-    session: &Session,
-    mesh: &Mesh<D>,
-    pairs: &mut [Pair<D>],
-    group: &[usize],
-) -> Result<(), Agreed> {
-    let all = |nodes: Vec<u32>| -> Result<BTreeSet<u32>, Agreed> {
-        Ok(gather(session.world(), &nodes)?.into_iter().collect())
-    };
-    let nodes_of = |facets: &[u32]| -> Vec<u32> {
-        facets.iter().flat_map(|facet| mesh.facet_nodes(*facet)).map(|node| mesh.global_node(node)).collect()
-    };
-    // Of each node, the position of the pair of which it faces the largest part.
-    let mut most: BTreeMap<u32, (usize, f64)> = BTreeMap::new();
-    for &at in group {
-        for node in pairs[at].nodes.iter().filter(|node| !node.masters.is_empty()) {
-            let kept = most.entry(mesh.global_node(node.node)).or_insert((at, node.weight));
-            // Halves of what a node faces differ by rounding errors.
-            if node.weight > LARGER * kept.1 {
-                *kept = (at, node.weight);
-            }
-        }
-    }
-    let (mut sharing, mut carrying) = (Vec::new(), Vec::new());
-    for &at in group {
-        let Pair { contact, on, against, .. } = pairs[at].clone();
-        let faced = all(nodes_of(&against))?;
-        sharing.push(Sharing { contact, on, against, faced });
-        carrying.push(all(most.iter().filter(|(_, (of, _))| *of == at).map(|(node, _)| *node).collect())?);
-    }
-    let of_all = |facets: fn(&Sharing) -> &Vec<u32>| -> Vec<u32> {
-        sharing.iter().flat_map(facets).copied().collect::<BTreeSet<u32>>().into_iter().collect()
-    };
-    let (on, against) = (of_all(|sharing| &sharing.on), of_all(|sharing| &sharing.against));
-    let own = all(nodes_of(&on))?;
-    let lawless: BTreeSet<u32> = group.iter().flat_map(|at| pairs[*at].lawless.clone()).collect();
-    for (place, &at) in group.iter().enumerate() {
-        let pair = &mut pairs[at];
-        // Nodes that face nothing carry the law of the first pair.
-        let others = carrying.iter().enumerate().filter(|(other, _)| *other != place);
-        pair.of_others = match place {
-            0 => others.flat_map(|(_, nodes)| nodes).copied().collect(),
-            _ => &own - &carrying[place],
-        };
-        pair.lawless.clone_from(&lawless);
-        pair.sharing.clone_from(&sharing);
-        pair.on.clone_from(&on);
-        pair.against.clone_from(&against);
-        pair.form(session, mesh, &mesh.nodes)?;
-    }
-    Ok(())
-}
-
-/// By what factor a part of the surface is larger than another one but for rounding errors.
-const LARGER: f64 = 1.0 + 1e-9;
-
-/// Lets nodes of pairs whose law would act there, and that belong to other contacts, too, leave their part of the surface to neighbours,
-/// where the law allows it. Collective.
-fn leave_shared_nodes<const D: usize>(
-    session: &Session,
-    job: &Job,
-    (mesh, circumstances): (&Mesh<D>, &Circumstances<'_, D>),
-    pairs: &mut [Pair<D>],
-) -> Result<(), Agreed> {
-    let (mut slaves, mut both) = (Vec::new(), Vec::new());
-    for pair in &*pairs {
-        let [own, faced] = pair.nodes_of_all(session, mesh)?;
-        both.push(&own | &faced);
-        slaves.push(own);
-    }
-    let mut of_obstacles = Vec::new();
-    for (number, contact) in job.contact.iter().enumerate() {
-        if pair_of(pairs, number).is_none() {
-            let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
-            let nodes = on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-            of_obstacles.extend(nodes.map(|node| mesh.global_node(node)));
-        }
-    }
-    let of_obstacles: BTreeSet<u32> = gather(session.world(), &of_obstacles)?.into_iter().collect();
-    for at in 0..pairs.len() {
-        let contact = &job.contact[pairs[at].contact];
-        if contact.against.is_empty() || !contact.is_without_scale() {
-            continue;
-        }
-        let is_together = |other: usize| other == at || pairs[at].shares_with(&pairs[other]);
-        let (own, others): (Vec<usize>, Vec<usize>) = (0..pairs.len()).partition(|other| is_together(*other));
-        let is_shared = |node: &u32| {
-            of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node))
-        };
-        let shared = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared);
-        let pair = &mut pairs[at];
-        pair.lawless.extend(shared);
-        if pair.lawless.is_empty() {
-            continue;
-        }
-        pair.form(session, mesh, &mesh.nodes)?;
-        if !pair.sharing.is_empty() || session.total(pair.nodes.len()) > 0 {
-            continue;
-        }
-        let exchanged = circumstances.exchanged(session, (mesh, contact), (&*pair, Exchange::Shared))?;
-        if let Some(mut other) = exchanged {
-            let [own, _] = other.nodes_of_all(session, mesh)?;
-            other.lawless.extend(own.into_iter().filter(is_shared));
-            other.form(session, mesh, &mesh.nodes)?;
-            *pair = other;
-        }
-        session.agree(if session.total(pair.nodes.len()) > 0 {
-            Ok(())
-        } else {
-            Err(Error::Refused(format!(
-                "contact.{}: all nodes of the boundary {} belong to other contacts, too, so that none is left for the law; refine the mesh \
-                 there",
-                pair.contact,
-                names_of_sides(job, pair)[0]
-            )))
-        })?;
-    }
-    Ok(())
 }
 
 /// Why a node of two contacts is refused.

@@ -7,8 +7,7 @@ use super::{
     memory::require_for_run,
     obstacles, pairs, parts,
     restored::{StartState, sides_before, start_file, transfer},
-    sides::{self, Circumstances},
-    steps,
+    side_words, steps,
     validate::refuse_free_bodies,
 };
 use crate::{
@@ -52,8 +51,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let from = start_file(session, loaded)?;
     let materials = Materials::new(session, job, &mesh)?;
     let earlier = sides_before(session, loaded, from.as_deref())?;
-    let circumstances = Circumstances::of(session, job, (&mesh, &materials), earlier)?;
-    let paired = pairs::find(session, job, &mut mesh, &circumstances)?;
+    let paired = pairs::find(session, job, &mut mesh, (&materials, &earlier))?;
     let probes = session.agree(Probes::locate(session, &mesh, &job.output))?;
     let (mut body, mut state) = build::body::<D, S>(session, job, (mesh, &materials), paired)?;
     let fault = probed::fault(&job.output, &body);
@@ -65,9 +63,9 @@ pub(super) fn setup<const D: usize, const S: usize>(
     warnings.extend(bonds::warnings(session, job, &body));
     warnings.extend(parts::warnings(session, job, &body.mesh));
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);
-    warnings.extend(circumstances.warnings(&body.pairs));
-    warnings.extend(sides::warnings_of_edges(session, job, &body.mesh, &body.pairs)?);
-    warnings.extend(sides::warnings_of_carriers(session, job, &body.pairs));
+    warnings.extend(side_words::warnings_of_changes(&earlier, &body.pairs));
+    warnings.extend(side_words::warnings_of_edges(session, job, &body.mesh, &body.pairs)?);
+    warnings.extend(side_words::warnings_of_carriers(session, job, &body.pairs));
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };

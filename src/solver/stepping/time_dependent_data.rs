@@ -19,6 +19,9 @@ const SAMPLES_OF_RUN: u32 = 1024;
 /// Values before and after a time that differ by less than this fraction of the scale count as equal: there is no jump.
 const CONTINUITY_TOLERANCE: f64 = 1e-9;
 
+/// The share of a value that may be an error of rounding.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
 /// The time-dependent expressions.
 #[derive(Debug)]
 pub(super) struct TimeDependentData<const D: usize> {
@@ -169,7 +172,9 @@ impl<const D: usize> TimeDependentExpression<D> {
                 let fraction = f64::from(at) / f64::from(SAMPLES);
                 let value = self.value.evaluate((1.0 - fraction) * start + fraction * end, point);
                 let difference = (value - ((1.0 - fraction) * first + fraction * last)).abs();
-                if difference.is_finite() {
+                // Of a position that hardly moves, the last digits are rounding errors.
+                let rounding = ROUNDING * value.abs().max(first.abs());
+                if difference.is_finite() && difference > rounding {
                     (deviation, scale) = (deviation.max(difference), scale.max(difference));
                 }
             }
@@ -247,6 +252,9 @@ mod tests {
             "a pulse within the step"
         );
         assert_eq!(expression("0*t").deviation_from_linear([0.5, 0.75]), 0.0);
+        let mut at_rest = expression("-1e-4 + 0*t");
+        at_rest.scale = at_rest.measure_scale(2.0, false);
+        assert_eq!(at_rest.deviation_from_linear([0.3, 0.7]), 0.0, "rounding errors of an obstacle at rest");
         assert_eq!(
             expression("sqrt(t - 9)").deviation_from_linear([0.5, 0.75]),
             0.0,

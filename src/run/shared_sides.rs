@@ -1,0 +1,190 @@
+//! Nodes and facets on the sides of several contacts between bodies.
+
+use super::{
+    parts::part_of,
+    side_words::names_of_sides,
+    sides::{Sides, meet},
+};
+use crate::{
+    error::{Error, Result},
+    fem::pairs::{Exchange, Pair, Sharing, pair_of},
+    parallel::{agreement::Agreed, exchange::gather},
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// By what factor a part of the surface is larger than another one but for rounding errors.
+const LARGER: f64 = 1.0 + 1e-9;
+
+impl<const D: usize> Sides<'_, D> {
+    /// Lets the nodes of facets that are on the slave side of several pairs face the other sides of all of them: each node carries the law of the
+    /// pair that has the largest part of what it faces, where the laws allow it.
+    pub(super) fn share(&self, pairs: &mut [Pair<D>]) -> Result<(), Agreed> {
+        let Self { session, job, .. } = *self;
+        for at in 0..pairs.len() {
+            if job.contact[pairs[at].contact].against.is_empty() || !pairs[at].sharing.is_empty() {
+                continue;
+            }
+            let mut group = vec![at];
+            let mut seen = 0;
+            while seen < group.len() {
+                for other in at + 1..pairs.len() {
+                    let (first, second) = (&pairs[group[seen]], &pairs[other]);
+                    let is_apart = !meet(session, &first.on, &second.on);
+                    if is_apart || group.contains(&other) || job.contact[second.contact].against.is_empty() {
+                        continue;
+                    }
+                    let [one, two] = [first, second].map(|pair| &job.contact[pair.contact]);
+                    let are_same =
+                        one.has_the_laws_of(two) && first.exchange.is_some() == second.exchange.is_some();
+                    let slide = [first.slides, second.slides];
+                    let are_alike = one.is_without_scale()
+                        && two.is_without_scale()
+                        && one.redistribute_mass == two.redistribute_mass;
+                    if are_same || (are_alike && slide == [false; 2]) {
+                        group.push(other);
+                    } else if slide == [true; 2] {
+                        session.agree(Err(self.refusal_of_laws([first, second])))?;
+                    }
+                }
+                seen += 1;
+            }
+            if group.len() > 1 {
+                self.share_side(pairs, &group)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses two pairs that share a slave side and whose laws differ, where bodies slide.
+    fn refusal_of_laws(&self, pairs: [&Pair<D>; 2]) -> Error {
+        let [own, _] = names_of_sides(self.job, pairs[0]);
+        let held = pairs.into_iter().find(|pair| pair.exchange == Some(Exchange::Held));
+        let remedy = held.map_or_else(
+            || "state the other `side` in both".into(),
+            |pair| format!("let no support hold nodes of {}", names_of_sides(self.job, pair)[1]),
+        );
+        Error::Refused(format!(
+            "contact.{} and contact.{}: nodes of {own} carry the laws of both, which differ, so that a node that slides from one body to the \
+             other has no law of its own; {remedy}, or give both the same laws",
+            pairs[0].contact, pairs[1].contact
+        ))
+    }
+
+    /// The same for pairs, given by their positions, that have one slave side.
+    fn share_side(&self, pairs: &mut [Pair<D>], group: &[usize]) -> Result<(), Agreed> {
+        let Self { session, mesh, .. } = *self;
+        let all = |nodes: Vec<u32>| -> Result<BTreeSet<u32>, Agreed> {
+            Ok(gather(session.world(), &nodes)?.into_iter().collect())
+        };
+        let nodes_of = |facets: &[u32]| -> Vec<u32> {
+            facets
+                .iter()
+                .flat_map(|facet| mesh.facet_nodes(*facet))
+                .map(|node| mesh.global_node(node))
+                .collect()
+        };
+        // Of each node, the position of the pair of which it faces the largest part.
+        let mut most: BTreeMap<u32, (usize, f64)> = BTreeMap::new();
+        for &at in group {
+            for node in pairs[at].nodes.iter().filter(|node| !node.masters.is_empty()) {
+                let kept = most.entry(mesh.global_node(node.node)).or_insert((at, node.weight));
+                // Halves of what a node faces differ by rounding errors.
+                if node.weight > LARGER * kept.1 {
+                    *kept = (at, node.weight);
+                }
+            }
+        }
+        let (mut sharing, mut carrying) = (Vec::new(), Vec::new());
+        for &at in group {
+            let Pair { contact, on, against, .. } = pairs[at].clone();
+            let faced = all(nodes_of(&against))?;
+            sharing.push(Sharing { contact, on, against, faced });
+            carrying.push(all(most
+                .iter()
+                .filter(|(_, (of, _))| *of == at)
+                .map(|(node, _)| *node)
+                .collect())?);
+        }
+        let of_all = |facets: fn(&Sharing) -> &Vec<u32>| -> Vec<u32> {
+            sharing.iter().flat_map(facets).copied().collect::<BTreeSet<u32>>().into_iter().collect()
+        };
+        let (on, against) = (of_all(|sharing| &sharing.on), of_all(|sharing| &sharing.against));
+        let own = all(nodes_of(&on))?;
+        let lawless: BTreeSet<u32> = group.iter().flat_map(|at| pairs[*at].lawless.clone()).collect();
+        for (place, &at) in group.iter().enumerate() {
+            let pair = &mut pairs[at];
+            // Nodes that face nothing carry the law of the first pair.
+            let others = carrying.iter().enumerate().filter(|(other, _)| *other != place);
+            pair.of_others = match place {
+                0 => others.flat_map(|(_, nodes)| nodes).copied().collect(),
+                _ => &own - &carrying[place],
+            };
+            pair.lawless.clone_from(&lawless);
+            pair.sharing.clone_from(&sharing);
+            pair.on.clone_from(&on);
+            pair.against.clone_from(&against);
+            pair.form(session, mesh, &mesh.nodes)?;
+        }
+        Ok(())
+    }
+
+    /// Lets nodes of pairs whose law would act there, and that belong to other contacts, too, leave their part of the surface to neighbours,
+    /// where the law allows it.
+    pub(super) fn leave_shared_nodes(&self, pairs: &mut [Pair<D>]) -> Result<(), Agreed> {
+        let Self { session, job, mesh, .. } = *self;
+        let (mut slaves, mut both) = (Vec::new(), Vec::new());
+        for pair in &*pairs {
+            let [own, faced] = pair.nodes_of_all(session, mesh)?;
+            both.push(&own | &faced);
+            slaves.push(own);
+        }
+        let mut of_obstacles = Vec::new();
+        for (number, contact) in job.contact.iter().enumerate() {
+            if pair_of(pairs, number).is_none() {
+                let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
+                let nodes = on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+                of_obstacles.extend(nodes.map(|node| mesh.global_node(node)));
+            }
+        }
+        let of_obstacles: BTreeSet<u32> = gather(session.world(), &of_obstacles)?.into_iter().collect();
+        for at in 0..pairs.len() {
+            let contact = &job.contact[pairs[at].contact];
+            if contact.against.is_empty() || !contact.is_without_scale() {
+                continue;
+            }
+            let is_together = |other: usize| other == at || pairs[at].shares_with(&pairs[other]);
+            let (own, others): (Vec<usize>, Vec<usize>) =
+                (0..pairs.len()).partition(|other| is_together(*other));
+            let is_shared = |node: &u32| {
+                of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node))
+            };
+            let shared = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared);
+            let pair = &mut pairs[at];
+            pair.lawless.extend(shared);
+            if pair.lawless.is_empty() {
+                continue;
+            }
+            pair.form(session, mesh, &mesh.nodes)?;
+            if !pair.sharing.is_empty() || session.total(pair.nodes.len()) > 0 {
+                continue;
+            }
+            if let Some(mut other) = self.exchanged(pair, Exchange::Shared)? {
+                let [own, _] = other.nodes_of_all(session, mesh)?;
+                other.lawless.extend(own.into_iter().filter(is_shared));
+                other.form(session, mesh, &mesh.nodes)?;
+                *pair = other;
+            }
+            session.agree(if session.total(pair.nodes.len()) > 0 {
+                Ok(())
+            } else {
+                Err(Error::Refused(format!(
+                    "contact.{}: all nodes of the boundary {} belong to other contacts, too, so that none is left for the law; refine the mesh \
+                     there",
+                    pair.contact,
+                    names_of_sides(job, pair)[0]
+                )))
+            })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,146 @@
+//! What users read about the sides of contact between bodies: the lines of the log, and warnings.
+
+use super::sides::{STIFFER, is_blunter};
+use crate::{
+    fem::pairs::{Exchange, Pair},
+    job::{self, Job, Side},
+    mesh::Mesh,
+    parallel::{agreement::Agreed, session::Session},
+};
+use std::collections::BTreeMap;
+
+/// The angle in rad (10 degrees) of edges over faces whose nodes carry the law from which on the user is warned: forces along an inclined
+/// face are 18 % of those across.
+pub(super) const EDGE: f64 = 0.175;
+
+/// The boundaries of a pair at whose nodes the law acts, and those that they face.
+pub(super) fn names_of_sides<const D: usize>(job: &Job, pair: &Pair<D>) -> [String; 2] {
+    let job::Contact { on, against, .. } = &job.contact[pair.contact];
+    if pair.exchange.is_some() { [against, on] } else { [on, against] }.map(|names| names.join(", "))
+}
+
+/// The lines of the log about exchanged sides.
+pub(super) fn lines<const D: usize>(job: &Job, pairs: &[Pair<D>]) -> Vec<String> {
+    let line = |pair: &Pair<D>| {
+        let job::Contact { on, against, .. } = &job.contact[pair.contact];
+        let [on, against] = [on, against].map(|names| names.join(", "));
+        let why = match pair.exchange? {
+            Exchange::Requested => "as `side` states".into(),
+            Exchange::Continued => "as in the run from which this one starts".into(),
+            Exchange::Held => format!("because supports hold nodes of {on}"),
+            Exchange::Sharper => format!("because its corners or edges lie over {on}"),
+            Exchange::Coarser => format!("because the mesh of {on} is coarser"),
+            Exchange::Stiffer => format!("because {on} is more than {STIFFER} times as stiff"),
+            Exchange::Faced => format!("because {on} is faced in another contact"),
+            Exchange::Shared => format!("because all nodes of {on} belong to other contacts, too"),
+        };
+        Some(format!("contact    contact.{}: nodes of {against} carry the law, {why}", pair.contact))
+    };
+    pairs.iter().filter_map(line).collect()
+}
+
+/// Warnings about choices that differ from those of the run from whose state this one starts, given by its contacts, each with whether its
+/// sides were exchanged.
+pub(super) fn warnings_of_changes<const D: usize>(
+    earlier: &BTreeMap<usize, bool>,
+    pairs: &[Pair<D>],
+) -> Vec<String> {
+    let changed = pairs
+        .iter()
+        .filter(|pair| earlier.get(&pair.contact).is_some_and(|earlier| *earlier != pair.exchange.is_some()));
+    let words = |pair: &Pair<D>| {
+        format!(
+            "contact.{}: the other side carried the law in the run from which this one starts, because supports or `side` were \
+             different: pressures, friction and histories of the contact start anew; give both jobs the same `side` to keep them",
+            pair.contact
+        )
+    };
+    changed.map(words).collect()
+}
+
+/// Warnings about corners and edges that lie over faces whose nodes carry the law. Collective, with the same warnings on all ranks.
+pub(super) fn warnings_of_edges<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    pairs: &[Pair<D>],
+) -> Result<Vec<String>, Agreed> {
+    let mut out = Vec::new();
+    for pair in pairs.iter().filter(|pair| pair.slides) {
+        let sharpness = pair.sharpness(session, mesh);
+        if sharpness <= EDGE {
+            continue;
+        }
+        let mut other = pair.clone().exchanged(Exchange::Requested);
+        other.form(session, mesh, &mesh.nodes)?;
+        let remedy = match (is_blunter((session, mesh), &other, sharpness), job.contact[pair.contact].side) {
+            (false, _) => None,
+            (true, Side::Auto) => {
+                Some("let no support and no other contact hold their nodes, so that these carry the law")
+            }
+            (true, _) => Some("delete `side`"),
+        };
+        out.push(words_of_edges(job, pair, ("lie", remedy)));
+    }
+    Ok(out)
+}
+
+/// Warnings about wear that stays with the nodes of the other body, and about facets of which contacts leave all nodes without a law.
+/// Collective, with the same warnings on all ranks.
+pub(super) fn warnings_of_carriers<const D: usize>(
+    session: &Session,
+    job: &Job,
+    pairs: &[Pair<D>],
+) -> Vec<String> {
+    let mut out = Vec::new();
+    for pair in pairs {
+        let [own, other] = names_of_sides(job, pair);
+        if let Some(reason) =
+            pair.exchange.filter(|_| pair.slides && job.contact[pair.contact].wear.is_some())
+        {
+            let remedy = match reason {
+                Exchange::Held => format!("let no support hold nodes of {other}"),
+                Exchange::Requested => "delete `side`".into(),
+                _ => "state side = \"on\"".into(),
+            };
+            out.push(format!(
+                "contact.{}: nodes of {own} carry the law and keep the wear, so that {own} wears, not {other}: {remedy}",
+                pair.contact
+            ));
+        }
+        if session.total(usize::from(pair.is_bare)) > 0 {
+            out.push(format!(
+                "contact.{}: facets of {own} that face {other} carry no law, because all their nodes belong to other contacts, too, so that \
+                 pressures beside them may be wrong by half; give contacts that meet there one table with on = [...], or let nodes of {own} \
+                 lie where they meet",
+                pair.contact
+            ));
+        }
+    }
+    out
+}
+
+/// The warning about a pair whose nodes were pressed by corners and edges of the other side in a run.
+pub(super) fn pressed_by_edge<const D: usize>(job: &Job, pair: &Pair<D>) -> String {
+    words_of_edges(job, pair, ("pressed", None))
+}
+
+/// A warning about corners and edges over faces, with what they do there and what to do about it.
+fn words_of_edges<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<&str>)) -> String {
+    let [own, other] = names_of_sides(job, pair);
+    let side = if pair.exchange.is_some() { "on" } else { "against" };
+    let remedy = remedy.map_or_else(
+        || {
+            format!(
+                "if {own} is flat there, state side = \"{side}\"; of two surfaces with corners, round those of {other} with a radius of more than \
+                 two facets of {own}"
+            )
+        },
+        Into::into,
+    );
+    format!(
+        "contact.{}: corners or edges of {other} {lie} on faces of {own}, whose nodes carry the law: as they slide, forces along these faces may \
+         be wrong by a part of the pressure; {remedy}",
+        pair.contact
+    )
+}
