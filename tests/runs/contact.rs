@@ -869,3 +869,36 @@ fn a_body_of_quadratic_cells_with_mass_on_a_plane_is_solved_to_the_tolerance() {
     let residual = case.run(2).number("max_residual");
     assert!(residual < 1e-9, "{residual:e}");
 }
+
+/// A massless layer on a law that jumps and falls.
+const FALLING: &str = "
+    mesh.rectangle = {size = [1.0, 0.5], cells = [1, 1]}
+    time = {end = 0.01, step = 0.01, scheme = 'lagged_euler'}
+    solver = {accept = ['uniqueness'], guesses = 0}
+    output.profile = [{on = 'bottom'}]
+    [material]
+    hypothesis = 'plane_strain'
+    viscosity = {volumetric = 0.0, shear = 50.0}
+    [[support]]
+    on = ['left', 'right']
+    fix = ['x']
+    [[support]]
+    on = ['top']
+    fix = ['y']
+    velocity = [-0.32]
+    [[contact]]
+    on = ['bottom']
+    normal.graph = {points = [[0.0, -10.0], [0.0, 30.0], [0.2, -20.0], [0.2, 25.0], [0.4, 0.0]], slope_before = 50, slope_after = 0}";
+
+#[test]
+fn a_layer_whose_only_equilibrium_is_on_a_jump_of_a_falling_law_finds_it() {
+    for speed in ["0.32", "0.35"] {
+        let case = Case::written_as(FALLING).set("support.1.velocity", &format!("[-{speed}]"));
+        let results = case.run(1);
+        let [velocities, pressures] =
+            ["normal_velocity", "contact_pressure"].map(|name| results.table("profiles.csv").numbers(name));
+        let known = 100.0 * (speed.parse::<f64>().expect("number") - 0.2);
+        assert!(velocities.iter().all(|v| (v - 0.2).abs() < 1e-12), "{velocities:?}");
+        assert!(pressures.iter().all(|p| (p - known).abs() < 1e-8), "{pressures:?} Pa");
+    }
+}

@@ -110,12 +110,15 @@ impl Descent {
                 return Ok(false);
             }
             equations.write_motion(&mut self.velocity)?;
+            let least_change = ROUNDING * self.velocity.norm()?;
+            // The energy may have a kink here. On vertical parts of graphs pressures alone may change.
+            let leads_away = |place: &Place| place.change > least_change || place.residual <= ENOUGH * norm;
             let place = loop {
                 equations.set_softening(share);
                 equations.linearise(x)?;
                 let kind = (ProjectedKind::Definite, share == 0.0);
                 if equations.solve_linearised(&self.residual, &mut self.direction, kind)?
-                    && let Some(place) = self.search(equations, x, norm, share == 0.0)?
+                    && let Some(place) = self.search(equations, x, norm, share == 0.0)?.filter(leads_away)
                 {
                     break place;
                 }
@@ -125,9 +128,6 @@ impl Descent {
                 equations.counts.unstable += 1;
                 share = if share > LEAST_SHARE { DECREASE * share } else { 0.0 };
             };
-            if place.change <= ROUNDING * self.velocity.norm()? {
-                return Ok(false);
-            }
             x.add_scaled(-place.length, &self.direction)?;
             equations.residual(x, &mut self.residual)?;
             norm = self.residual.norm()?;
