@@ -869,3 +869,119 @@ fn a_body_of_quadratic_cells_with_mass_on_a_plane_is_solved_to_the_tolerance() {
     let residual = case.run(2).number("max_residual");
     assert!(residual < 1e-9, "{residual:e}");
 }
+
+/// Two blocks without friction, side by side on a plate, of which one or none is held along it.
+const SIDE_BY_SIDE: &str = "
+    time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+    [mesh]
+    rectangle = [
+        {name = 'low', size = [2.0, 0.5], cells = [6, 2]},
+        {name = 'a', corner = [0.0, 0.5], size = [0.8, 0.5], cells = [4, 2]},
+        {name = 'b', corner = [0.8, 0.5], size = [1.2, 0.5], cells = [5, 3]},
+    ]
+    [material]
+    hypothesis = 'plane_strain'
+    elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.0}
+    [[support]]
+    on = ['low.bottom']
+    fix = 'all'
+    [[traction]]
+    on = ['a.top', 'b.top']
+    value = [0.0, -1000.0]
+    [[contact]]
+    on = ['a.bottom', 'b.bottom']
+    against = ['low.top']
+    normal.unilateral = {}
+    [[contact]]
+    on = ['a.right']
+    against = ['b.left']
+    normal.unilateral = {}";
+
+#[test]
+fn bodies_that_touch_are_named_where_nothing_holds_them_together() {
+    for ranks in [1, 2] {
+        Case::written_as(SIDE_BY_SIDE)
+            .run_with(ranks, &[])
+            .expect(2)
+            .says("nothing prevents these rigid motions: body 2 (around (0.4, 0.75)) and body 3 (around (1.4, 0.75)) together: translation along x");
+    }
+    // As the message says: a support, or inertia.
+    let held = "[{on = ['low.bottom'], fix = 'all'}, {on = ['a.left'], fix = ['x']}]";
+    Case::written_as(SIDE_BY_SIDE).set("support", held).run(1);
+    Case::written_as(SIDE_BY_SIDE).set("material.density", "1.0").run(1);
+}
+
+#[test]
+fn parts_of_contacts_that_facets_do_not_follow_are_warned_of() {
+    let part = |place: &str| {
+        Case::written_as(BONDED).set("contact.0.where", &format!("'x < {place}'")).run_with(1, &[]).expect(0)
+    };
+    part("0.052").says("contact.0.where: the condition changes within 1 facet (0.005 m) of bottom");
+    assert!(!part("0.05").stdout.contains("changes within"), "between two facets");
+}
+
+/// A strip that yields is peeled off a plane: bonds hold it, and its cells resist less than elastic ones.
+const PEELED: &str = "
+    mesh = {order = 2, rectangle = {size = [0.2, 0.01], cells = [20, 1]}}
+    time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+    [material]
+    hypothesis = 'plane_stress'
+    elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.0}
+    viscoplasticity.perzyna = {relaxation = 1e-3, yield_stress = 1e6}
+    [[support]]
+    on = ['right']
+    where = 'hypot(x - 0.2, y - 0.01) < 1e-9'
+    fix = ['y']
+    displacement = ['5e-4*t']
+    [[support]]
+    on = ['left']
+    fix = ['x']
+    [[contact]]
+    on = ['bottom']
+    where = 'x < 0.15'
+    normal.unilateral = {}
+    adhesion = {stiffness = 1e11, energy = 10.0, strength = 2e5}";
+
+#[test]
+fn bonds_hold_a_strip_whose_cells_yield() {
+    let force = |step: &str| {
+        let case = Case::written_as(PEELED).set("time.step", step);
+        case.run(1).table("resultants.csv").only("source", "support right").last("force_y")
+    };
+    // Nothing gives way any more after cells and bonds beyond the tip have, however the step is divided.
+    let [whole, quarters] = ["1.0", "0.25"].map(force);
+    assert!((whole / quarters - 1.0).abs() < 1e-7 && (whole - 472.6).abs() < 0.1, "{whole} {quarters} N");
+}
+
+/// A massless layer on a law that jumps and falls.
+const FALLING: &str = "
+    mesh.rectangle = {size = [1.0, 0.5], cells = [1, 1]}
+    time = {end = 0.01, step = 0.01, scheme = 'lagged_euler'}
+    solver = {accept = ['uniqueness'], guesses = 0}
+    output.profile = [{on = 'bottom'}]
+    [material]
+    hypothesis = 'plane_strain'
+    viscosity = {volumetric = 0.0, shear = 50.0}
+    [[support]]
+    on = ['left', 'right']
+    fix = ['x']
+    [[support]]
+    on = ['top']
+    fix = ['y']
+    velocity = [-0.32]
+    [[contact]]
+    on = ['bottom']
+    normal.graph = {points = [[0.0, -10.0], [0.0, 30.0], [0.2, -20.0], [0.2, 25.0], [0.4, 0.0]], slope_before = 50, slope_after = 0}";
+
+#[test]
+fn a_layer_whose_only_equilibrium_is_on_a_jump_of_a_falling_law_finds_it() {
+    for speed in ["0.32", "0.35"] {
+        let case = Case::written_as(FALLING).set("support.1.velocity", &format!("[-{speed}]"));
+        let results = case.run(1);
+        let [velocities, pressures] =
+            ["normal_velocity", "contact_pressure"].map(|name| results.table("profiles.csv").numbers(name));
+        let known = 100.0 * (speed.parse::<f64>().expect("number") - 0.2);
+        assert!(velocities.iter().all(|v| (v - 0.2).abs() < 1e-12), "{velocities:?}");
+        assert!(pressures.iter().all(|p| (p - known).abs() < 1e-8), "{pressures:?} Pa");
+    }
+}
