@@ -15,9 +15,10 @@ const PAIRS: [(&str, &str, &str); 6] = [
     ("distance_weakening_block", "contact.0.friction", "0.3 + 0.3*max(1 - l/0.05, 0)"),
 ];
 
-/// Share of the largest value that rounding makes of a result. The block slides 1e5 times as fast as it moves vertically.
+/// Share of the largest value that rounding makes of a result. The block moves along the plane 1e5 times as fast as vertically, and its
+/// numerical dissipation is a small difference.
 fn rounding(job: &str) -> f64 {
-    if job == "distance_weakening_block" { 1e-9 } else { 1e-10 }
+    if job == "distance_weakening_block" { 1e-8 } else { 1e-10 }
 }
 
 /// The job with its built-in law, and with this formula in its place.

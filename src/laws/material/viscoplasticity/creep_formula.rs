@@ -234,6 +234,8 @@ fn identity<const S: usize>() -> Mandel<S> {
 const ROUNDING: f64 = 1e-12;
 /// Share of a stress at which a rate that is zero has a threshold.
 const SMALL: f64 = 1e-6;
+/// Change of a logarithm below which the next correction of Newton's method is a rounding error.
+const LAST: f64 = 1e-11;
 /// Largest size of a logarithm.
 const LARGEST: f64 = 690.0;
 
@@ -288,15 +290,16 @@ fn root_from(start: f64, function: &mut impl FnMut(f64) -> [f64; 2]) -> f64 {
     for _ in 0..200 {
         let [value, slope] = function(at);
         let newton = at - value / slope;
+        if (newton - at).abs() <= LAST {
+            return newton;
+        }
         if value > 0.0 {
             high = at
         } else {
             low = at
         }
         let is_open = low.is_infinite() || high.is_infinite();
-        let next = if value == 0.0 {
-            at
-        } else if low < newton && newton < high && (is_open || (newton - at).abs() <= 0.5 * last) {
+        let next = if low < newton && newton < high && (is_open || (newton - at).abs() <= 0.5 * last) {
             newton
         } else if is_open {
             stride *= 2.0;
