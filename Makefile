@@ -49,7 +49,7 @@ help:
 	@echo 'make book      docs/ as a book in target/book, with its links and formulas checked'
 	@echo 'make gallery   run the jobs with pictures in README.md, and write the pictures'
 	@echo 'make bench-errors  estimated errors of all jobs against true ones; ARGS=--write puts the table into docs/what-accuracy-costs.md'
-	@echo 'make bench-effects  what effects cost (docs/speed.md); ARGS=--write puts the table into it'
+	@echo 'make bench-effects  what effects and formulas cost (docs/speed.md); ARGS=--write puts the tables into it'
 	@echo 'make bench-estimates  estimated and measured times of all jobs (docs/speed.md); ARGS=--write puts the table into it'
 	@echo 'make bench-space  errors in space against seconds and memory (docs/space.md); ARGS=--write puts the tables into it'
 	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'

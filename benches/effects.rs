@@ -1,8 +1,8 @@
 //! What effects and formulas cost: `cargo bench --bench effects -- [--write]`.
 //!
 //! Runs scenes of `jobs/`, most of them on finer meshes, with all their effects and without one of them at a time
-//! (`solver study --ablate`), and scenes with built-in laws and with the same laws written as formulas. `--write` puts the table of effects
-//! into docs/speed.md.
+//! (`solver study --ablate`), and scenes with built-in laws and with the same laws written as formulas. `--write` puts both tables into
+//! docs/speed.md.
 
 #[path = "table/mod.rs"]
 mod table;
@@ -28,7 +28,7 @@ struct Scene {
     effects: &'static [(&'static str, &'static str)],
 }
 
-const SCENES: [Scene; 13] = [
+const SCENES: [Scene; 16] = [
     Scene {
         job: "conveyor_belt",
         set: &["mesh.rectangle.cells=[128,32]", "time.end=0.1"],
@@ -93,6 +93,21 @@ const SCENES: [Scene; 13] = [
         job: "ground_at_rest",
         set: &["mesh.rectangle.cells=[128,128]", "time.end=10.0"],
         effects: &[("initial.stress", "an initial stress")],
+    },
+    Scene {
+        job: "frictional_heating",
+        set: &["mesh.rectangle.cells=[128,64]", "time.end=25.0"],
+        effects: &[("material.heat", "heat")],
+    },
+    Scene {
+        job: "damped_bar",
+        set: &["mesh.rectangle.cells=[400,20]"],
+        effects: &[("material.damping", "Rayleigh damping")],
+    },
+    Scene {
+        job: "orthotropic_strip",
+        set: &["mesh.rectangle.cells=[256,64]", "material.density=1600.0", "time.step=0.02"],
+        effects: &[("material.orthotropic", "orthotropic elasticity")],
     },
 ];
 
@@ -237,12 +252,13 @@ fn study(job: &str, set: &[&str], rest: &str, options: &[&str]) -> Value {
     serde_json::from_str(&results).expect("an object")
 }
 
-/// Prints what laws cost as formulas, and how far their answers are from those of the built-in laws.
-fn print_formulas() {
-    println!(
+/// What laws cost as formulas, and how far their answers are from those of the built-in laws: the rows of a table.
+fn formulas() -> String {
+    let mut rows = String::from(
         "| law | job, changed by | s of steps: built-in, formula | ratio | Newton iterations | difference of velocity, stress |\n\
-         |---|---|--:|--:|--:|--:|"
+         |---|---|--:|--:|--:|--:|\n",
     );
+    print!("{rows}");
     for Formula { law, job, set, formula } in &FORMULAS {
         let norm =
             |of: &str, space: &str| format!("[[norm]]\nof = \"{of}\"\nin = \"{space}\"\nover = \"max\"\n");
@@ -262,7 +278,7 @@ fn print_formulas() {
             let relative = &found["runs"][1]["errors"][at]["relative"];
             format!("{:.0e}", relative.as_f64().unwrap_or_else(|| panic!("{law}: {found}")))
         };
-        println!(
+        let row = format!(
             "| {law} | `{job}` {} | {:.2}, {:.2} | {:.2} | {} | {} |",
             set[..set.len() - 1].join(" ").replace('|', "\\|"),
             seconds[0],
@@ -271,14 +287,17 @@ fn print_formulas() {
             newton.join(", "),
             [0, 1].map(difference).join(", ")
         );
+        println!("{row}");
+        writeln!(rows, "{row}").expect("text");
     }
+    rows
 }
 
 fn main() {
     let writes = std::env::args().any(|word| word == "--write");
     let mut triad = Triad::new();
     let bandwidth = BYTES as f64 / fastest(&mut || triad.run());
-    print_formulas();
+    let of_formulas = formulas();
     let mut rows = String::from(
         "| effect | job, changed by | s with it | s without | ratio | change of displacement, stress |\n|---|---|--:|--:|--:|---|\n",
     );
@@ -309,6 +328,8 @@ fn main() {
         }
     }
     if writes {
-        table::write("docs/speed.md", "effects", "make bench-effects ARGS=--write", bandwidth, &rows);
+        for (name, rows) in [("effects", &rows), ("formulas", &of_formulas)] {
+            table::write("docs/speed.md", name, "make bench-effects ARGS=--write", bandwidth, rows);
+        }
     }
 }

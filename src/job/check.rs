@@ -7,7 +7,7 @@ use super::findings::{MeshNames, Table, number_of_group};
 use crate::laws::contact::{Gap, Side};
 use crate::laws::expression::Scalar;
 use crate::laws::law::header;
-use crate::laws::material::Material;
+use crate::laws::material::{Hypothesis, Material};
 
 impl Job {
     /// All materials with their paths: the main one, then those of the regions.
@@ -70,6 +70,7 @@ pub(super) fn check(job: &Job, table: &mut Table<'_>) {
     check_extrapolation(job, table);
     job.solver.check(&mut table.table("solver"));
     job.output.check(&mut table.table("output"), job.time.end);
+    check_flow_that_is_written(job, table);
     check_expected(job, table);
     job.mesh.check_placement(&mut table.table("mesh"));
     if let Some(dimension) = job.dimension() {
@@ -149,6 +150,21 @@ fn check_revolved(job: &Job, table: &mut Table<'_>) {
         }
         if load.moment.is_some() {
             table.fault("obstacle_load.moment", turning, "delete this key");
+        }
+    });
+}
+
+/// In plane stress the strain across the plane is known of flow that keeps the volume.
+fn check_flow_that_is_written(job: &Job, table: &mut Table<'_>) {
+    if job.material.hypothesis != Some(Hypothesis::PlaneStress) || !job.output.asks_for_flow() {
+        return;
+    }
+    each_material(job, table, |material, table| {
+        let flow = material.viscoplasticity.as_ref();
+        if flow.is_some_and(|law| !law.with_yield_stress(0.0).keeps_volume()) {
+            let message = "the equivalent viscoplastic strain in plane stress is known of flow that keeps the volume only";
+            let help = "use plane strain, or delete \"equivalent_viscoplastic_strain\" in [output]";
+            table.fault("viscoplasticity", message, help);
         }
     });
 }

@@ -96,6 +96,10 @@ pub(super) fn body<const D: usize, const S: usize>(
     if job.output.asks_for_slip() {
         body.contacts.iter_mut().flat_map(|contact| &mut contact.friction).for_each(Friction::keep_slip);
     }
+    if job.output.asks_for_flow() {
+        let Body { effects, geometry, .. } = &mut body;
+        effects.iter_mut().for_each(|effect| effect.keep_flow(geometry));
+    }
     if job.time.adaptive.is_some() || job.time.scheme.states() > 1 {
         body.keep_earlier();
     }

@@ -15,6 +15,12 @@ const PAIRS: [(&str, &str, &str); 6] = [
     ("distance_weakening_block", "contact.0.friction", "0.3 + 0.3*max(1 - l/0.05, 0)"),
 ];
 
+/// Share of the largest value that rounding makes of a result. The block moves along the plane 1e5 times as fast as vertically, and its
+/// numerical dissipation is a small difference.
+fn rounding(job: &str) -> f64 {
+    if job == "distance_weakening_block" { 1e-8 } else { 1e-10 }
+}
+
 /// The job with its built-in law, and with this formula in its place.
 fn pair(job: &str, key: &str, formula: &str) -> [Case; 2] {
     let law = match key {
@@ -37,7 +43,7 @@ fn built_in_laws_written_as_formulas_give_the_same_answer_on_one_and_two_ranks()
             assert_same_answer(
                 &built_in.run(ranks),
                 &written.run(ranks),
-                1e-9,
+                rounding(job),
                 &format!("{job} on {ranks} ranks"),
             );
         }
@@ -53,23 +59,35 @@ fn formulas_have_the_numbers_of_built_in_laws_under_every_scheme() {
                 let case = case.set("time.scheme", &format!("'{scheme}'")).set("time.end", "0.1");
                 case.set("contact.0.redistribute_mass", &is_moved).run_and_keep(1)
             });
-            assert_same_answer(&wanted.results(), &found.results(), 1e-8, &format!("{job} under {scheme}"));
+            assert_same_answer(
+                &wanted.results(),
+                &found.results(),
+                rounding(job),
+                &format!("{job} under {scheme}"),
+            );
         }
     }
 }
 
 #[test]
-fn nortons_law_written_as_a_formula_gives_the_same_answer_under_every_scheme() {
+fn laws_of_flow_written_as_formulas_give_the_same_answer_under_every_scheme() {
     let norton = "{ norton = { rate = 0.02, reference_stress = 10, exponent = 3, hardening_strain = 0.1 } }";
-    let written = "{ expression = { rate = '0.02*(q/10)^3/(1 + e/0.1)', reference_stress = 10 } }";
+    let as_norton = "{ expression = { rate = '0.02*(q/10)^3/(1 + e/0.1)', reference_stress = 10 } }";
+    let perzyna = "{ perzyna = { yield_stress = 2, relaxation = 100, hardening_modulus = 50 } }";
+    let as_perzyna = "{ expression = { rate = 'max(q - 2 - 50*e, 0)/300', reference_stress = 10 } }";
     for scheme in ["lagged_euler", "implicit_euler", "bdf2"] {
-        let [wanted, found] = [norton, written].map(|law| {
-            let case = Case::square(8).set("time.scheme", &format!("'{scheme}'")).set("time.end", "0.25");
-            case.set("material.viscoplasticity", law)
-                .set("solver.accept", "['explicit_stability']")
-                .run_and_keep(2)
-        });
-        assert_same_answer(&wanted.results(), &found.results(), 1e-9, scheme);
+        for (built_in, written) in [(norton, as_norton), (perzyna, as_perzyna)] {
+            let [wanted, found] = [built_in, written].map(|law| {
+                let case = Case::square(8).set("time.scheme", &format!("'{scheme}'")).set("time.end", "0.25");
+                case.set("material.viscoplasticity", law)
+                    .set("material.hypothesis", "'plane_strain'")
+                    .set("traction.0.value", "['0', '-8*sin(15*t)']")
+                    .set("solver.tolerance", "1e-12")
+                    .set("solver.accept", "['explicit_stability']")
+                    .run_and_keep(2)
+            });
+            assert_same_answer(&wanted.results(), &found.results(), 1e-10, &format!("{scheme}, {written}"));
+        }
     }
 }
 

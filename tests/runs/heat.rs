@@ -48,6 +48,22 @@ fn heat_leaves_the_motion_as_it_is_and_is_written_where_it_is_called_for() {
 }
 
 #[test]
+fn a_flux_that_ends_at_nodes_enters_whole() {
+    for order in ["1", "2"] {
+        let case = square()
+            .set("mesh.rectangle.cells", "[8, 8]")
+            .set("mesh.order", order)
+            .set("material.heat", HEAT)
+            .set("initial.temperature", "290")
+            .set("heat", "[{ on = ['top'], flux = '60*(x > 0.25)*(x < 0.75)' }]");
+        let results = case.run(2);
+        let entered: f64 =
+            results.table("history.csv").numbers("entered_heat").last().copied().expect("rows");
+        assert!((entered - 60.0 * 0.5 * 0.25).abs() < 1e-9, "{entered}");
+    }
+}
+
+#[test]
 fn a_stage_goes_on_from_the_temperature_of_the_state_it_starts_from() {
     let first = heated().run_and_keep(1);
     let state = first.results().path("checkpoint-4.h5");

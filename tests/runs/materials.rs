@@ -112,6 +112,41 @@ fn accumulated_strain_is_kept_where_the_material_hardens_only() {
 }
 
 #[test]
+fn every_law_writes_its_equivalent_strain_where_it_is_asked_for() {
+    for (name, law) in LAWS {
+        let case = square("plane_strain").set(LAW, law).set("output.also", &format!("['{STRAIN}']"));
+        let results = case.run(2);
+        let fields = NumberFile::open(&results.path("fields.vtkhdf"));
+        let strain = fields.field(STRAIN, fields.times().len() - 1);
+        let is_kept = strain.iter().all(|value| *value >= 0.0) && strain.iter().any(|value| *value > 0.0);
+        assert!(is_kept, "{name}: {strain:?}");
+    }
+    // The same as that of hardening that does nothing.
+    let norton = "norton = { rate = 0.01, reference_stress = 9, exponent = 3";
+    for (hypothesis, law, nothing) in [
+        ("plane_strain", "perzyna = { relaxation = 100, yield_stress = 9", ", hardening_modulus = 1e-9"),
+        ("plane_stress", norton, ", hardening_strain = 1, hardening_exponent = 0"),
+        ("plane_strain", norton, ", hardening_strain = 1, hardening_exponent = 0"),
+    ] {
+        for scheme in ["lagged_euler", "implicit_euler"] {
+            let [found, wanted] = ["", nothing].map(|more| {
+                let case = square(hypothesis).set(LAW, &format!("{{ {law}{more} }} }}"));
+                let case = case
+                    .set("time.scheme", &format!("'{scheme}'"))
+                    .set("output.probe_also", &format!("['{STRAIN}']"));
+                case.set("solver.accept", "['explicit_stability']").run(1).table("probes.csv").numbers(STRAIN)
+            });
+            let largest = wanted.iter().copied().fold(0.0, f64::max);
+            assert!(largest > 1e-4, "{law}: {largest}");
+            let is_same = |(one, other): (&f64, &f64)| (one - other).abs() < 1e-9 * largest;
+            assert!(found.iter().zip(&wanted).all(is_same), "{law}: {found:?} {wanted:?}");
+        }
+    }
+    let soil = square("plane_stress").set(LAW, LAWS[7].1).set("output.also", &format!("['{STRAIN}']"));
+    soil.run_with(1, &[]).expect(2).says("keeps the volume only");
+}
+
+#[test]
 fn a_hardening_run_that_continues_is_the_straight_run_to_the_last_bit() {
     let make = || square("plane_strain").set(LAW, LAWS[2].1).set("checkpoint.every", "8");
     let straight = make();

@@ -499,6 +499,33 @@ fn creep_is_as_fast_as_the_temperature_at_the_end_of_a_step_has_it() {
     });
 }
 
+/// A bar under a constant stress s that creeps at the rate r e^(b (T - 300)) warms by its own flow: c T' = s r e^(b (T - 300)), so that
+/// T = 300 - ln(1 - t/t') / b, which has no bound as t comes to t' = c/(b s r) = 125 s.
+fn runaway(session: &Session, steps: f64) -> f64 {
+    let end = 0.9 * 125.0;
+    let job = format!(
+        "{}[material]\nhypothesis = \"plane_stress\"\nelasticity = {{ youngs_modulus = 1e11, poisson_ratio = 0.3 }}\n\
+         heat = {{ conductivity = 1, volumetric_capacity = 1e5 }}\n\
+         viscoplasticity.expression = {{ rate = \"1e-3*(q/1e6)^3*exp(0.05*(temperature - 300))\", reference_stress = 1e7 }}\n\
+         [[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n\
+         [[traction]]\non = [\"right\"]\nvalue = [2e6, 0]\n[initial]\ntemperature = 300\n\
+         [time]\nend = {end}\nstep = {}\nscheme = \"bdf2\"\n",
+        any_mesh::<2>(),
+        end / steps
+    );
+    let mut run = simulation::<2, 3>(session, &job, &crossed([2, 2]));
+    finish(session, &mut run);
+    error(session, &run, |_| 300.0 + 20.0 * 10.0_f64.ln())
+}
+
+#[test]
+fn flow_that_warms_its_body_runs_away_as_in_closed_form() {
+    run_on(&[1, 2], |world| {
+        let [coarse, fine] = [100.0, 200.0].map(|steps| runaway(&world.session, steps));
+        assert!(fine < 0.02 && coarse / fine > 3.5, "{coarse} {fine}");
+    });
+}
+
 #[test]
 fn a_brake_fades_as_it_warms() {
     run_on(&[1, 2], |world| {

@@ -13,8 +13,8 @@
 use super::{EnergyKind, History, HistoryStore, Moment, Quantity, Role, quantity};
 use crate::{
     error::{Error, Result},
-    fem::space::{Simplex, assemble_numbers},
-    job::{HeatBoundary, Scalar},
+    fem::space::{Simplex, assemble_numbers, facet_rule},
+    job::{Convection, HeatBoundary, Scalar},
     laws::material::{self, Material},
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
@@ -116,12 +116,11 @@ struct Released {
     flow: Vec<f64>,
 }
 
-/// Nodes at which heat passes.
+/// Facets of this rank through which heat passes.
 #[derive(Debug)]
 struct Boundary {
     given: HeatBoundary,
-    /// Owned nodes, each with its share of the boundary in m^(D-1).
-    nodes: Vec<(u32, f64)>,
+    facets: Vec<u32>,
 }
 
 /// What passes heat at the boundary at a time.
@@ -201,28 +200,19 @@ impl<const D: usize> Heat<D> {
 
     /// Lets heat pass these facets of this rank. Collective.
     pub fn add_boundary(&mut self, mesh: &Mesh<D>, given: HeatBoundary, facets: &[u32]) -> Result<()> {
-        let mut nodes = Vec::new();
-        let is_held = given.temperature.is_some();
-        self.gather(|weights| {
-            for &facet in facets {
-                for (node, weight) in mesh.facets[facet as usize].iter().zip(shares_of_facet(mesh, facet)) {
-                    // A temperature is given also where the boundary has no area, on the axis of a body of revolution.
-                    weights[*node as usize] += if is_held { 1.0 } else { weight };
-                }
-            }
-        })?;
-        let weights = self.exchange.owned()?;
-        nodes.extend((0..).zip(weights.iter().copied()).filter(|(_, weight)| *weight > 0.0));
-        drop(weights);
-        let number = self.boundaries.len() as u32;
-        if is_held {
+        if given.temperature.is_some() {
+            self.gather(|counts| {
+                let nodes = facets.iter().flat_map(|&facet| mesh.facets[facet as usize]);
+                nodes.for_each(|node| counts[node as usize] += 1.0);
+            })?;
+            let counts = self.exchange.owned()?;
+            let nodes = (0..).zip(counts.iter()).filter(|(_, count)| **count > 0.0).map(|(node, _)| node);
             let known: BTreeMap<u32, u32> = self.held.iter().copied().collect();
-            self.held.extend(
-                nodes.iter().filter(|(node, _)| !known.contains_key(node)).map(|(node, _)| (*node, number)),
-            );
+            let number = self.boundaries.len() as u32;
+            self.held.extend(nodes.filter(|node| !known.contains_key(node)).map(|node| (node, number)));
             self.held.sort_unstable();
         }
-        self.boundaries.push(Boundary { given, nodes });
+        self.boundaries.push(Boundary { given, facets: facets.to_vec() });
         Ok(())
     }
 
@@ -360,39 +350,37 @@ impl<const D: usize> Heat<D> {
         Ok(())
     }
 
-    /// What passes heat at the boundary at this time in s.
-    pub fn write_conditions(&self, mesh: &Mesh<D>, time: f64, out: &mut Conditions) -> Result<()> {
-        for values in [&mut out.power, &mut out.film] {
+    /// What passes heat at the boundary at this time in s, by quadrature of degree 2. Collective.
+    pub fn write_conditions(
+        &mut self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        time: f64,
+        out: &mut Conditions,
+    ) -> Result<()> {
+        let boundaries = std::mem::take(&mut self.boundaries);
+        let [mut power, mut film] = [Ok(()), Ok(())];
+        let is_crossed = boundaries.iter().any(|boundary| boundary.given.temperature.is_none());
+        let is_filmed = boundaries.iter().any(|boundary| boundary.given.convection.is_some());
+        for (values, is_there, is_film) in
+            [(&mut out.power, is_crossed, false), (&mut out.film, is_filmed, true)]
+        {
             values.clear();
-            values.resize(self.owned, 0.0);
-        }
-        for (number, Boundary { given, nodes }) in self.boundaries.iter().enumerate() {
-            let value = |value: &Scalar, what: &str, node: u32| {
-                let place: &Vector<D> = &mesh.nodes[node as usize];
-                let number_there = value.evaluate(time, place);
-                let is_sound = is_temperature(number_there) || (what == FLUX && number_there.is_finite());
-                let fault = || {
-                    Error::Failed(format!(
-                        "heat.{number}: the {what} is {number_there} at t = {time} s, position {place:?} m; only a flux may be \
-                         negative: correct the expression in the job"
-                    ))
-                };
-                is_sound.then_some(number_there).ok_or_else(fault)
-            };
-            if let Some(flux) = &given.flux {
-                for &(node, weight) in nodes {
-                    out.power[node as usize] += weight * value(flux, FLUX, node)?;
-                }
+            if !is_there {
+                values.resize(self.owned, 0.0);
+                continue;
             }
-            if let Some(convection) = &given.convection {
-                for &(node, weight) in nodes {
-                    let film = weight * value(&convection.coefficient, COEFFICIENT, node)?;
-                    out.film[node as usize] += film;
-                    out.power[node as usize] +=
-                        film * value(&convection.ambient, "ambient temperature", node)?;
-                }
-            }
+            let fault = if is_film { &mut film } else { &mut power };
+            self.gather(|sums| *fault = add_passing(&boundaries, mesh, time, is_film, sums))?;
+            values.extend_from_slice(&self.exchange.owned()?);
         }
+        self.boundaries = boundaries;
+        session.agree(power.and(film).and_then(|()| self.write_held(mesh, time, out)))?;
+        Ok(())
+    }
+
+    /// The temperatures of the nodes where they are given.
+    fn write_held(&self, mesh: &Mesh<D>, time: f64, out: &mut Conditions) -> Result<()> {
         out.held.clear();
         for &(node, number) in &self.held {
             let Some(temperature) = &self.boundaries[number as usize].given.temperature else { continue };
@@ -675,14 +663,56 @@ fn add_to_corners<const D: usize>(mesh: &Mesh<D>, cell: usize, whole: f64, sums:
     mesh.cell(cell).iter().zip(shares).for_each(|(node, share)| sums[*node as usize] += share * whole);
 }
 
-/// The shares in m^(D-1) that the corners of a facet have of it.
-fn shares_of_facet<const D: usize>(mesh: &Mesh<D>, facet: u32) -> [f64; D] {
+/// Adds to the nodes of this rank the power in W that enters, of convection that of a body of 0 K, or the convection in W/K.
+fn add_passing<const D: usize>(
+    boundaries: &[Boundary],
+    mesh: &Mesh<D>,
+    time: f64,
+    is_film: bool,
+    sums: &mut [f64],
+) -> Result<()> {
+    for (number, Boundary { given, facets }) in boundaries.iter().enumerate() {
+        let value = |value: &Scalar, what: &str, place: &Vector<D>| {
+            let number_there = value.evaluate(time, place);
+            let is_sound = is_temperature(number_there) || (what == FLUX && number_there.is_finite());
+            let fault = || {
+                Error::Failed(format!(
+                    "heat.{number}: the {what} is {number_there} at t = {time} s, position {place:?} m; only a flux may be \
+                     negative: correct the expression in the job"
+                ))
+            };
+            is_sound.then_some(number_there).ok_or_else(fault)
+        };
+        let passing = |place: &Vector<D>| match given {
+            HeatBoundary { flux: Some(flux), .. } if !is_film => value(flux, FLUX, place),
+            HeatBoundary { convection: Some(Convection { coefficient, ambient }), .. } => {
+                let film = value(coefficient, COEFFICIENT, place)?;
+                Ok(if is_film { film } else { film * value(ambient, "ambient temperature", place)? })
+            }
+            _ => Ok(0.0),
+        };
+        for &facet in facets.iter().filter(|_| given.temperature.is_none()) {
+            for (weight, shares, place) in points_of_facet(mesh, facet) {
+                let whole = weight * passing(&place)?;
+                let nodes = mesh.facets[facet as usize].iter().zip(shares);
+                nodes.for_each(|(node, share)| sums[*node as usize] += share * whole);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The Gauss points of a facet between its corners: the weight in m^(D-1), the values of the functions of the corners, the place in m.
+fn points_of_facet<const D: usize>(
+    mesh: &Mesh<D>,
+    facet: u32,
+) -> impl Iterator<Item = (f64, &'static [f64; 3], Vector<D>)> {
     let corners = mesh.facet_corners(facet);
-    let share = norm(&facet_normal(&corners)) / D as f64;
-    let turn = |at: usize| mesh.turn(&corners[at]);
-    std::array::from_fn(
-        |at| if mesh.is_revolved { share * (2.0 * turn(at) + turn(1 - at)) / 3.0 } else { share },
-    )
+    let measure = norm(&facet_normal(&corners));
+    facet_rule::<D>().iter().map(move |(shares, weight)| {
+        let place = std::array::from_fn(|i| corners.iter().zip(shares).map(|(c, share)| share * c[i]).sum());
+        (measure * weight * mesh.turn(&place), shares, place)
+    })
 }
 
 #[cfg(test)]
@@ -709,7 +739,7 @@ mod tests {
         for facet in 0..mesh.facets.len() as u32 {
             let [a, b] = mesh.facet_corners(facet);
             let length = norm(&[b[0] - a[0], b[1] - a[1]]);
-            let total: f64 = shares_of_facet(&mesh, facet).iter().sum();
+            let total: f64 = points_of_facet(&mesh, facet).map(|(weight, ..)| weight).sum();
             let expected = std::f64::consts::PI * length * (a[0] + b[0]);
             assert!((total - expected).abs() <= 1e-13 * expected, "{total} {expected}");
         }

@@ -1,6 +1,6 @@
 use super::{Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, Term};
 use crate::{
-    fem::space::{Batch, Needs},
+    fem::space::{Batch, Geometry, Needs},
     linear_algebra::simd::LANES,
 };
 
@@ -96,6 +96,9 @@ pub trait Effect<const D: usize, const S: usize> {
     fn histories(&self) -> Vec<&dyn HistoryStore> {
         Vec::new()
     }
+
+    /// Keeps the equivalent viscoplastic strain of all cells that flow.
+    fn keep_flow(&mut self, _: &Geometry<D>) {}
 
     /// Visits the same histories.
     fn visit_histories(&mut self, _visit: &mut dyn FnMut(&mut dyn HistoryStore)) {}

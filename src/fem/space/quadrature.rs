@@ -102,7 +102,7 @@ pub const fn cell_rule<const D: usize>() -> CellRule {
 }
 
 /// The rule for edges (`D = 2`) or triangular faces (`D = 3`).
-pub(super) const fn facet_rule<const D: usize>() -> FacetRule {
+pub const fn facet_rule<const D: usize>() -> FacetRule {
     if D == 2 { EDGE } else { FACE }
 }
 

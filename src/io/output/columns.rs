@@ -298,11 +298,7 @@ pub(crate) const PROBES: RunTable = RunTable {
             "m/s²",
             "acceleration in the equations of the step, at the time at which they hold; interpolated, as all quantities of nodes",
         )],
-        &[Column::plain(
-            "equivalent_viscoplastic_strain",
-            "",
-            "accumulated viscoplastic strain, with hardening",
-        )],
+        &[Column::plain("equivalent_viscoplastic_strain", "", "accumulated equivalent viscoplastic strain")],
         &[Column::plain("damage", "", "damage")],
         &[Column::plain(
             "contact_pressure",

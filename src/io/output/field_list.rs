@@ -144,8 +144,8 @@ static HISTORIES: [OutputField; 8] = [
         "equivalent_viscoplastic_strain",
         Place::Cell,
         "",
-        "with hardening",
-        "accumulated viscoplastic strain",
+        "with hardening, or if asked for",
+        "accumulated equivalent viscoplastic strain",
     ),
     history(
         "damage",

@@ -23,6 +23,10 @@ use crate::{
 /// Number of the quantities.
 const COUNT: usize = 15;
 
+/// The equivalent viscoplastic strain, and what a body needs to have it.
+const FLOWED: &str = "equivalent_viscoplastic_strain";
+const FLOW: &str = "[material.viscoplasticity]";
+
 /// What a body needs to have a slip distance.
 const FRICTION: &str = "a contact with friction, whose coefficient may be 0";
 
@@ -41,10 +45,7 @@ const QUANTITIES: [(ProbedQuantity, &[Source]); COUNT] = [
     (ProbedQuantity::Pressure, &[Source::Field(Position::PRESSURE)]),
     (ProbedQuantity::Strain, &[Source::Field(Position::STRAIN)]),
     (ProbedQuantity::Acceleration, &[Source::Acceleration]),
-    (
-        ProbedQuantity::EquivalentViscoplasticStrain,
-        &[Source::OfCells("equivalent_viscoplastic_strain", "viscoplastic flow with hardening")],
-    ),
+    (ProbedQuantity::EquivalentViscoplasticStrain, &[Source::OfCells(FLOWED, FLOW)]),
     (ProbedQuantity::Damage, &[Source::OfCells("damage", "[material.damage]")]),
     (ProbedQuantity::ContactPressure, &[Source::Field(Position::CONTACT_PRESSURE)]),
     (ProbedQuantity::ContactTraction, &[Source::Field(Position::CONTACT_TRACTION)]),
@@ -103,7 +104,10 @@ pub(crate) fn fault<const D: usize, const S: usize>(
     let is_kept = body.contacts.iter().flat_map(|contact| &contact.friction).any(Friction::keeps_slip);
     let of_fields = (output.also.contains(&FurtherField::Slip) && !is_kept)
         .then(|| ("output.also", words_of_missing(["slip", FRICTION])));
-    of_probes.or(of_fields)
+    let flows = || body.cell_histories().any(|history| history.name() == FLOWED);
+    let of_flow = (output.also.contains(&FurtherField::EquivalentViscoplasticStrain) && !flows())
+        .then(|| ("output.also", words_of_missing([FLOWED, FLOW])));
+    of_probes.or(of_fields).or(of_flow)
 }
 
 fn words_of_missing([name, needed]: [&str; 2]) -> [String; 2] {

@@ -126,7 +126,7 @@ pub struct Traction {
     #[schemars(extend("variables" = "x, y, z"), example = "x > 0.5", example = "(x > 1)*(x < 2)")]
     pub part: Option<Scalar>,
     /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
-    /// x, y, z.
+    /// x, y, z, integrated by their values at points within the facets.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
     pub value: Vec<Scalar>,

@@ -24,7 +24,8 @@ pub struct HeatBoundary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "K"), example = 293.0, example = "293 + 100*min(t/10, 1)")]
     pub temperature: Option<Scalar>,
-    /// The heat that enters the body per area and time. Several fluxes, and the heat of convection, are added.
+    /// The heat that enters the body per area and time: a number, or an expression in t, x, y, z, integrated by its values at points within
+    /// the facets. Several fluxes, and the heat of convection, are added.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "W/m^2"), example = 1e4, example = "1e4*(t < 2)")]
     pub flux: Option<Scalar>,

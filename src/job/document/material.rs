@@ -31,7 +31,13 @@ pub(in crate::job) fn check_material(material: &Material, table: &mut Table<'_>,
     if !may_be_empty && !material.resists() {
         let [whole, elasticity, viscosity] = ["", "elasticity", "viscosity"].map(|key| table.header(key));
         let message = format!("{whole} has no density, no elasticity and no viscosity");
-        table.fault("", message, format!("add density, {elasticity} or {viscosity}"));
+        let help = match material.heat {
+            None => format!("add density, {elasticity} or {viscosity}"),
+            Some(_) => {
+                "for heat alone add a density: a body without loads then stays at rest at no cost".into()
+            }
+        };
+        table.fault("", message, help);
     }
     for (key, message) in material.laws_that_require_elasticity() {
         if material.orthotropic.is_some() {

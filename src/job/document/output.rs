@@ -92,6 +92,8 @@ pub enum FurtherField {
     /// The accumulated slip distance relative to the obstacle at the nodes of contacts with friction in m; 0 at other nodes. Without this
     /// entry it is written where a friction law depends on it.
     Slip,
+    /// The equivalent viscoplastic strain that has accumulated in each cell. Without this entry it is written where flow depends on it.
+    EquivalentViscoplasticStrain,
 }
 
 /// A quantity of probes.
@@ -206,6 +208,12 @@ impl Output {
     /// Whether slip distances are written also where no friction law depends on them.
     pub fn asks_for_slip(&self) -> bool {
         self.also.contains(&FurtherField::Slip) || self.probe_also.contains(&ProbedQuantity::Slip)
+    }
+
+    /// Whether equivalent viscoplastic strains are written also where no law of flow depends on them.
+    pub fn asks_for_flow(&self) -> bool {
+        self.also.contains(&FurtherField::EquivalentViscoplasticStrain)
+            || self.probe_also.contains(&ProbedQuantity::EquivalentViscoplasticStrain)
     }
 
     /// Checks the keys of a run that ends at this time in s.

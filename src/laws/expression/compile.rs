@@ -42,8 +42,14 @@ const POWER: Binary = {
         let [by_base, by_exponent] = slopes(base, exponent);
         [if exponent == 0.0 { 0.0 } else { by_base }, by_exponent]
     }
-    Binary::smooth((f64::powf, slopes_of_numbers), (Interval::power, slopes))
-        .sharing(|base, exponent| [exponent, exponent * Real::ln(base)])
+    fn by_base(base: f64, exponent: f64, power: f64) -> f64 {
+        // Neither underflow nor overflow.
+        let is_ordinary = power.is_normal() && base.is_normal();
+        if is_ordinary { exponent * (power / base) } else { slopes_of_numbers(base, exponent)[0] }
+    }
+    let smooth = Binary::smooth((f64::powf, slopes_of_numbers), (Interval::power, slopes));
+    let alone = Binary { by_left: Some(by_base), ..smooth };
+    alone.sharing(|base, exponent| [exponent, exponent * Real::ln(base)])
 };
 const BELOW: Binary = comparison!(<);
 const AT_MOST: Binary = comparison!(<=);

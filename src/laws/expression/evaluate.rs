@@ -21,8 +21,12 @@ impl Program {
         machine.digest
     }
 
-    /// Value at these arguments, and derivative by one of them.
-    pub(super) fn differentiate(&self, arguments: &Arguments, by: Variable) -> [f64; 2] {
+    /// Value at these arguments, and derivatives by some of them.
+    pub(super) fn differentiate<const N: usize>(
+        &self,
+        arguments: &Arguments,
+        by: [Variable; N],
+    ) -> (f64, [f64; N]) {
         self.run(&mut Slopes { arguments, by })
     }
 }
@@ -111,48 +115,56 @@ impl Machine for Pieces<'_> {
     }
 }
 
-/// Values and derivatives by one variable.
-struct Slopes<'a> {
+/// Values and derivatives by some variables.
+struct Slopes<'a, const N: usize> {
     arguments: &'a Arguments,
-    by: Variable,
+    by: [Variable; N],
 }
 
-impl Machine for Slopes<'_> {
-    type Entry = [f64; 2];
+impl<const N: usize> Machine for Slopes<'_, N> {
+    type Entry = (f64, [f64; N]);
 
-    fn number(&self, number: f64) -> [f64; 2] {
-        [number, 0.0]
+    fn number(&self, number: f64) -> Self::Entry {
+        (number, [0.0; N])
     }
 
-    fn variable(&self, variable: Variable) -> [f64; 2] {
-        [self.arguments[variable as usize], f64::from(u8::from(variable == self.by))]
+    fn variable(&self, variable: Variable) -> Self::Entry {
+        (self.arguments[variable as usize], self.by.map(|by| f64::from(u8::from(variable == by))))
     }
 
-    fn unary(&mut self, function: &Unary, [argument, slope]: [f64; 2]) -> [f64; 2] {
-        [(function.value)(argument), chain((function.slope)(argument), slope)]
-    }
-
-    fn binary(&mut self, function: &Binary, [left, right]: [[f64; 2]; 2]) -> [f64; 2] {
-        let value = (function.value)(left[0], right[0]);
-        if left[1] == 0.0 && right[1] == 0.0 {
-            return [value, 0.0];
+    fn unary(&mut self, function: &Unary, (argument, slopes): Self::Entry) -> Self::Entry {
+        let value = (function.value)(argument);
+        if slopes == [0.0; N] {
+            return (value, slopes);
         }
-        let slopes = (function.slopes)(left[0], right[0]);
-        [value, chain(slopes[0], left[1]) + chain(slopes[1], right[1])]
+        let slope = (function.slope)(argument);
+        (value, slopes.map(|inner| chain(slope, inner)))
     }
 
-    fn ternary(&mut self, function: &Ternary, [first, then, otherwise]: [[f64; 2]; 3]) -> [f64; 2] {
-        let piece = (function.piece)([first[0], then[0], otherwise[0]]);
+    fn binary(&mut self, function: &Binary, [left, right]: [Self::Entry; 2]) -> Self::Entry {
+        let value = (function.value)(left.0, right.0);
+        if left.1 == [0.0; N] && right.1 == [0.0; N] {
+            return (value, [0.0; N]);
+        }
+        let [by_left, by_right] = match function.by_left {
+            Some(by_left) if right.1 == [0.0; N] => [by_left(left.0, right.0, value), 0.0],
+            _ => (function.slopes)(left.0, right.0),
+        };
+        (value, std::array::from_fn(|k| chain(by_left, left.1[k]) + chain(by_right, right.1[k])))
+    }
+
+    fn ternary(&mut self, function: &Ternary, [first, then, otherwise]: [Self::Entry; 3]) -> Self::Entry {
+        let piece = (function.piece)([first.0, then.0, otherwise.0]);
         match function.switches || piece.is_nan() {
-            true => [piece, 0.0],
+            true => (piece, [0.0; N]),
             false if piece != 0.0 => then,
             false => otherwise,
         }
     }
 
-    fn interpolate(&mut self, table: &Table, [at, slope]: [f64; 2]) -> [f64; 2] {
+    fn interpolate(&mut self, table: &Table, (at, slopes): Self::Entry) -> Self::Entry {
         let [value, steepness] = interpolate(table, points_before(table, at), at);
-        [value, chain(steepness, slope)]
+        (value, slopes.map(|slope| chain(steepness, slope)))
     }
 }
 

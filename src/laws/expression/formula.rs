@@ -97,6 +97,12 @@ impl<S: Scope> Formula<S> {
 
     /// Its value there, and its derivative by one variable.
     pub fn differentiate(&self, at: &[(Variable, f64)], by: Variable) -> [f64; 2] {
+        let (value, [slope]) = self.slopes(at, [by]);
+        [value, slope]
+    }
+
+    /// Its value there, and its derivatives by some variables.
+    pub fn slopes<const N: usize>(&self, at: &[(Variable, f64)], by: [Variable; N]) -> (f64, [f64; N]) {
         self.expression.program.differentiate(&arguments(at), by)
     }
 

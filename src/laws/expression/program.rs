@@ -294,7 +294,9 @@ pub(super) struct Binary {
     pub(super) value: fn(f64, f64) -> f64,
     /// Its derivatives by both arguments.
     pub(super) slopes: fn(f64, f64) -> [f64; 2],
-    /// The same at all points of intervals.
+    /// Its derivative by the left argument, given its value, where that takes much less than both.
+    pub(super) by_left: Option<fn(f64, f64, f64) -> f64>,
+    /// Its values and derivatives at all points of intervals.
     pub(super) enclosures: OfTwo<Interval>,
     /// Its derivatives by the logarithms of both arguments over its value at all points of intervals, where they are sharper than
     /// quotients of the other enclosures.
@@ -316,7 +318,16 @@ pub(super) struct Piece {
 
 impl Binary {
     pub(super) const fn smooth((value, slopes): OfTwo<f64>, enclosures: OfTwo<Interval>) -> Self {
-        Self { value, slopes, enclosures, shares: None, piece: None, line: None, switches: false }
+        Self {
+            value,
+            slopes,
+            by_left: None,
+            enclosures,
+            shares: None,
+            piece: None,
+            line: None,
+            switches: false,
+        }
     }
 
     pub(super) const fn sharing(self, shares: fn(Interval, Interval) -> [Interval; 2]) -> Self {

@@ -44,7 +44,8 @@ impl Hypothesis {
     description = "Isotropic elasticity, linear unless it has the table `expression`."
 )]
 pub struct Elasticity<N = f64> {
-    /// Young's modulus. An expression in x, y, z is evaluated at the centre of each cell.
+    /// Young's modulus. An expression in x, y, z is evaluated at the centre of each cell: `if(y > 0.9, 2e11, 7e10)` is a coat that sticks to
+    /// its body, where facets of cells lie in y = 0.9.
     #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
     pub youngs_modulus: N,
     /// Poisson's ratio.

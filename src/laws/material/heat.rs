@@ -7,7 +7,8 @@ use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The heat of a material: its capacity and its conductivity.
+/// The heat of a material: its capacity and its conductivity. For heat alone the material needs a density and nothing else: a body without
+/// loads stays at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Heat {

@@ -18,7 +18,7 @@ mod thickness;
 
 pub use creep_formula::CreepFormula;
 pub use drucker_prager::DruckerPrager;
-pub use flow::{Flow, InPlaces, Parameters};
+pub use flow::{Flow, InPlaces, Parameters, Room};
 pub use maxwell::{Dashpots, Maxwell};
 pub use norton::Norton;
 pub use perzyna::{Metric, Perzyna};
@@ -33,7 +33,7 @@ use crate::{
     },
     linear_algebra::{
         simd::{LANES, Pack},
-        tensor::Mandel,
+        tensor::{Mandel, normal_components, trace},
     },
 };
 use schemars::JsonSchema;
@@ -159,6 +159,16 @@ macro_rules! delegate {
     };
 }
 
+/// The equivalent of a viscoplastic strain, `sqrt(2/3 x:x)` of its deviator `x`. In plane stress the strain across the plane is that of flow
+/// that keeps the volume.
+pub fn equivalent_strain<const S: usize>(strain: &Mandel<S>) -> f64 {
+    let (sum, normal) = (trace(strain), normal_components::<S>());
+    let (mean, across) = if normal == 2 { (0.0, sum) } else { (sum / 3.0, 0.0) };
+    let deviator = |(c, e): (usize, &f64)| if c < normal { e - mean } else { *e };
+    let square: f64 = strain.iter().enumerate().map(deviator).map(|x| x * x).sum();
+    ((square + across * across) / 1.5).sqrt()
+}
+
 impl<N> Viscoplasticity<N> {
     /// Whether the flow depends on the temperature.
     pub fn sees_temperature(&self) -> bool {
@@ -189,6 +199,9 @@ impl Flow for FlowLaw {
         rates::<S>(s: &Pack<S>, accumulated: &[f64; LANES], growths: &mut [f64; LANES]) -> Option<Pack<S>>;
         flow_to_end::<S>(trial: &Mandel<S>, length: f64, accumulated: f64, tangent: Option<&mut Tangent<S>>)
             -> Option<(Mandel<S>, f64)>;
+        by_accumulated::<S>(trial: &Mandel<S>, stress: &Mandel<S>, length: f64, accumulated: f64, tangent: &Tangent<S>)
+            -> Mandel<S>;
+        room::<S>(elastic: &Mandel<S>, release: &Mandel<S>, growth: f64, accumulated: f64) -> Room<S>;
         yielding::<S>(stresses: &Pack<S>, accumulated: &[f64; LANES]) -> [bool; LANES];
         has_symmetric_tangent::<S>() -> bool;
         fastest_rate::<S>(overstress: f64) -> f64;

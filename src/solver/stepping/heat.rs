@@ -199,7 +199,7 @@ impl HeatStep {
         heat: &mut Heat<D>,
         step: Step,
     ) -> Result<()> {
-        session.agree(heat.write_conditions(mesh, step.time, &mut self.conditions))?;
+        heat.write_conditions(session, mesh, step.time, &mut self.conditions)?;
         self.prepare(session, heat.capacity(), step.length)?;
         // The field with the given temperatures, and its conduction.
         self.field.clear();

@@ -2,7 +2,7 @@
 //!
 //! `s_{n-1} = E e(u_{n-2}) + H_{n-1}` is not stored: `u_{n-2} = u_{n-1} - k_{n-1} v_{n-1}`.
 
-use super::{VISCOPLASTIC, ViscoplasticFlow, beyond_back_stress};
+use super::{VISCOPLASTIC, ViscoplasticFlow, beyond_back_stress, count};
 use crate::{
     fem::{
         effect::{NUMERICAL, Outcome, Step},
@@ -95,7 +95,8 @@ impl<const S: usize> ViscoplasticFlow<S> {
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some((converged, trial)) = self.stress.both_mut(batch.number) else { return };
-        let mut accumulated = self.accumulated.as_mut().and_then(|history| history.both_mut(batch.number));
+        let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
+        let mut accumulated = accumulated.as_mut().and_then(|history| history.both_mut(batch.number));
         let mut growths = [0.0; LANES];
         let warm = self.warm[batch.material].as_mut().zip(batch.temperature);
         let given = Advance {
@@ -115,6 +116,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 after[lane] = before[lane] + step.length * growths[lane];
             }
         }
+        count(law, batch.number, &self.stress, &mut self.accumulated);
         outcome.energy[VISCOPLASTIC] += sum(&dissipated);
         if let Some(flow) = &mut outcome.flow {
             let cells = &mut flow[batch.first_cell..][..batch.count];

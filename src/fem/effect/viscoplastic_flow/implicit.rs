@@ -4,7 +4,7 @@
 //! finds: what does not yield keeps `H_n = H_{n-1}`. A cell that did not flow in the step before starts with implicit Euler, as a run
 //! does.
 
-use super::{ViscoplasticFlow, beyond_back_stress};
+use super::{ViscoplasticFlow, beyond_back_stress, count};
 use crate::{
     fem::{
         effect::{Blend, Outcome, Step},
@@ -73,6 +73,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 tangents.push(batch.first_point + lane, &tangent_change(law, &tangent, length), symmetric);
             }
         }
+        count(law, batch.number, &self.stress, &mut self.accumulated);
     }
 
     /// The dissipation of flow in a solved step, and the numerical terms of the scheme, in each cell of a batch.

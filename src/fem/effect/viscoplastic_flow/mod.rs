@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     fem::space::{Batch, Geometry, Integrity, Needs},
-    laws::material::{ByMaterial, Flow, FlowLaw},
+    laws::material::{ByMaterial, Flow, FlowLaw, equivalent_strain},
     linear_algebra::{
         simd::{LANES, Pack, sum},
         tensor::add_scaled,
@@ -29,7 +29,30 @@ pub struct ViscoplasticFlow<const S: usize> {
     warm: Vec<Option<FlowLaw>>,
     properties: FlowProperties,
     stress: CellHistory<S>,
+    /// The equivalent viscoplastic strain: of cells that harden, or of all that flow, if it is written.
     accumulated: Option<CellHistory<1>>,
+}
+
+/// The equivalent viscoplastic strain.
+const EQUIVALENT_STRAIN: Quantity = quantity!("equivalent_viscoplastic_strain");
+
+/// Adds the equivalent of the strain by which a law without hardening has flowed in a step, if it is kept.
+fn count<const S: usize>(
+    law: &FlowLaw,
+    number: usize,
+    stress: &CellHistory<S>,
+    accumulated: &mut Option<CellHistory<1>>,
+) {
+    let Some(accumulated) = accumulated.as_mut().filter(|_| !law.hardens()) else { return };
+    let (Some([before, after]), Some((converged, trial))) =
+        (stress.both(number), accumulated.both_mut(number))
+    else {
+        return;
+    };
+    for lane in 0..LANES {
+        let flow = law.elasticity().solve(&add_scaled(&before.lane(lane), -1.0, &after.lane(lane)));
+        trial.set(lane, [converged.lane(lane)[0] + equivalent_strain(&flow)]);
+    }
 }
 
 /// The stresses beyond the back stresses, given those that flow leaves; `None` for laws without a back stress.
@@ -45,11 +68,10 @@ impl<const S: usize> ViscoplasticFlow<S> {
         let flows = |material: usize| laws.get(material).is_some();
         let hardens = |material: usize| laws.get(material).is_some_and(FlowLaw::hardens);
         let stress = CellHistory::new(STRESS_OF_FLOW, geometry, flows);
-        let strain = quantity!("equivalent_viscoplastic_strain");
         let accumulated = laws
             .laws()
             .any(FlowLaw::hardens)
-            .then(|| CellHistory::new(strain, geometry, hardens).without_error());
+            .then(|| CellHistory::new(EQUIVALENT_STRAIN, geometry, hardens).without_error());
         let properties = FlowProperties {
             step_bound: laws.laws().map(|law| 2.0 / law.fastest_rate::<S>(1.0)).fold(f64::INFINITY, f64::min),
             has_power_law: laws.laws().any(FlowLaw::is_power_law),
@@ -131,6 +153,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some(histories) = self.stress.last_three(batch.number) else { return };
         error.add_history(law.elasticity(), batch, curvature, histories);
+    }
+
+    fn keep_flow(&mut self, geometry: &Geometry<D>) {
+        let flows = |material: usize| self.laws.get(material).is_some();
+        self.accumulated = Some(CellHistory::new(EQUIVALENT_STRAIN, geometry, flows).without_error());
     }
 
     fn histories(&self) -> Vec<&dyn HistoryStore> {

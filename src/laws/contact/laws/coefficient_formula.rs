@@ -105,9 +105,8 @@ impl CoefficientFormula {
     /// The derivative of the coefficient by the sliding velocity at the end of the step.
     fn by_speed(&self, speed: f64, pressure: f64, at: SlidingContext) -> f64 {
         let arguments = self.arguments(speed, pressure, at);
-        let by = |variable| self.coefficient.differentiate(&arguments, variable)[1];
-        let own = if self.coefficient.uses(Variable::V) { by(Variable::V) } else { 0.0 };
-        if self.coefficient.uses(Variable::L) { own + at.step_length * by(Variable::L) } else { own }
+        let (_, [own, by_slip]) = self.coefficient.slopes(&arguments, [Variable::V, Variable::L]);
+        own + at.step_length * by_slip
     }
 
     fn fault(&self) -> Option<[String; 2]> {

@@ -12,14 +12,14 @@
 //! All conditions on `f`, and the fastest rate, which bounds explicit steps, follow from enclosures of the formula.
 
 use super::{
-    flow::{Flow, InPlaces, Parameters},
+    flow::{Flow, InPlaces, Parameters, Room},
     release::{Release, WEIGHT, rate_along_deviator},
     tangent::{Tangent, add_product, write_isotropic},
 };
 use crate::{
     laws::{
         expression::{Enclosure, Formula, Interval, OfCreep, REACH, Supremum, Unproven, Variable},
-        law::{Derived, LawFault, increasing_root},
+        law::{Derived, LawFault},
         material::{Elastic, Elasticity, Hypothesis, Isotropic},
     },
     linear_algebra::tensor::{Mandel, larger, normal_components, trace, von_mises},
@@ -148,7 +148,7 @@ impl CreepFormula {
             ),
         ];
         // Beyond the rounding of a rate, and of its derivatives by stress and strain, of the size at the reference stress.
-        let rate = self.at(self.reference_stress, [0.0; 2])[0].abs();
+        let rate = self.value(self.reference_stress, [0.0; 2]).abs();
         let scales = [rate, rate / self.reference_stress, rate];
         for ((found, wrong, help), scale) in conditions.into_iter().zip(scales) {
             match found {
@@ -170,14 +170,24 @@ impl CreepFormula {
         None
     }
 
-    /// Rate in 1/s, and its derivatives by the von Mises norm, the mean stress and the accumulated strain.
-    fn at(&self, norm: f64, [mean, accumulated]: [f64; 2]) -> [f64; 4] {
-        let at = self.arguments(norm, [mean, accumulated]);
-        let [rate, by_norm] = self.rate.differentiate(&at, Variable::Q);
-        let by = |variable| {
-            if self.rate.uses(variable) { self.rate.differentiate(&at, variable)[1] } else { 0.0 }
-        };
-        [rate, by_norm, by(Variable::P), by(Variable::E)]
+    /// Rate in 1/s at a von Mises norm, a mean stress and an accumulated strain.
+    fn value(&self, norm: f64, others: [f64; 2]) -> f64 {
+        self.rate.value(&self.arguments(norm, others))
+    }
+
+    /// The rate, and its derivatives by the von Mises norm and the accumulated strain.
+    fn at(&self, norm: f64, others: [f64; 2]) -> Rate {
+        let (rate, [by_norm, by_strain]) =
+            self.rate.slopes(&self.arguments(norm, others), [Variable::Q, Variable::E]);
+        Rate { rate, by_norm, by_strain }
+    }
+
+    /// The derivative of the rate by the mean stress.
+    fn by_mean(&self, norm: f64, others: [f64; 2]) -> f64 {
+        if !self.rate.uses(Variable::P) {
+            return 0.0;
+        }
+        self.rate.differentiate(&self.arguments(norm, others), Variable::P)[1]
     }
 
     /// The arguments of a rate: von Mises norm, mean stress and accumulated strain, and the temperature.
@@ -203,42 +213,108 @@ impl Elastic<CreepFormula> {
     }
 }
 
+/// A rate in 1/s, and its derivatives by the von Mises norm and the accumulated strain.
+#[derive(Debug, Clone, Copy)]
+struct Rate {
+    rate: f64,
+    by_norm: f64,
+    by_strain: f64,
+}
+
 /// The mean of the three normal stresses.
 fn mean_of<const S: usize>(s: &Mandel<S>) -> f64 {
     trace(s) / 3.0
 }
 
+fn identity<const S: usize>() -> Mandel<S> {
+    std::array::from_fn(|c| f64::from(u8::from(c < normal_components::<S>())))
+}
+
 /// Share of a rate that is rounding.
 const ROUNDING: f64 = 1e-12;
+/// Share of a stress at which a rate that is zero has a threshold.
+const SMALL: f64 = 1e-6;
+/// Change of a logarithm below which the next correction of Newton's method is a rounding error.
+const LAST: f64 = 1e-11;
 /// Largest size of a logarithm.
 const LARGEST: f64 = 690.0;
 
+/// Where a step from a stress of this von Mises norm, and this mean and accumulated strain, ends in flow.
+struct End {
+    /// `x`.
+    x: f64,
+    /// `q(x)`.
+    norm: f64,
+    /// The derivative of `x q(x) - k f(q(x), m, p + x q(x))` by `x`, and by `q` at this `x`.
+    by_x: f64,
+    by_norm: f64,
+    /// The derivative of `k f` by `p`.
+    by_strain: f64,
+}
+
 impl Elastic<CreepFormula> {
-    /// The root `x`, whose logarithm is that of an increasing equation, `ln(x q(x)) - ln(k f(q(x), m, p + x q(x)))`, given `m` and `p`.
-    fn solve(&self, release: &Release, length: f64, [mean, accumulated]: [f64; 2]) -> f64 {
-        let equation = |logarithm: f64| {
+    /// The end of a step that flows at this rate at its start: the root `x`, whose logarithm is that of an increasing equation,
+    /// `ln(x q(x)) - ln(k f(q(x), m, p + x q(x)))`, given `m` and `p`. Newton's method starts where the tangent of `f` has the end, which
+    /// is the end for a rate that is linear beyond a threshold.
+    fn solve(&self, release: &Release, start: Rate, length: f64, [mean, accumulated]: [f64; 2]) -> End {
+        let mut last = start;
+        let mut equation = |logarithm: f64| {
             let x = logarithm.exp();
             let (norm, fall) = release.at(x);
-            let [rate, by_norm, _, by_strain] = self.parameters.at(norm, [mean, accumulated + x * norm]);
+            last = self.parameters.at(norm, [mean, accumulated + x * norm]);
+            let Rate { rate, by_norm, by_strain } = last;
             // Where nothing is left of the stress, all of it has flowed.
-            let open = if norm > 0.0 { logarithm + norm.ln() - (length * rate).ln() } else { f64::INFINITY };
+            let open = if norm > 0.0 { logarithm + (norm / (length * rate)).ln() } else { f64::INFINITY };
             let relaxed = (by_norm * norm * fall - by_strain * x * norm * (1.0 - fall)) / rate;
             [open, 1.0 - fall + if relaxed.is_finite() { relaxed } else { 0.0 }]
         };
-        let (start, _) = release.at(0.0);
-        let first = (length * self.parameters.at(start, [mean, accumulated])[0] / start)
-            .ln()
-            .clamp(-LARGEST, LARGEST);
-        let (mut low, mut high, mut step) = (first, first, 1.0);
-        while equation(low)[0] >= 0.0 && low > -LARGEST {
-            (low, step) = (low - step, 2.0 * step);
-        }
-        step = 1.0;
-        while equation(high)[0] < 0.0 && high < LARGEST {
-            (high, step) = (high + step, 2.0 * step);
-        }
-        increasing_root(low, high, 0.5 * (low + high), equation).exp()
+        let (norm, _) = release.at(0.0);
+        let Rate { rate, by_norm, by_strain } = start;
+        let stiffness = release.stiffness_at_start();
+        let growth = length * rate / (1.0 + length * (by_norm * stiffness - by_strain));
+        let left = norm - stiffness * growth;
+        let tangent = growth / if left > 0.0 { left } else { norm };
+        let x = root_from(tangent.ln().clamp(-LARGEST, LARGEST), &mut equation).exp();
+        let (norm, fall) = release.at(x);
+        let by_q = x - length * (last.by_norm + x * last.by_strain);
+        let by_x = norm * (1.0 - length * last.by_strain) - by_q * norm * fall / x;
+        End { x, norm, by_x, by_norm: by_q, by_strain: length * last.by_strain }
     }
+}
+
+/// The root of an increasing function between two [`LARGEST`], which `function` returns with its derivative: Newton's method from `start`,
+/// with bisection once its steps leave a bracket or do not become half as long.
+fn root_from(start: f64, function: &mut impl FnMut(f64) -> [f64; 2]) -> f64 {
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    let (mut at, mut last, mut stride) = (start, f64::INFINITY, 1.0);
+    for _ in 0..200 {
+        let [value, slope] = function(at);
+        let newton = at - value / slope;
+        if (newton - at).abs() <= LAST {
+            return newton;
+        }
+        if value > 0.0 {
+            high = at
+        } else {
+            low = at
+        }
+        let is_open = low.is_infinite() || high.is_infinite();
+        let next = if low < newton && newton < high && (is_open || (newton - at).abs() <= 0.5 * last) {
+            newton
+        } else if is_open {
+            stride *= 2.0;
+            if value > 0.0 { at - stride } else { at + stride }
+        } else {
+            0.5 * (low + high)
+        };
+        let next = next.clamp(-LARGEST, LARGEST);
+        last = (next - at).abs();
+        at = next;
+        if last <= 2.0 * f64::EPSILON * (1.0 + at.abs()) {
+            break;
+        }
+    }
+    at
 }
 
 /// Bounds of derivatives are found for stresses up to `2^(k / PARTS)` times the reference stress, for `k` in this range.
@@ -253,8 +329,7 @@ impl Flow for Elastic<CreepFormula> {
 
     fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
         let mean = mean_of(s);
-        let rate = |norm| self.parameters.rate.value(&self.parameters.arguments(norm, [mean, accumulated]));
-        rate_along_deviator(s, rate)
+        rate_along_deviator(s, |norm| self.parameters.value(norm, [mean, accumulated]))
     }
 
     fn flow_to_end<const S: usize>(
@@ -266,33 +341,93 @@ impl Flow for Elastic<CreepFormula> {
     ) -> Option<(Mandel<S>, f64)> {
         let norm = von_mises(trial);
         let mean = mean_of(trial);
-        let fastest = self.parameters.at(norm, [mean, accumulated])[0];
-        if norm == 0.0 || fastest == 0.0 {
+        let fastest = self.parameters.at(norm, [mean, accumulated]);
+        if norm == 0.0 || fastest.rate == 0.0 {
             return None;
         }
         let release = Release::new(trial, norm, &self.elasticity);
-        let x = self.solve(&release, length, [mean, accumulated]);
-        let (left_norm, _) = release.at(x);
-        let growth = x * left_norm;
-        let (left, [a, b]) = release.map::<S>(x);
+        let end = self.solve(&release, fastest, length, [mean, accumulated]);
+        let growth = end.x * end.norm;
+        let (left, [a, b]) = release.map::<S>(end.x);
         let weighted = WEIGHT.apply(&left.apply(trial));
         if let Some(tangent) = tangent {
             // The derivative of q(x) by s* at this x is R W s / q, that of R s* by x is -E W R s.
             let gradient = left.apply(&weighted);
-            let (_, fall) = release.at(x);
-            let [_, by_norm, by_mean, by_strain] =
-                self.parameters.at(left_norm, [mean, accumulated + growth]);
-            let by_q = x - length * (by_norm + x * by_strain);
-            let by_x = left_norm * (1.0 - length * by_strain) - by_q * left_norm * fall / x;
             write_isotropic(tangent, a, b);
             let release = self.elasticity.apply(&gradient);
-            add_product(tangent, by_q / (by_x * left_norm), &release, &gradient);
+            add_product(tangent, end.by_norm / (end.by_x * end.norm), &release, &gradient);
+            let by_mean = length * self.parameters.by_mean(end.norm, [mean, accumulated + growth]);
             if by_mean != 0.0 {
-                let identity = std::array::from_fn(|c| f64::from(u8::from(c < normal_components::<S>())));
-                add_product(tangent, -length * by_mean / (3.0 * by_x), &release, &identity);
+                add_product(tangent, -by_mean / (3.0 * end.by_x), &release, &identity());
             }
         }
-        Some((weighted.map(|w| x * w), growth))
+        Some((weighted.map(|w| end.x * w), growth))
+    }
+
+    fn by_accumulated<const S: usize>(
+        &self,
+        trial: &Mandel<S>,
+        _: &Mandel<S>,
+        length: f64,
+        accumulated: f64,
+        _: &Tangent<S>,
+    ) -> Mandel<S> {
+        let (norm, others) = (von_mises(trial), [mean_of(trial), accumulated]);
+        let fastest = self.parameters.at(norm, others);
+        if norm == 0.0 || fastest.rate == 0.0 {
+            return [0.0; S];
+        }
+        let release = Release::new(trial, norm, &self.elasticity);
+        let end = self.solve(&release, fastest, length, others);
+        let (left, _) = release.map::<S>(end.x);
+        let gradient = left.apply(&WEIGHT.apply(&left.apply(trial)));
+        self.elasticity.apply(&gradient).map(|component| -end.by_strain / end.by_x * component)
+    }
+
+    /// The yield surface of a rate that is zero up to a threshold, `g(s) = q` and `Y + h p` the threshold; nothing is linear in `p`.
+    fn room<const S: usize>(
+        &self,
+        elastic: &Mandel<S>,
+        release: &Mandel<S>,
+        growth: f64,
+        accumulated: f64,
+    ) -> Room<S> {
+        let law = &self.parameters;
+        let (norm, mean) = (von_mises(elastic), mean_of(elastic));
+        let nearly_none = SMALL * if norm > 0.0 { norm } else { law.reference_stress };
+        if law.value(nearly_none, [mean, accumulated]) != 0.0 {
+            return Room::Everywhere;
+        }
+        if law.value(norm, [mean, accumulated]) == 0.0 {
+            return Room::Nowhere;
+        }
+        let relief = 2.0 * von_mises(release);
+        let at = |share: f64| ((norm - share * relief).max(0.0), [mean, accumulated + 2.0 * share * growth]);
+        let yields = |share: f64| {
+            let (norm, others) = at(share);
+            law.value(norm, others) != 0.0
+        };
+        let [mut low, mut high] = [0.0, 1.0];
+        if yields(high) {
+            return Room::UpTo(f64::INFINITY, [0.0; S]);
+        }
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if yields(middle) { low = middle } else { high = middle }
+        }
+        let (least, others) = at(low);
+        let Rate { by_norm, by_strain, .. } = law.at(least, others);
+        let falls = by_norm * relief - 2.0 * by_strain * growth;
+        if falls <= 0.0 {
+            return Room::UpTo(low, [0.0; S]);
+        }
+        let [along, by_mean] = [by_norm / norm, law.by_mean(least, others) / 3.0].map(|slope| slope / falls);
+        let weighted = WEIGHT.apply(elastic);
+        let identity = identity::<S>();
+        Room::UpTo(low, std::array::from_fn(|c| along * weighted[c] + by_mean * identity[c]))
     }
 
     /// Along the deviator, stress relaxes at the rate `3 G df/dq`, also the largest rate in plane stress, and hardening at `-df/dp`; they
@@ -402,7 +537,7 @@ mod tests {
                 let stress: Mandel<3> = std::array::from_fn(|i| trial[i] - release[i]);
                 let q = von_mises(&stress);
                 // The stress whose rate is this growth, by the slope of the law.
-                let [rate, slope, ..] = law.parameters.at(q, [0.0; 2]);
+                let Rate { rate, by_norm: slope, .. } = law.parameters.at(q, [0.0; 2]);
                 let off = (growth / length - rate).abs() / slope.max(f64::MIN_POSITIVE);
                 assert!(growth > 0.0 && q > 0.0 && off < 1e-6 * q, "{text} {length}: {growth} {q} {rate}");
             }

@@ -8,7 +8,7 @@ use crate::{
     },
     linear_algebra::{
         simd::{LANES, Pack},
-        tensor::Mandel,
+        tensor::{Mandel, dot},
     },
 };
 
@@ -57,6 +57,16 @@ pub trait InPlaces<N> {
     fn with_yield_stress(&self, yield_stress: f64) -> Self::AtPlace;
 }
 
+/// How much of a flow may be taken on from the step before.
+pub enum Room<const S: usize> {
+    /// Any stress flows: all of it.
+    Everywhere,
+    /// The stress does not yield.
+    Nowhere,
+    /// This share of it, and its derivative with respect to the stress. It may be above 1.
+    UpTo(f64, Mandel<S>),
+}
+
 /// The evaluation of a law at a point. The defaults are those of a law without yield surface and without hardening.
 pub trait Flow {
     /// The elastic tensor `E` in Pa.
@@ -102,6 +112,44 @@ pub trait Flow {
         accumulated: f64,
         tangent: Option<&mut Tangent<S>>,
     ) -> Option<(Mandel<S>, f64)>;
+
+    /// The derivative in Pa of the `stress` at the end of a step, which [`flow_to_end`](Self::flow_to_end) finds, by the accumulated strain
+    /// at its start, given its tangent. By default that of hardening `Y + h p` where the stress at the end is homogeneous in `s*` and
+    /// `Y + h p`.
+    fn by_accumulated<const S: usize>(
+        &self,
+        trial: &Mandel<S>,
+        stress: &Mandel<S>,
+        _length: f64,
+        accumulated: f64,
+        tangent: &Tangent<S>,
+    ) -> Mandel<S> {
+        let hardening = self.hardening_modulus();
+        if hardening <= 0.0 {
+            return [0.0; S];
+        }
+        let share = hardening / self.strength(accumulated);
+        std::array::from_fn(|i| share * (stress[i] - dot(&tangent[i], trial)))
+    }
+
+    /// How much of a flow that releases `release` in Pa, with the growth `growth` of the accumulated strain, takes away half of what the
+    /// stress `elastic` is beyond the yield surface.
+    fn room<const S: usize>(
+        &self,
+        elastic: &Mandel<S>,
+        release: &Mandel<S>,
+        growth: f64,
+        accumulated: f64,
+    ) -> Room<S> {
+        let Some((equivalent, direction)) = self.equivalent_stress(elastic) else { return Room::Everywhere };
+        let beyond = equivalent - self.strength(accumulated);
+        if beyond <= 0.0 {
+            return Room::Nowhere;
+        }
+        let relief = self.equivalent_stress(release).map_or(0.0, |(equivalent, _)| equivalent);
+        let relief = 2.0 * (relief + self.hardening_modulus() * growth);
+        Room::UpTo(beyond / relief, direction.map(|d| d / relief))
+    }
 
     /// Which trial stresses of a pack may flow: where this is false,
     /// [`flow_to_end`](Self::flow_to_end) finds no flow.

@@ -181,6 +181,9 @@ impl Flow for Elastic<Perzyna> {
     }
 
     fn equivalent_stress<const S: usize>(&self, s: &Mandel<S>) -> Option<(f64, Mandel<S>)> {
+        if self.parameters.yield_stress == 0.0 && !self.hardens() {
+            return None;
+        }
         let mean = trace(s) / 3.0;
         let mut deviator = *s;
         deviator.iter_mut().take(normal_components::<S>()).for_each(|d| *d -= mean);

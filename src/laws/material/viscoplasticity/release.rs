@@ -41,6 +41,12 @@ impl Release {
         Self { squares: [along, (norm * norm - along).max(0.0)], stiffness: [e * w, f * v] }
     }
 
+    /// Minus the derivative of the von Mises norm by the growth `x q(x)` at its start, in Pa: `3 G` where the norm is that of a deviator.
+    pub(super) fn stiffness_at_start(&self) -> f64 {
+        let [a, b] = self.squares;
+        (a * self.stiffness[0] + b * self.stiffness[1]) / (a + b)
+    }
+
     /// The von Mises norm at this `x`, and minus the derivative of its logarithm by that of `x`.
     pub(super) fn at(&self, x: f64) -> (f64, f64) {
         let (mut square, mut fall) = (0.0, 0.0);

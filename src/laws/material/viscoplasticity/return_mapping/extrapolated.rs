@@ -8,8 +8,8 @@
 //! phi = min(1, f / (2 (g(E m) + h p_m)), s0:m / (2 m:E m)), not negative,   f = g(s0) - Y - h p_{n-1}
 //! ```
 //!
-//! with the equivalent stress `g` of the yield surface `g(s) = Y + h p`. If `s0` does not yield there is no flow. `g` is convex
-//! and `g(c s) = c g(s)` for positive `c`, so that `g(s*) - Y - h p* >= f - phi (g(E m) + h p_m) >= f / 2`: the extrapolated flow
+//! with the equivalent stress `g` of the yield surface `g(s) = Y + h p`, or of the threshold of a formula. If `s0` does not yield there
+//! is no flow. `g` is convex and `g(c s) = c g(s)` for positive `c`, so that `g(s*) - Y - h p* >= f - phi (g(E m) + h p_m) >= f / 2`: the extrapolated flow
 //! removes at most half of the overstress and never moves a stress inside the yield surface, and `s*` changes by at least half of
 //! the
 //! change of `s0`. It supplies no energy, because `s*:m >= 0`. Of steady flow less than half is extrapolated for any length of the
@@ -19,7 +19,7 @@ use super::Returned;
 use crate::{
     laws::material::viscoplasticity::{
         FlowLaw,
-        flow::Flow,
+        flow::{Flow, Room},
         tangent::{Tangent, add_product},
     },
     linear_algebra::tensor::{Mandel, add_scaled, dot},
@@ -65,9 +65,12 @@ impl FlowLaw {
                 *tangent = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
             }
             if let Some(gradient) = &share.gradient {
-                let rise = self.hardening_modulus() * last.growth;
-                let by_strength = if rise > 0.0 { rise / self.strength(before) } else { 0.0 };
-                let by_share = by_share(by_strength, &release, &trial, &found.stress, tangent);
+                let by_strain = match last.growth == 0.0 {
+                    true => [0.0; S],
+                    false => self.by_accumulated(&trial, &found.stress, length, before, tangent),
+                };
+                let by_share: Mandel<S> =
+                    std::array::from_fn(|i| last.growth * by_strain[i] - dot(&tangent[i], &release));
                 add_product(tangent, 1.0, &by_share, gradient);
             }
         }
@@ -85,43 +88,22 @@ impl FlowLaw {
         accumulated: f64,
     ) -> Option<Share<S>> {
         let whole = Some(Share { value: 1.0, gradient: None });
-        let Some((equivalent, direction)) = self.equivalent_stress(elastic) else { return whole };
-        let beyond = equivalent - self.strength(accumulated);
-        if beyond <= 0.0 {
-            return None;
-        }
-        let relief = self.equivalent_stress(release).map_or(0.0, |(equivalent, _)| equivalent);
-        let relief = 2.0 * (relief + self.hardening_modulus() * last.growth);
+        let (room, gradient) = match self.room(elastic, release, last.growth, accumulated) {
+            Room::Everywhere => return whole,
+            Room::Nowhere => return None,
+            Room::UpTo(share, gradient) => (share, gradient),
+        };
         let (work, square) = (dot(elastic, &last.flow), 2.0 * dot(release, &last.flow));
         if work <= 0.0 {
             return Some(Share { value: 0.0, gradient: None });
         }
-        if beyond >= relief && work >= square {
+        if room >= 1.0 && work >= square {
             return whole;
         }
-        // The smaller of the two, without a division by zero.
-        let (value, below, normal) = if beyond * square <= work * relief {
-            (beyond, relief, direction)
-        } else {
-            (work, square, last.flow)
-        };
-        Some(Share { value: value / below, gradient: Some(normal.map(|n| n / below)) })
+        // The smaller of the two.
+        Some(match room * square <= work {
+            true => Share { value: room, gradient: Some(gradient) },
+            false => Share { value: work / square, gradient: Some(last.flow.map(|n| n / square)) },
+        })
     }
-}
-
-/// The derivative of the `stress` at the end with respect to `phi`, given the tangent `T` and the derivative of the yield stress
-/// `Y*` at
-/// `p*` with respect to `phi`, relative to `Y*`. The stress at the end is homogeneous in `s*` and `Y*`, so that its derivative
-/// with respect to `Y*` is `(s - T s*) / Y*`.
-fn by_share<const S: usize>(
-    growth: f64,
-    release: &Mandel<S>,
-    trial: &Mandel<S>,
-    stress: &Mandel<S>,
-    tangent: &Tangent<S>,
-) -> Mandel<S> {
-    std::array::from_fn(|i| {
-        let missing = stress[i] - dot(&tangent[i], trial);
-        growth * missing - dot(&tangent[i], release)
-    })
 }

@@ -387,3 +387,59 @@ fn a_share_of_extrapolated_flow_by_hand() {
     let (found, _) = axial(-31.0).expect("flow");
     assert!((found.accumulated - 0.02 - 10.0 / viscous).abs() < 1e-15);
 }
+
+/// A step that goes on from a flow: stress, flow, accumulated strain and tangent, and whether the extrapolated flow was limited.
+fn continued<const S: usize>(
+    law: &FlowLaw,
+    elastic: &Mandel<S>,
+    last: &Extrapolated<S>,
+) -> Option<(Returned<S>, Tangent<S>, bool)> {
+    let mut tangent = [[0.0; S]; S];
+    let (found, smooth) = law.continue_flow(elastic, last, 0.3, 0.01, Some(&mut tangent))?;
+    Some((found, tangent, !smooth))
+}
+
+#[test]
+fn a_threshold_of_a_formula_limits_extrapolated_flow_as_a_yield_surface_does() {
+    let law = perzyna(Metric::Frobenius, 1.0);
+    let pairs = [
+        (law, "max(q - 19, 0)/300"),
+        (Perzyna { hardening_modulus: Some(400.0), ..law }, "max(q - 19 - 400*e, 0)/300"),
+        (Perzyna { exponent: 3.0, ..law }, "19*max(q/19 - 1, 0)^3/300"),
+        (Perzyna { yield_stress: 0.0, ..law }, "q/300"),
+    ];
+    let mut random = proptest::test_runner::TestRng::deterministic_rng(Default::default());
+    let mut number = || f64::from(random.next_u32()) / f64::from(u32::MAX);
+    for (law, rate) in pairs {
+        let formula = serde_json::json!({ "rate": rate, "reference_stress": 20.0 });
+        let formula = Viscoplasticity::CreepFormula(serde_json::from_value(formula).expect("a law"));
+        let [built_in, written] = [Viscoplasticity::Perzyna(law), formula]
+            .map(|law: Viscoplasticity| law.prepare(&BODY, Hypothesis::Space));
+        let (mut limited, mut inside) = (0, 0);
+        for _ in 0..300 {
+            let direction: Mandel<6> = std::array::from_fn(|_| number() - 0.5);
+            let elastic: Mandel<6> =
+                std::array::from_fn(|i| 50.0 * (direction[i] + 0.3 * (number() - 0.5)) * (0.2 + number()));
+            let mean = direction[..3].iter().sum::<f64>() / 3.0;
+            let scale = 0.05 * number();
+            let flow: Mandel<6> =
+                std::array::from_fn(|i| scale * (direction[i] - if i < 3 { mean } else { 0.0 }));
+            let growth = (dot(&flow, &flow) / 1.5).sqrt();
+            let last = Extrapolated { flow, growth };
+            let [wanted, found] = [&built_in, &written].map(|law| continued(law, &elastic, &last));
+            let (Some(wanted), Some(found)) = (wanted, found) else {
+                assert!(wanted.is_none() && found.is_none(), "{rate} at {elastic:?}");
+                inside += 1;
+                continue;
+            };
+            limited += usize::from(wanted.2);
+            assert_eq!(wanted.2, found.2, "{rate} at {elastic:?}");
+            assert!(difference(&wanted.0.stress, &found.0.stress) < 1e-11, "{rate}: {wanted:?} {found:?}");
+            assert!((wanted.0.accumulated - found.0.accumulated).abs() < 1e-14, "{rate}");
+            for (one, other) in wanted.1.iter().zip(&found.1) {
+                assert!(difference(one, other) < 1e-9, "{rate} at {elastic:?}: {one:?} {other:?}");
+            }
+        }
+        assert!((limited > 30 && inside > 10) != (rate == "q/300"), "{rate}: {limited} {inside}");
+    }
+}
