@@ -224,7 +224,8 @@ pub(crate) const RESULTANTS: RunTable = RunTable {
                     "N m",
                     "moment about the origin or the point of `[output] moments_about`, in the undeformed configuration; 0 of bodies of \
                      revolution. Forces between bodies act at the nodes of both sides: `contact` and `against` balance but for friction \
-                     times the distance between the surfaces, that of meshes of curved surfaces that do not match, too",
+                     times the distance between the surfaces, that of meshes of curved surfaces that do not match, too, and for the \
+                     pressure times the distance of sliding",
                 )
                 .in_plane("N")
             },
