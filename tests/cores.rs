@@ -50,17 +50,9 @@ pub fn share(launcher: &mut Command) -> tempfile::TempDir {
     own
 }
 
-/// Lets OpenBLAS take the kernels for this processor; those that it chooses if this is empty.
-pub fn take_kernels(launcher: &mut Command, kernels: &str) {
-    match kernels {
-        "" => launcher.env_remove(KERNELS),
-        kernels => launcher.env(KERNELS, kernels),
-    };
-}
-
 /// The environment variable with the processor whose kernels OpenBLAS takes. Rounding errors depend on them, and on these the counts of
 /// iterations where bonds fail or cells flow: those of one kind, so that counts are the same on newer processors, too.
-const KERNELS: &str = "OPENBLAS_CORETYPE";
+pub const KERNELS: &str = "OPENBLAS_CORETYPE";
 
 #[cfg(target_arch = "x86_64")]
 fn has_kernels_of_haswell() -> bool {

@@ -25,7 +25,13 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
 
 /// The same on one rank with the kernels that OpenBLAS has for this processor; with those that it chooses if this is empty.
 pub fn run_with_kernels(kernels: &str, scenario: &str, folder: &Path) {
-    check(1, scenario, &start_as(1, scenario, folder, |launcher| cores::take_kernels(launcher, kernels)));
+    let take = |launcher: &mut Command| {
+        match kernels {
+            "" => launcher.env_remove(cores::KERNELS),
+            kernels => launcher.env(cores::KERNELS, kernels),
+        };
+    };
+    check(1, scenario, &start_as(1, scenario, folder, take));
 }
 
 fn check(ranks: usize, scenario: &str, output: &Output) {
