@@ -23,7 +23,7 @@ pub fn share(launcher: &mut Command) -> tempfile::TempDir {
 
 /// The environment variable with the processor whose kernels OpenBLAS takes. Rounding errors depend on them, and on these the counts of
 /// iterations where bonds fail or cells flow: those of one kind, so that counts are the same on newer processors, too.
-const KERNELS: &str = "OPENBLAS_CORETYPE";
+pub const KERNELS: &str = "OPENBLAS_CORETYPE";
 
 #[cfg(target_arch = "x86_64")]
 fn has_kernels_of_haswell() -> bool {

@@ -20,7 +20,21 @@ pub fn folder() -> Option<PathBuf> {
 }
 
 pub fn run(ranks: usize, scenario: &str, folder: &Path) {
-    let output = start(ranks, scenario, folder);
+    check(ranks, scenario, &start(ranks, scenario, folder));
+}
+
+/// The same on one rank with the kernels that OpenBLAS has for this processor; with those that it chooses if this is empty.
+pub fn run_with_kernels(kernels: &str, scenario: &str, folder: &Path) {
+    let take = |launcher: &mut Command| {
+        match kernels {
+            "" => launcher.env_remove(cores::KERNELS),
+            kernels => launcher.env(cores::KERNELS, kernels),
+        };
+    };
+    check(1, scenario, &start_as(1, scenario, folder, take));
+}
+
+fn check(ranks: usize, scenario: &str, output: &Output) {
     let words =
         format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{scenario} on {ranks} ranks:\n{words}");
@@ -31,6 +45,10 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
 
 /// Starts a scenario and waits for it. One rank is started without `mpirun`, which would take longer than many a scenario.
 pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
+    start_as(ranks, scenario, folder, |_| {})
+}
+
+fn start_as(ranks: usize, scenario: &str, folder: &Path, change: impl Fn(&mut Command)) -> Output {
     let (test, words) = scenario.split_once(' ').unwrap_or((scenario, ""));
     let program = std::env::current_exe().expect("this program");
     let mut launcher = Command::new(if ranks == 1 { "timeout" } else { "mpirun" });
@@ -40,6 +58,7 @@ pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
         launcher.args(["--oversubscribe", "--bind-to", "none", "--timeout", LIMIT, "-n", &ranks.to_string()]);
     }
     let _folder = cores::share(&mut launcher);
+    change(&mut launcher);
     launcher
         .arg(program)
         .args(["--include-ignored", "--exact", test, "--nocapture", "--test-threads", "1"])

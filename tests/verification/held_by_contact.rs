@@ -1,8 +1,8 @@
 //! Blocks whose rigid motions are prevented by contact and friction only: quasistatic blocks under loads with uniform stress, and a
 //! block with negligible inertia.
 
-use super::run_on;
 use super::scenes::{any_mesh, simulation};
+use super::{run_on, run_with_kernels};
 use clarke::{
     error::Exit,
     job::Job,
@@ -240,5 +240,5 @@ fn on_stairs(session: &Session) {
 
 #[test]
 fn a_free_block_rests_where_a_law_begins_to_press() {
-    run_on(&[1], |world| on_stairs(&world.session));
+    run_with_kernels(&["", "Prescott"], |world| on_stairs(&world.session));
 }

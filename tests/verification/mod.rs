@@ -85,6 +85,14 @@ fn test_of<F: FnOnce(World)>(scenario: F) -> Option<&'static str> {
     None
 }
 
+/// Runs the scenario of a test on one rank with the kernels of OpenBLAS for each of these processors, whose rounding errors differ; with
+/// those that it chooses where this is empty.
+pub fn run_with_kernels(kernels: &[&str], scenario: impl FnOnce(World)) {
+    let Some(test) = test_of(scenario) else { return };
+    let folder = tempfile::tempdir().expect("folder");
+    kernels.iter().for_each(|kernels| mpirun::run_with_kernels(kernels, test, folder.path()));
+}
+
 /// Runs the scenario of a test on each of these numbers of ranks, with one folder for all of them.
 pub fn run_on(ranks: &[usize], scenario: impl FnOnce(World)) {
     let Some(test) = test_of(scenario) else { return };

@@ -49,6 +49,8 @@ pub(super) struct Descent {
     /// Other unknowns from which to start, if there are any.
     pub other_start: DistributedVector,
     pub has_other_start: bool,
+    /// Whether the energy is convex.
+    pub is_convex: bool,
     trial: DistributedVector,
     trial_residual: DistributedVector,
     direction: DistributedVector,
@@ -73,6 +75,7 @@ impl Descent {
             residual: like.like()?,
             other_start: like.like()?,
             has_other_start: false,
+            is_convex: false,
             trial: like.like()?,
             trial_residual: like.like()?,
             direction: like.like()?,
@@ -101,7 +104,7 @@ impl Descent {
             norm = self.residual.norm()?;
         }
         let tolerance = absolute.max(relative * norm);
-        let mut share = 1.0;
+        let mut share = if self.is_convex { 0.0 } else { 1.0 };
         for _ in 0..limit {
             if norm <= tolerance || equations.is_exact() {
                 return Ok(true);
@@ -131,7 +134,9 @@ impl Descent {
             x.add_scaled(-place.length, &self.direction)?;
             equations.residual(x, &mut self.residual)?;
             norm = self.residual.norm()?;
-            share = (INCREASE * share).clamp(LEAST_SHARE, 1.0);
+            if !self.is_convex {
+                share = (INCREASE * share).clamp(LEAST_SHARE, 1.0);
+            }
         }
         Ok(false)
     }

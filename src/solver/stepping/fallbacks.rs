@@ -79,8 +79,10 @@ impl Properties {
     /// short steps where full ones converge. With all other velocities in equilibrium the residual is that of the contact points alone
     /// and measures their error. Fixed-point iteration avoids cycles between pressure and friction; it is used if friction depends on the
     /// pressure. Where cells flow, the residual of the whole body measures the error of flow as well, and shorter steps come second: full
-    /// ones beyond the yield stress overshoot. Where laws soften there may be no solution near the start of the step; then only the descent to another one ends. With
-    /// bonds it is tried first: on double cantilever beams it takes fewer iterations than full steps even where these converge.
+    /// ones beyond the yield stress overshoot. Without friction, monotone laws have a convex energy, to whose minimum a descent leads where
+    /// full steps go round in circles: along stairs rounding errors would decide whether shorter steps lower the residual. Where laws soften
+    /// there may be no solution near the start of the step; then only the descent to another one ends. With bonds it is tried first: on
+    /// double cantilever beams it takes fewer iterations than full steps even where these converge.
     ///
     /// With larger parameters other branches recur: full steps then fail or succeed soon, where line searches may take many steps.
     ///
@@ -107,6 +109,7 @@ impl Properties {
             (turns, Yielding, 1.0, FixedPoint),
             (follows_bounds && self.flows, Backtracking, 1.0, Newton),
             (follows_bounds && !rubs, FullSteps, 10.0, Newton),
+            (follows_bounds && self.is_convex(), Descent, 1.0, Newton),
             (follows_bounds, Equilibrated, 1.0, Newton),
             (follows_bounds, Equilibrated, 10.0, Newton),
             (self.friction_moves_obstacles, Yielding, 1.0, FixedPoint),
@@ -118,7 +121,7 @@ impl Properties {
             (fixes_bounds, FullSteps, 30.0, FixedPoint),
             (fixes_bounds, Equilibrated, 30.0, FixedPoint),
             (fixes_bounds, Backtracking, 30.0, FixedPoint),
-            (follows_bounds, Descent, 1.0, Newton),
+            (follows_bounds && self.softens, Descent, 1.0, Newton),
             (fixes_bounds, Descent, 1.0, FixedPoint),
             (rubs && self.softens, Yielding, 1.0, FixedPoint),
             (self.has_friction, Falling, 1.0, FixedPoint),
@@ -130,6 +133,11 @@ impl Properties {
             stiffness_factor,
             iteration,
         })
+    }
+
+    /// Whether the equations are those of the minimum of a convex energy, with linear forces beside those of the contact points.
+    pub(super) fn is_convex(self) -> bool {
+        self.interior_is_linear && !self.has_friction && !self.softens
     }
 
     /// Whether friction acts, and moves no obstacles.
@@ -151,7 +159,8 @@ impl Properties {
             Search::Equilibrated => self.interior_is_linear,
             Search::Backtracking => true,
             _ if self.has_user_search => false,
-            Search::Descent | Search::ShortDescent | Search::Falling => self.softens,
+            Search::Descent => self.softens || self.is_convex(),
+            Search::ShortDescent | Search::Falling => self.softens,
             _ => true,
         }
     }
@@ -181,7 +190,8 @@ mod tests {
     #[test]
     fn full_steps_come_first_and_the_descent_of_bonds_before_them() {
         let found = searches(FRICTIONLESS);
-        assert_eq!(found[..3], [Search::FullSteps, Search::FullSteps, Search::Equilibrated]);
+        assert_eq!(found[..3], [Search::FullSteps, Search::FullSteps, Search::Descent]);
+        assert_eq!(found.iter().filter(|search| **search == Search::Descent).count(), 1);
         let bonds = Properties { softens: true, has_bonds: true, interior_is_linear: false, ..FRICTIONLESS };
         let found = searches(bonds);
         assert_eq!(found[..2], [Search::Descent, Search::FullSteps]);

@@ -384,6 +384,7 @@ impl Newton {
             Some(descent) => descent,
             None => Descent::new(velocity)?,
         };
+        descent.is_convex = self.properties(problem).is_convex();
         descent.has_other_start = self.writes_steady_start(problem, velocity, &mut descent.other_start)?;
         self.descent = Some(descent);
         Ok(())
