@@ -1,9 +1,11 @@
 //! A body: mesh, geometry, effects, contacts and loads, which a run advances in time.
 
 mod implicit;
+mod symmetric_parts;
 mod traffic;
 
 pub use implicit::Cells;
+use symmetric_parts::symmetric_parts;
 pub use traffic::PassBytes;
 
 use crate::{
@@ -22,7 +24,7 @@ use crate::{
         },
         state::State,
     },
-    laws::material::{Anisotropic, Isotropic},
+    laws::material::Isotropic,
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
         simd::Pack,
@@ -32,9 +34,6 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
 };
 use std::cell::RefCell;
-
-/// Share of the elastic stiffness in shear that flow leaves at least in the matrix of a step, where its derivatives are not symmetric.
-const LEAST_STIFFNESS: f64 = 1e-3;
 
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
@@ -177,27 +176,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         length: f64,
         tangents: &Tangents,
     ) -> Result<BlockRows, Agreed> {
-        let points = self.geometry.points();
-        let mut of_points = vec![None; self.geometry.point_count()];
-        for (number, tangent) in tangents.iter::<S>() {
-            let (cell, point, _) = self.geometry.point(number);
-            of_points[cell * points + point] = Some(tangent);
-        }
-        let mut elasticity = self.terms().find(|term| term.form() == Some(Form::Elasticity));
-        let is_skew = !tangents.are_symmetric() || self.terms().any(|term| term.is_skew());
-        elasticity = elasticity.filter(|_| is_skew && !self.softens());
-        let rows = self.assemble_rows(session, length, |number, cell, matrix| {
-            let elasticity = elasticity.and_then(|term| term.tensor(cell.material()));
-            for (point, tangent) in of_points[number * points..][..points].iter().enumerate() {
-                let Some(tangent) = tangent else { continue };
-                let mut tensor = Anisotropic::of_entries::<S>(tangent);
-                if let Some(elasticity) = &elasticity {
-                    let least = LEAST_STIFFNESS * length * elasticity.shear;
-                    tensor = tensor.raised::<S>((length, elasticity), least);
-                }
-                matrix.add_form_at((cell, point), 1.0, &tensor);
-            }
-        })?;
+        let softens = self.softens();
+        let rows = self.assemble_rows(
+            session,
+            length,
+            symmetric_parts(&self.geometry, &self.effects, tangents, (length, softens)),
+        )?;
         self.in_unknowns(session, rows)
     }
 

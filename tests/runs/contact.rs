@@ -870,6 +870,39 @@ fn a_body_of_quadratic_cells_with_mass_on_a_plane_is_solved_to_the_tolerance() {
     assert!(residual < 1e-9, "{residual:e}");
 }
 
+/// A strip that yields is peeled off a plane: bonds hold it, and its cells resist less than elastic ones.
+const PEELED: &str = "
+    mesh = {order = 2, rectangle = {size = [0.2, 0.01], cells = [20, 1]}}
+    time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+    [material]
+    hypothesis = 'plane_stress'
+    elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.0}
+    viscoplasticity.perzyna = {relaxation = 1e-3, yield_stress = 1e6}
+    [[support]]
+    on = ['right']
+    where = 'hypot(x - 0.2, y - 0.01) < 1e-9'
+    fix = ['y']
+    displacement = ['5e-4*t']
+    [[support]]
+    on = ['left']
+    fix = ['x']
+    [[contact]]
+    on = ['bottom']
+    where = 'x < 0.15'
+    normal.unilateral = {}
+    adhesion = {stiffness = 1e11, energy = 10.0, strength = 2e5}";
+
+#[test]
+fn bonds_hold_a_strip_whose_cells_yield() {
+    let force = |step: &str| {
+        let case = Case::written_as(PEELED).set("time.step", step);
+        case.run(1).table("resultants.csv").only("source", "support right").last("force_y")
+    };
+    // Nothing gives way any more after cells and bonds beyond the tip have, however the step is divided.
+    let [whole, quarters] = ["1.0", "0.25"].map(force);
+    assert!((whole / quarters - 1.0).abs() < 1e-7 && (whole - 472.6).abs() < 0.1, "{whole} {quarters} N");
+}
+
 /// A massless layer on a law that jumps and falls.
 const FALLING: &str = "
     mesh.rectangle = {size = [1.0, 0.5], cells = [1, 1]}

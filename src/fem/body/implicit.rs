@@ -1,6 +1,6 @@
 //! A body in steps that are implicit in every stress.
 
-use super::{Body, Called, with_seen};
+use super::{Body, Called, symmetric_parts::symmetric_parts, with_seen};
 use crate::{
     fem::{
         coupling::{Coupling, add_between, seen_by_contacts},
@@ -8,13 +8,17 @@ use crate::{
             Contact, ContactNode, Effect, Energy, Evaluation, Heat, Outcome, Step, SurfaceEffect, Tangents,
             contact_nodes,
         },
-        space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, nodal_forces, offsets},
+        space::{
+            Batch, Geometry, Held, MOST_NODES, Needs, Nodal, assemble, cell_rule, nodal_forces, offsets,
+        },
     },
     linear_algebra::{
+        petsc::BlockRows,
         simd::Pack,
         tensor::{Mandel, dot},
     },
     mesh::{Mesh, shape::linear_at},
+    parallel::{agreement::Agreed, session::Session},
 };
 
 /// The cells of a body with their effects, and the effects at its surface beside contact.
@@ -216,6 +220,34 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
         });
         self.evaluated.clear();
         self.evaluated.extend_from_slice(displacement);
+    }
+
+    /// The rows of a matrix with the symmetric parts of derivatives at free parts of the nodes of this rank, in steps of this length in s.
+    /// Collective.
+    pub fn matrix_of_tangents(
+        &self,
+        session: &Session,
+        tangents: &Tangents,
+        length: f64,
+    ) -> Result<BlockRows, Agreed> {
+        let softens = !Called::of(self.effects, self.evaluation, |p| p.end.is_some() && p.weakens).is_empty();
+        let add = symmetric_parts(self.geometry, self.effects, tangents, (length, softens));
+        let mut rows = assemble(session, self.mesh, self.geometry, self.held, add)?;
+        if let Some(coupling) = self.coupling {
+            rows = coupling.transform(session, self.mesh, rows)?;
+        }
+        for (node, tangent) in tangents.nodal::<D>().filter(|(node, _)| *node < self.mesh.owned) {
+            let Some(block) = rows.block_mut(node, (self.mesh.first_node + node) as u32, D) else { continue };
+            let (frame, free) = self.held.frame(node);
+            for direction in &frame[..free] {
+                let half = |i: usize| {
+                    (0..D).map(|j| 0.5 * (tangent[i * D + j] + tangent[j * D + i]) * direction[j]).sum()
+                };
+                let image = self.held.free_part(node, &std::array::from_fn(half));
+                (0..D * D).for_each(|k| block[k] += image[k / D] * direction[k % D]);
+            }
+        }
+        Ok(rows)
     }
 
     /// Adds the change of the forces of flow with a velocity to `forces` (both with ghosts).

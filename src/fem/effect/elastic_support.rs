@@ -119,10 +119,8 @@ impl<const D: usize> ElasticSupport<D> {
                 let springs = at.stress_of(vector).map(|s| length.unwrap_or(0.0) * s);
                 add_scaled(&springs, 1.0, &at.damping.apply(&at.point.normal, vector))
             };
-            let range = rows.offsets[node]..rows.offsets[node + 1];
             let own = (mesh.first_node + node) as u32;
-            let Ok(place) = rows.columns[range.clone()].binary_search(&own) else { continue };
-            let block = &mut rows.values[(range.start + place) * D * D..][..D * D];
+            let Some(block) = rows.block_mut(node, own, D) else { continue };
             let (frame, free) = held.frame(node);
             for (k, direction) in frame.iter().enumerate() {
                 let whole = product(direction);

@@ -81,13 +81,18 @@ impl Tangents {
 
     /// Adds the change of the forces of nodes with a velocity to `forces`, `D` values a node.
     pub fn add_nodal<const D: usize>(&self, velocity: &[f64], forces: &mut [f64]) {
-        for (&node, tangent) in self.nodes.iter().zip(self.nodal.chunks_exact(D * D)) {
-            let at = node as usize * D;
+        for (node, tangent) in self.nodal::<D>() {
+            let at = node * D;
             for (i, row) in tangent.chunks_exact(D).enumerate() {
                 let change = row.iter().zip(&velocity[at..at + D]).map(|(t, v)| t * v).sum::<f64>();
                 forces[at + i] += change;
             }
         }
+    }
+
+    /// Nodes of this rank and their matrices, row by row; a node may come several times.
+    pub fn nodal<const D: usize>(&self) -> impl Iterator<Item = (usize, &[f64])> {
+        self.nodes.iter().map(|&node| node as usize).zip(self.nodal.chunks_exact(D * D))
     }
 
     /// Whether the matrices of all points and nodes are symmetric.

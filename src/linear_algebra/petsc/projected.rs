@@ -1,11 +1,11 @@
 use super::{
-    DistributedVector, Ksp, LinearOutcome, Matrix, ProjectedOperator, ProjectedOutcome,
+    BlockRows, DistributedVector, Ksp, LinearOutcome, Matrix, ProjectedOperator, ProjectedOutcome,
     callback::Callback,
     check,
     ksp::TOO_MANY,
     library::communicator,
     projected_operator::{multiply, precondition, project},
-    reduced::ReducedMatrix,
+    reduced::{ReducedMatrix, block_rows},
     reference::Reference,
     shell::symmetric_shell,
     sys,
@@ -29,6 +29,8 @@ pub struct ProjectedKsp {
     /// The operator's own preconditioner, if it is in use; inside `ksp`.
     own: sys::PC,
     constant: Option<Matrix>,
+    /// The same with what was added for the preconditioner alone.
+    stiffened: Option<Matrix>,
     reduced: Option<ReducedMatrix>,
     block: usize,
     tolerances: (f64, f64, usize),
@@ -36,6 +38,7 @@ pub struct ProjectedKsp {
     /// The smallest right-hand side since the tolerances were set.
     smallest: f64,
     refresh_threshold: usize,
+    stiffening_threshold: Option<usize>,
     /// Whether the next solve is the first since the tolerances were set.
     first: bool,
     /// Whether the preconditioner was built for a subspace.
@@ -76,12 +79,14 @@ impl ProjectedKsp {
             complement,
             own: ptr::null_mut(),
             constant: None,
+            stiffened: None,
             reduced: None,
             block,
             tolerances: (1e-5, 0.0, 10_000),
             most: usize::MAX,
             smallest: f64::INFINITY,
             refresh_threshold: usize::MAX,
+            stiffening_threshold: None,
             first: true,
             reducing: false,
         })
@@ -123,10 +128,49 @@ impl ProjectedKsp {
     ///
     /// The preconditioner is set up with the constant matrix alone; otherwise multigrid would smooth with the operator.
     pub fn set_constant(&mut self, constant: &Matrix) -> Result<()> {
-        self.reduced = None;
-        self.reducing = false;
         self.constant = Some(constant.share()?);
-        self.precondition_with(constant.raw.get())
+        self.stiffened = None;
+        self.restart_with(constant)
+    }
+
+    /// Sets the number of iterations after which the preconditioner of the constant matrix and what is added to it costs less than further
+    /// ones.
+    pub fn set_stiffening_threshold(&mut self, iterations: usize) {
+        self.stiffening_threshold = Some(iterations);
+    }
+
+    /// This number, if it was set.
+    pub fn stiffening_pays_after(&self) -> Option<usize> {
+        self.stiffening_threshold
+    }
+
+    /// Preconditions later solves with these rows added to the constant matrix, whose pattern they have, in place of rows added before.
+    /// Collective.
+    pub fn stiffen(&mut self, rows: &BlockRows) -> Result<()> {
+        let Some(constant) = &self.constant else { return Ok(()) };
+        let mut sum = block_rows(constant.raw.get())?;
+        sum.add(rows, self.block);
+        let stiffened = Matrix::symmetric(self.block, &sum)?;
+        let shared = stiffened.share()?;
+        self.stiffened = Some(stiffened);
+        self.restart_with(&shared)
+    }
+
+    /// Preconditions later solves with the constant matrix alone. Collective.
+    pub fn forget_stiffening(&mut self) -> Result<()> {
+        match (self.stiffened.take(), &self.constant) {
+            (Some(_), Some(constant)) => {
+                let constant = constant.share()?;
+                self.restart_with(&constant)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Sets up the preconditioner of a matrix on the whole space.
+    fn restart_with(&mut self, matrix: &Matrix) -> Result<()> {
+        (self.reduced, self.reducing, self.first) = (None, false, true);
+        self.precondition_with(matrix.raw.get())
     }
 
     /// Later solves use the operator's own preconditioner.
@@ -158,7 +202,9 @@ impl ProjectedKsp {
         operator: &mut dyn ProjectedOperator,
         like: &DistributedVector,
     ) -> Result<[bool; 2]> {
-        let Some(constant) = &self.constant else { return Ok([false; 2]) };
+        let Some(constant) = self.stiffened.as_ref().or(self.constant.as_ref()) else {
+            return Ok([false; 2]);
+        };
         if self.refresh_threshold == usize::MAX || !operator.may_project() {
             return Ok([false; 2]);
         }
@@ -347,7 +393,8 @@ impl ProjectedKsp {
 
     /// Builds the preconditioner for the current subspace. Collective.
     fn refresh(&mut self) -> Result<()> {
-        let (Some(constant), Some(reduced)) = (&self.constant, &mut self.reduced) else { return Ok(()) };
+        let constant = self.stiffened.as_ref().or(self.constant.as_ref());
+        let (Some(constant), Some(reduced)) = (constant, &mut self.reduced) else { return Ok(()) };
         reduced.make(constant)?;
         let raw = reduced.raw.get();
         self.precondition_with(raw)

@@ -47,6 +47,24 @@ impl BlockRows {
         }
         Err(Error::Internal(format!("{} block rows that are none of a matrix", self.offsets.len())))
     }
+
+    /// The `block * block` values of a row of this rank and a global column, if they are stored.
+    pub fn block_mut(&mut self, row: usize, column: u32, block: usize) -> Option<&mut [f64]> {
+        let range = self.offsets[row]..self.offsets[row + 1];
+        let place = range.start + self.columns[range].binary_search(&column).ok()?;
+        self.values.get_mut(place * block * block..(place + 1) * block * block)
+    }
+
+    /// Adds the entries of other rows that are stored in these, too.
+    pub fn add(&mut self, other: &Self, block: usize) {
+        for (row, range) in other.offsets.windows(2).enumerate() {
+            for at in range[0]..range[1] {
+                let Some(sum) = self.block_mut(row, other.columns[at], block) else { continue };
+                let more = &other.values[at * block * block..][..block * block];
+                sum.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -63,7 +63,7 @@ fn motion_count<const D: usize, const S: usize>(session: &Session, body: &Body<D
 }
 
 /// Iterations of a step without contact, with contact, and with friction, which may fix nodes that are free in the preconditioner's
-/// matrix.
+/// matrix, or with other equations that differ much from that matrix.
 struct Iterations {
     without: f64,
     contact: f64,
@@ -118,7 +118,9 @@ impl ProblemSize {
     /// iterations grows in proportion to the mean of the inverse shape quality (measured with uniform and graded meshes whose cells
     /// are up to 16 times as long as thick).
     fn iterations(self, Iterations { without, contact, friction }: Iterations) -> f64 {
-        let regular = match (self.contact, self.friction) {
+        // Cells that have yielded resist less than in the preconditioner's matrix, and bonds, which may hold the body, are not in it.
+        let differs = self.friction || self.flows && !self.condensed;
+        let regular = match (self.contact, differs) {
             (false, _) => without,
             (true, false) => contact,
             (true, true) => friction,

@@ -6,11 +6,12 @@ use crate::{
     fem::effect::{Contact, Friction, set_walls},
     linear_algebra::{
         petsc::{
-            DistributedVector, Matrix, NonlinearProblem, ProjectedKind, ProjectedKsp, ProjectedOperator,
+            BlockRows, DistributedVector, Matrix, NonlinearProblem, ProjectedKind, ProjectedKsp,
+            ProjectedOperator,
         },
         tensor::larger,
     },
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
 };
 
 /// A linear map that replaces the values of each contact node by others.
@@ -168,6 +169,9 @@ pub trait CellForces {
 
     /// Adds the change of the forces with a change of the velocity.
     fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()>;
+
+    /// The symmetric part of the derivative as rows of a matrix of all nodes. Collective.
+    fn derivative(&self, session: &Session) -> Result<BlockRows, Agreed>;
 }
 
 /// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::fem::effect::Contact`] for the unknown `x`.
@@ -671,6 +675,7 @@ impl<const D: usize> ContactEquations<'_, D> {
         // Of an earlier search, which a restart does not have.
         if self.counts.sets.len() <= 1 {
             self.matrix.forget_linearised();
+            self.session.agree(self.linear_solver.forget_stiffening())?;
         }
         let mut has_additions = false;
         if let Some(cells) = operator.cells.as_mut().filter(|_| is_slow || self.counts.sets.len() == 1) {
@@ -685,9 +690,11 @@ impl<const D: usize> ContactEquations<'_, D> {
             self.counts.refreshed += usize::from(rebuilt);
         }
         self.counts.coupled += usize::from(coupled);
+        let is_definite = kind == ProjectedKind::Definite;
         let kind = if coupled { ProjectedKind::Unsymmetric } else { kind };
         let mut is_solved = true;
-        let most = self.matrix.factor_pays_after();
+        let stiffening = self.linear_solver.stiffening_pays_after().filter(|_| operator.cells.is_some());
+        let most = self.matrix.factor_pays_after().or(stiffening);
         self.linear_solver.limit_iterations(most.unwrap_or(usize::MAX));
         let mut outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
         self.linear_solver.limit_iterations(usize::MAX);
@@ -703,14 +710,29 @@ impl<const D: usize> ContactEquations<'_, D> {
                 left.add_scaled(1.0, open)?;
                 Ok::<_, Error>(left.norm()? <= share * open.norm()?)
             };
-        let is_false =
-            coupled && self.lacks_hold && !leaves_at_most(FALSE_SOLUTION, &mut operator, velocity)?;
-        if most.is_some() && (outcome.linear.ran_out() || is_false) {
-            let rebuilt =
-                self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?;
+        let is_false = coupled
+            && (self.lacks_hold || stiffening.is_some())
+            && !leaves_at_most(FALSE_SOLUTION, &mut operator, velocity)?;
+        let mut has_definite_factor = false;
+        // Cells that have yielded and bonds, which hold the body, are not in the constant matrix.
+        let has_failed = stiffening.is_some() && !outcome.linear.converged() && !outcome.indefinite;
+        if most.is_some() && (outcome.linear.ran_out() || has_failed || is_false) {
+            let rebuilt = match &operator.cells {
+                Some(cells) if stiffening.is_some() => stiffen(self.session, self.linear_solver, &**cells)?,
+                _ => self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?,
+            };
             self.counts.refreshed += usize::from(rebuilt);
             let first = outcome.linear;
+            if stiffening.is_some() && is_definite {
+                if !rebuilt {
+                    self.counts.linear_iterations += first.iterations;
+                    return Ok(false);
+                }
+                has_definite_factor = true;
+                self.linear_solver.limit_iterations(most.unwrap_or(usize::MAX));
+            }
             outcome = self.linear_solver.solve(&mut operator, kind, open, velocity)?;
+            self.linear_solver.limit_iterations(usize::MAX);
             outcome.linear = first.followed_by(outcome.linear);
             is_solved = leaves_at_most(LARGEST_LINEAR_RESIDUAL, &mut operator, velocity)?;
         }
@@ -724,11 +746,17 @@ impl<const D: usize> ContactEquations<'_, D> {
             operator.precondition(open, velocity)?;
             operator.project(velocity)?;
         }
+        // Where the derivatives are far from symmetric, those of the symmetric part lead down, too.
+        let is_symmetrised = has_definite_factor && !is_solved && !outcome.indefinite;
+        if is_symmetrised {
+            self.linear_solver.linear_solver().precondition(open, velocity)?;
+            operator.project(velocity)?;
+        }
         self.counts.linear_iterations += outcome.linear.iterations;
         self.counts.last_iterations = outcome.linear.iterations;
         self.counts.indefinite += usize::from(outcome.indefinite);
         self.counts.refreshed += usize::from(outcome.refreshed);
-        if !is_solved && !is_on_springs {
+        if !(is_solved || is_on_springs || is_symmetrised) {
             if outcome.indefinite {
                 return Ok(false);
             }
@@ -746,6 +774,18 @@ impl<const D: usize> ContactEquations<'_, D> {
         let (open, mut direction) = (open.owned()?, direction.owned_mut()?);
         self.contacts.iter().for_each(|contact| contact.unmap_direction(&open, &mut direction));
         Ok(true)
+    }
+}
+
+/// Adds the derivatives of these forces to the matrix that preconditions, unless it has no factor then: returns whether it has. Collective.
+fn stiffen(session: &Session, solver: &mut ProjectedKsp, cells: &dyn CellForces) -> Result<bool> {
+    let rows = cells.derivative(session)?;
+    match session.agree(solver.stiffen(&rows)) {
+        Err(failure) if failure.is_failure() => {
+            session.agree(solver.forget_stiffening())?;
+            Ok(false)
+        }
+        stiffened => Ok(stiffened.map(|()| true)?),
     }
 }
 

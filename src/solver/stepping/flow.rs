@@ -5,7 +5,8 @@ use super::equations::CellForces;
 use crate::{
     error::Result,
     fem::{body::Cells, coupling::Coupling, effect::Tangents, space::Held},
-    linear_algebra::petsc::DistributedVector,
+    linear_algebra::petsc::{BlockRows, DistributedVector},
+    parallel::{agreement::Agreed, session::Session},
 };
 
 /// Work vectors and tangents.
@@ -254,5 +255,9 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
             self.cells.add_tangents(&flow.tangents, &values, &mut forces);
         }
         self.flow.add_to_free_components(self.cells.basis(), forces)
+    }
+
+    fn derivative(&self, session: &Session) -> Result<BlockRows, Agreed> {
+        self.cells.matrix_of_tangents(session, &self.flow.tangents, self.start.length)
     }
 }

@@ -120,11 +120,8 @@ impl Springs {
             return Ok(RowsWithSprings { rows, springs: None });
         }
         for ((node, motion), spring) in motions.iter().zip(&springs) {
-            let range = rows.offsets[*node]..rows.offsets[node + 1];
-            let Some(at) = range.clone().find(|&at| rows.columns[at] as usize == first + node) else {
-                continue;
-            };
-            for (k, value) in rows.values[at * D * D..][..D * D].iter_mut().enumerate() {
+            let Some(block) = rows.block_mut(*node, (first + node) as u32, D) else { continue };
+            for (k, value) in block.iter_mut().enumerate() {
                 *value += spring * motion[k / D] * motion[k % D];
             }
         }

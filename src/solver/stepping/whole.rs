@@ -15,6 +15,9 @@ use crate::{
 };
 use std::rc::Rc;
 
+/// Iterations that take as long as assembling and factoring a matrix: a solve takes a hundredth of a factorisation of small matrices.
+const STIFFENING_THRESHOLD: usize = 64;
+
 /// CG and its preconditioner.
 pub(super) struct Whole {
     kind: Rc<Kind>,
@@ -68,6 +71,9 @@ impl Whole {
         }
         ksp.apply_options()?;
         krylov.set_refresh_threshold(preconditioner.refresh_threshold(dimension));
+        if preconditioner == Preconditioner::Cholesky {
+            krylov.set_stiffening_threshold(STIFFENING_THRESHOLD);
+        }
         Ok(Self { kind, krylov })
     }
 }
