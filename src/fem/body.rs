@@ -230,6 +230,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
         seen_by_contacts(self.coupling.as_ref(), &self.held, values)
     }
 
+    /// Nodal values of all nodes of this rank, with ghosts, and the same as contacts see them, given those of the nodes owned here.
+    /// Collective.
+    pub fn absolute_and_seen(&self, owned: &[f64]) -> Result<[Vec<f64>; 2]> {
+        let mut all = DistributedVector::ghosted(D, self.mesh.owned, &self.mesh.ghosts)?;
+        all.owned_mut()?.copy_from_slice(owned);
+        all.update_ghosts()?;
+        let all = all.local()?;
+        Ok([all.to_vec(), self.seen_by_contacts(&all).to_vec()])
+    }
+
     /// The nodes of this rank that others face in contact between bodies, with directions in which it can hold them, given those in which
     /// it can hold the others. Collective.
     pub fn opposite_directions(&self, touched: &[(usize, Vector<D>)]) -> Result<Vec<(usize, Vector<D>)>> {

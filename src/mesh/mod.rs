@@ -25,6 +25,6 @@ pub mod tree;
 pub use distributed::{Mesh, distribute};
 pub use global::{Boundary, GlobalMesh, InnerGroup, Names, PointSet};
 pub use midsides::midpoint;
-pub use skeleton::{count_free_motions, free_motions};
+pub use skeleton::{common_motions, count_free_motions, free_motions};
 pub use split::other_side;
 pub use tags::Tags;

@@ -40,7 +40,7 @@ impl<const D: usize> Skeleton<D> {
         let words = |(number, free): (usize, Vec<Motion>)| {
             let body = &self.bodies[number];
             let motions = body.in_words(&free);
-            format!("body {} (around {}): {}", number + 1, place(&body.centre), motions.join(", "))
+            format!("{}: {}", body.name(number), motions.join(", "))
         };
         loose.into_iter().map(words).collect()
     }
@@ -109,7 +109,13 @@ impl<const D: usize> RigidBody<D> {
         rows.fold([0.0; 6], |sum, (i, share)| add_scaled(&sum, *share, &self.row(i, point)))
     }
 
-    fn in_words(&self, free: &[Motion]) -> Vec<String> {
+    /// Its number from 1 on, and where it is.
+    pub(super) fn name(&self, number: usize) -> String {
+        format!("body {} (around {})", number + 1, place(&self.centre))
+    }
+
+    /// A basis of free motions in words.
+    pub(super) fn in_words(&self, free: &[Motion]) -> Vec<String> {
         const AXES: [&str; 3] = ["x", "y", "z"];
         // Supports hold components, so a free translation is one along the axes.
         let inside = |motion: &Motion| free.iter().map(|f| dot(f, motion).powi(2)).sum::<f64>() > 1.0 - 1e-8;

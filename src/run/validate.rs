@@ -5,9 +5,10 @@ use crate::{
     fem::{body::Body, effect::Contact},
     io::output::quantity_name::RunOf,
     job::{Loaded, MeshNames},
-    mesh::{Mesh, free_motions},
+    mesh::{Mesh, common_motions, free_motions},
     parallel::{agreement::Agreed, session::Session},
 };
+use std::collections::BTreeSet;
 
 /// Refuses a mesh that lacks names of the job or contradicts it; warns about badly shaped cells. Collective.
 pub(super) fn validate<const D: usize>(
@@ -93,7 +94,19 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
     touched.extend(body.surface_effects.iter().flat_map(|effect| effect.holding_directions()));
     touched.extend(session.agree(body.opposite_directions(&touched))?);
     touched.extend(body.support_directions());
-    let free = free_motions(session, mesh, &held, &touched)?;
+    let mut free = free_motions(session, mesh, &held, &touched)?;
+    if free.is_empty() && body.coupling.is_some() {
+        let supports: Vec<_> = body.support_directions().collect();
+        let of_contact = |contact: &Contact<D>| {
+            let alone: BTreeSet<usize> = contact.normal.facing_nothing().map(|(node, _)| node).collect();
+            contact.holding_directions().into_iter().filter(move |(node, _)| !alone.contains(node))
+        };
+        let mut between: Vec<_> = body.contacts.iter().flat_map(of_contact).collect();
+        between.extend(body.surface_effects.iter().flat_map(|effect| effect.holding_directions()));
+        free = common_motions(session, mesh, &held, [&supports, &between], |motion| {
+            session.agree(body.absolute_and_seen(motion))
+        })?;
+    }
     if free.is_empty() {
         return Ok(());
     }

@@ -870,6 +870,47 @@ fn a_body_of_quadratic_cells_with_mass_on_a_plane_is_solved_to_the_tolerance() {
     assert!(residual < 1e-9, "{residual:e}");
 }
 
+/// Two blocks without friction, side by side on a plate, of which one or none is held along it.
+const SIDE_BY_SIDE: &str = "
+    time = {end = 1.0, step = 1.0, scheme = 'implicit_euler'}
+    [mesh]
+    rectangle = [
+        {name = 'low', size = [2.0, 0.5], cells = [6, 2]},
+        {name = 'a', corner = [0.0, 0.5], size = [0.8, 0.5], cells = [4, 2]},
+        {name = 'b', corner = [0.8, 0.5], size = [1.2, 0.5], cells = [5, 3]},
+    ]
+    [material]
+    hypothesis = 'plane_strain'
+    elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.0}
+    [[support]]
+    on = ['low.bottom']
+    fix = 'all'
+    [[traction]]
+    on = ['a.top', 'b.top']
+    value = [0.0, -1000.0]
+    [[contact]]
+    on = ['a.bottom', 'b.bottom']
+    against = ['low.top']
+    normal.unilateral = {}
+    [[contact]]
+    on = ['a.right']
+    against = ['b.left']
+    normal.unilateral = {}";
+
+#[test]
+fn bodies_that_touch_are_named_where_nothing_holds_them_together() {
+    for ranks in [1, 2] {
+        Case::written_as(SIDE_BY_SIDE)
+            .run_with(ranks, &[])
+            .expect(2)
+            .says("nothing prevents these rigid motions: body 2 (around (0.4, 0.75)) and body 3 (around (1.4, 0.75)) together: translation along x");
+    }
+    // As the message says: a support, or inertia.
+    let held = "[{on = ['low.bottom'], fix = 'all'}, {on = ['a.left'], fix = ['x']}]";
+    Case::written_as(SIDE_BY_SIDE).set("support", held).run(1);
+    Case::written_as(SIDE_BY_SIDE).set("material.density", "1.0").run(1);
+}
+
 /// A strip that yields is peeled off a plane: bonds hold it, and its cells resist less than elastic ones.
 const PEELED: &str = "
     mesh = {order = 2, rectangle = {size = [0.2, 0.01], cells = [20, 1]}}
