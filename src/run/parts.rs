@@ -42,8 +42,8 @@ pub(super) fn part_of<const D: usize>(
     Ok(facets)
 }
 
-/// Warnings of conditions on the place of loads, supports and heat that facets do not follow: these belong to a part as a whole. Collective, with
-/// the same warnings on all ranks.
+/// Warnings of conditions on the place of loads, supports, heat and contacts that facets do not follow: these belong to a part as a whole.
+/// Collective, with the same warnings on all ranks.
 pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh<D>) -> Vec<String> {
     let tractions = job.traction.iter().enumerate().map(|(at, t)| (format!("traction.{at}"), &t.on, &t.part));
     let supports = job.support.iter().enumerate();
@@ -51,8 +51,9 @@ pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh
     let supports = on_areas.map(|(at, s)| (format!("support.{at}"), &s.on, &s.part));
     let flows = job.heat.iter().enumerate().filter(|(_, heat)| heat.temperature.is_none());
     let flows = flows.map(|(at, heat)| (format!("heat.{at}"), &heat.on, &heat.part));
+    let contacts = job.contact.iter().enumerate().map(|(at, c)| (format!("contact.{at}"), &c.on, &c.part));
     let mut warnings = Vec::new();
-    for (table, on, part) in tractions.chain(supports).chain(flows) {
+    for (table, on, part) in tractions.chain(supports).chain(flows).chain(contacts) {
         let Some(part) = part else { continue };
         let cut = facets(mesh, on).into_iter().filter(|facet| is_cut(mesh, *facet, part));
         let [count, area] = measured(session, mesh, cut);

@@ -911,6 +911,15 @@ fn bodies_that_touch_are_named_where_nothing_holds_them_together() {
     Case::written_as(SIDE_BY_SIDE).set("material.density", "1.0").run(1);
 }
 
+#[test]
+fn parts_of_contacts_that_facets_do_not_follow_are_warned_of() {
+    let part = |place: &str| {
+        Case::written_as(BONDED).set("contact.0.where", &format!("'x < {place}'")).run_with(1, &[]).expect(0)
+    };
+    part("0.052").says("contact.0.where: the condition changes within 1 facet (0.005 m) of bottom");
+    assert!(!part("0.05").stdout.contains("changes within"), "between two facets");
+}
+
 /// A strip that yields is peeled off a plane: bonds hold it, and its cells resist less than elastic ones.
 const PEELED: &str = "
     mesh = {order = 2, rectangle = {size = [0.2, 0.01], cells = [20, 1]}}

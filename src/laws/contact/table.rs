@@ -106,8 +106,8 @@ pub struct Contact {
     pub sliding: Sliding,
     /// The part of these boundaries to which the contact applies: the facets at whose centre this expression in x, y, z is not 0. A
     /// boundary may be in several contact tables if each has a `where`, and no facet belongs to two; a node between them belongs to the
-    /// one with the larger part of its area. A product of conditions holds where all hold, their `max` where one holds. Absent: the
-    /// whole boundaries.
+    /// one with the larger part of its area. Facets within which the condition changes are warned of. A product of conditions holds where
+    /// all hold, their `max` where one holds. Absent: the whole boundaries.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
     #[schemars(extend("variables" = "x, y, z"), example = "x < 1", example = "(x > 1)*(x < 2)")]
     pub part: Option<Scalar>,
