@@ -8,8 +8,8 @@
 //!
 //! The prescribed motion of an obstacle is known at all times. Where it is not uniform within a step, the depth of the point is taken at
 //! [`SAMPLES`] times inside of the step, too. The obstacle has come and gone if the point is outside of it at both ends and inside at one
-//! of these times, deeper than the depths at the ends of this step and of its neighbours differ from each other: then the steps do not
-//! resolve the motion. An obstacle that jumps as the step begins takes a point with it that it touches at the end: its depth right after the jump, less and less
+//! of these times, deeper than in the obstacle at rest, and than the depths at the ends of this step and of its neighbours differ from each
+//! other: then the steps do not resolve the motion. An obstacle that jumps as the step begins takes a point with it that it touches at the end: its depth right after the jump, less and less
 //! until the end of the step, is none of these depths. A motion that they resolve may touch between their ends, with an error that is that of the scheme.
 
 use super::obstacles::Gap;
@@ -87,10 +87,10 @@ impl Gap {
         if !self.is_driven() {
             return false;
         }
-        let depth = |share: f64| {
-            let place = std::array::from_fn(|i| before[i] + share * (after[i] - before[i]));
-            self.depth::<D>(start + share * (end - start), &place).unwrap_or(f64::NEG_INFINITY)
-        };
+        let place = |share: f64| std::array::from_fn(|i| before[i] + share * (after[i] - before[i]));
+        let depth_at =
+            |time: f64, share: f64| self.depth::<D>(time, &place(share)).unwrap_or(f64::NEG_INFINITY);
+        let depth = |share: f64| depth_at(start + share * (end - start), share);
         let ends = [depth(0.0), depth(1.0)];
         // Coordinates of one point may all be zero.
         let centres: [Vector<D>; 2] = [*start, *end].map(|time| self.centre(time));
@@ -104,11 +104,13 @@ impl Gap {
         let takes_along = ends[1] >= -rounding && jump < sweep.body_size;
         let jump = if takes_along { jump.max(0.0) } else { 0.0 };
         let inside = (1..=SAMPLES).map(|at| at as f64 / (SAMPLES + 1) as f64);
-        let inside = inside.map(|share| depth(share) - (1.0 - share) * jump);
-        let deepest = inside.fold(f64::NEG_INFINITY, f64::max);
+        let depths = inside.clone().map(|share| depth(share) - (1.0 - share) * jump);
+        let deepest = depths.fold(f64::NEG_INFINITY, f64::max);
         if deepest <= rounding {
             return false;
         }
+        // The straight way between two places at a round obstacle lies inside of it even where it rests.
+        let at_rest = inside.map(|share| depth_at(*end, share)).fold(0.0, f64::max);
         // The place of the point in the neighbouring steps is not known; that of the obstacle is. A depth that is no number is ignored.
         let length = end - start;
         let around = [
@@ -119,7 +121,7 @@ impl Gap {
         let [least, most] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], depth| {
             [least.min(depth), most.max(depth)]
         });
-        deepest > rounding + (most - least)
+        deepest > rounding + (most - least) + at_rest
     }
 }
 
@@ -197,6 +199,10 @@ mod tests {
         for gap in driven("-0.3 + 0.25*sin(pi*t)^2") {
             assert!(passes(&gap, rest), "0.15 m deep at t = 0.5 s, and 0.1 m away at the ends: {gap:?}");
             assert!(!passes(&gap, [[0.03, 0.2]; 2]), "the point is above its highest place: {gap:?}");
+        }
+        let low = 0.0396f64.sqrt() - 0.2;
+        for gap in &driven("-0.2 + 0*t")[..2] {
+            assert!(!passes(gap, [[-0.02, low], [0.02, low]]), "a force moves it along the surface: {gap:?}");
         }
         for gap in driven("-0.3 + 0.25*exp(-(20*(t - 0.43))^2)") {
             assert!(passes(&gap, rest), "for a tenth of the step: {gap:?}");
