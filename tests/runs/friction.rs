@@ -699,3 +699,31 @@ fn friction_that_falls_with_the_speed_moves_a_block_without_mass_from_sticking_t
     assert!(ratios[0] < 0.3, "{ratios:?}");
     assert!((ratios[ratios.len() - 1] / sliding - 1.0).abs() < 1e-6, "{ratios:?}, not {sliding} at last");
 }
+
+/// A block that flows, pressed on a plane by a load that stays: the friction rises steeply from rest, and is part of what holds the block.
+const PRESSED: &str = "
+    mesh.rectangle = {size = [1.0, 0.5], cells = [8, 4]}
+    time = {end = 0.4, step = 0.02, scheme = 'implicit_euler'}
+    [material]
+    hypothesis = 'plane_stress'
+    elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.45}
+    viscoplasticity.perzyna = {relaxation = 2e3, yield_stress = 8e3}
+    [[support]]
+    on = ['top']
+    stiffness = {normal = 1e5, tangential = 5e4}
+    [[traction]]
+    on = ['top']
+    value = [0.0, '-8e3*min(t/0.2, 1)']
+    [[contact]]
+    on = ['bottom']
+    normal.unilateral = {}
+    friction.rate_and_state = {reference = 0.3, velocity = 1e-3, direct = 0.02, evolution = 0.0, distance = 1e-3}";
+
+#[test]
+fn friction_that_rises_steeply_from_rest_holds_a_body_that_flows() {
+    let case = Case::written_as(PRESSED);
+    let [one, two] = [1, 2].map(|ranks| case.run(ranks));
+    assert_same_answer(&one, &two, 1e-9, "two ranks");
+    let count = one.number("newton_iterations");
+    assert!(count < 400.0, "{count} Newton iterations in 20 steps");
+}

@@ -222,13 +222,13 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
         self.evaluated.extend_from_slice(displacement);
     }
 
-    /// The rows of a matrix with the symmetric parts of derivatives at free parts of the nodes of this rank, in steps of this length in s.
-    /// Collective.
+    /// The rows of a matrix with the symmetric parts of derivatives at free parts of the nodes of this rank, in steps of this length in s, and
+    /// of those of contact, `D * D` values for each node of this rank or none. Collective.
     pub fn matrix_of_tangents(
         &self,
         session: &Session,
         tangents: &Tangents,
-        length: f64,
+        (length, of_contact): (f64, &[f64]),
     ) -> Result<BlockRows, Agreed> {
         let softens = !Called::of(self.effects, self.evaluation, |p| p.end.is_some() && p.weakens).is_empty();
         let add = symmetric_parts(self.geometry, self.effects, tangents, (length, softens));
@@ -236,7 +236,9 @@ impl<'a, const D: usize, const S: usize> Cells<'a, D, S> {
         if let Some(coupling) = self.coupling {
             rows = coupling.transform(session, self.mesh, rows)?;
         }
-        for (node, tangent) in tangents.nodal::<D>().filter(|(node, _)| *node < self.mesh.owned) {
+        let of_effects = tangents.nodal::<D>().filter(|(node, _)| *node < self.mesh.owned);
+        let of_contact = of_contact.chunks_exact(D * D).enumerate();
+        for (node, tangent) in of_effects.chain(of_contact) {
             let Some(block) = rows.block_mut(node, (self.mesh.first_node + node) as u32, D) else { continue };
             let (frame, free) = self.held.frame(node);
             for direction in &frame[..free] {

@@ -170,8 +170,9 @@ pub trait CellForces {
     /// Adds the change of the forces with a change of the velocity.
     fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()>;
 
-    /// The symmetric part of the derivative as rows of a matrix of all nodes. Collective.
-    fn derivative(&self, session: &Session) -> Result<BlockRows, Agreed>;
+    /// The symmetric part of the derivative as rows of a matrix of all nodes, and that of what contact adds at nodes: `D * D` values for each
+    /// node of this rank, or none. Collective.
+    fn derivative(&self, session: &Session, of_contact: &[f64]) -> Result<BlockRows, Agreed>;
 }
 
 /// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::fem::effect::Contact`] for the unknown `x`.
@@ -714,11 +715,11 @@ impl<const D: usize> ContactEquations<'_, D> {
             && (self.lacks_hold || stiffening.is_some())
             && !leaves_at_most(FALSE_SOLUTION, &mut operator, velocity)?;
         let mut has_definite_factor = false;
-        // Cells that have yielded and bonds, which hold the body, are not in the constant matrix.
+        // Cells that have yielded, and bonds and friction, which hold the body, are not in the constant matrix.
         let has_failed = stiffening.is_some() && !outcome.linear.converged() && !outcome.indefinite;
         if most.is_some() && (outcome.linear.ran_out() || has_failed || is_false) {
             let rebuilt = match &operator.cells {
-                Some(cells) if stiffening.is_some() => stiffen(self.session, self.linear_solver, &**cells)?,
+                Some(_) if stiffening.is_some() => operator.stiffen(self.linear_solver, open)?,
                 _ => self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?,
             };
             self.counts.refreshed += usize::from(rebuilt);
@@ -777,18 +778,6 @@ impl<const D: usize> ContactEquations<'_, D> {
     }
 }
 
-/// Adds the derivatives of these forces to the matrix that preconditions, unless it has no factor then: returns whether it has. Collective.
-fn stiffen(session: &Session, solver: &mut ProjectedKsp, cells: &dyn CellForces) -> Result<bool> {
-    let rows = cells.derivative(session)?;
-    match session.agree(solver.stiffen(&rows)) {
-        Err(failure) if failure.is_failure() => {
-            session.agree(solver.forget_stiffening())?;
-            Ok(false)
-        }
-        stiffened => Ok(stiffened.map(|()| true)?),
-    }
-}
-
 /// `P Q (K + F' + C') P` for velocities, where `F` are the forces of cells, `P` removes the motions of points on vertical parts of
 /// their graphs, and `Q` eliminates the unknown pressures of sliding points from the equations; `Q` is the identity unless friction
 /// depends on these pressures.
@@ -809,6 +798,37 @@ impl<const D: usize> ReducedJacobian<'_, D> {
         }
         self.obstacles.add_changes(self.session, y)?;
         add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)
+    }
+
+    /// Adds the symmetric parts of the derivatives of the forces of cells, and of contact at its nodes, to the matrix that preconditions;
+    /// those of cells alone where it has no factor then, because laws fall. Returns whether it has a factor. Collective.
+    fn stiffen(&mut self, solver: &mut ProjectedKsp, like: &DistributedVector) -> Result<bool> {
+        let slopes = self.slopes_at_nodes(like)?;
+        let Some(cells) = &self.cells else { return Ok(false) };
+        for of_contact in [&slopes[..], &[]] {
+            let rows = cells.derivative(self.session, of_contact)?;
+            match self.session.agree(solver.stiffen(&rows)) {
+                Err(failure) if failure.is_failure() => self.session.agree(solver.forget_stiffening())?,
+                stiffened => return Ok(stiffened.map(|()| true)?),
+            }
+        }
+        Ok(false)
+    }
+
+    /// The changes of the contact forces with the velocity of their node in N s/m, row by row for each node of this rank. Collective.
+    fn slopes_at_nodes(&mut self, like: &DistributedVector) -> Result<Vec<f64>> {
+        let [mut velocity, mut forces] = [like.like()?, like.like()?];
+        let mut slopes = vec![0.0; D * velocity.owned()?.len()];
+        for j in 0..D {
+            let set = |(at, value): (usize, &mut f64)| *value = f64::from(u8::from(at % D == j));
+            velocity.owned_mut()?.iter_mut().enumerate().for_each(set);
+            forces.fill(0.0)?;
+            add_contact(self.ghosted, self.contacts, &velocity, &mut forces, Contact::add_slopes)?;
+            for (at, force) in forces.owned()?.iter().enumerate() {
+                slopes[at * D + j] = *force;
+            }
+        }
+        Ok(slopes)
     }
 
     /// Replaces a vector by what the equations do with it at contact nodes.

@@ -257,7 +257,7 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
         self.flow.add_to_free_components(self.cells.basis(), forces)
     }
 
-    fn derivative(&self, session: &Session) -> Result<BlockRows, Agreed> {
-        self.cells.matrix_of_tangents(session, &self.flow.tangents, self.start.length)
+    fn derivative(&self, session: &Session, of_contact: &[f64]) -> Result<BlockRows, Agreed> {
+        self.cells.matrix_of_tangents(session, &self.flow.tangents, (self.start.length, of_contact))
     }
 }
