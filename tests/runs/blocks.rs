@@ -2,6 +2,7 @@
 
 use crate::{
     case::Case,
+    launch::unwrapped,
     results::{Results, relative_difference},
 };
 
@@ -137,4 +138,15 @@ fn free_blocks_are_named_as_two_bodies_and_unsuitable_ones_by_their_names() {
     let case = squares("metis").set("time.end", "0.25").run_and_keep(2);
     let outcome = case.run_with(2, &[&["--restart"][..], &moved].concat()).expect(2);
     outcome.says("belongs to another problem").says("mesh.rectangle.1.corner");
+}
+
+#[test]
+fn blocks_that_touch_and_have_no_contact_between_them_are_warned_of() {
+    let said = |case: Case| case.set("output.probe", "[]").run_with(1, &[]).expect(0).stdout;
+    let square = || squares("auto").set("time.end", "0.03125");
+    let touching = |[one, other]: [&str; 2]| format!("blocks touch at the boundaries {one} and {other}");
+    assert!(unwrapped(&said(square())).contains(&touching(["a.right", "b.left"])));
+    assert!(unwrapped(&said(cubes("auto"))).contains(&touching(["a.back", "b.front"])));
+    let apart = blocks([("a", [0.0, 0.0], [6, 6]), ("b", [1.1, 0.0], [4, 5])], "auto");
+    assert!(!said(square().set("mesh.rectangle", &apart)).contains("blocks touch"));
 }
