@@ -107,7 +107,8 @@ impl<T> Blocks<T> {
 }
 
 /// A rectangle, divided into triangles. A list of tables `[[mesh.rectangle]]` with names gives several bodies, which share no
-/// nodes even where they touch.
+/// nodes even where they touch, and pass through each other without a `[[contact]]` between them. Parts that are bonded, glued or
+/// tied together, and coats and layers, are one block whose properties depend on the place, or parts of a mesh that share nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
@@ -193,7 +194,8 @@ impl Default for RectangleGrading {
 }
 
 /// A box, divided into tetrahedra. A list of tables `[[mesh.box]]` with names gives several bodies, which share no nodes even
-/// where they touch.
+/// where they touch, and pass through each other without a `[[contact]]` between them. Parts that are bonded, glued or tied
+/// together, and coats and layers, are one block whose properties depend on the place, or parts of a mesh that share nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cuboid {
