@@ -109,8 +109,9 @@ impl Gap {
         if deepest <= rounding {
             return false;
         }
-        // The straight way between two places at a round obstacle lies inside of it even where it rests.
-        let at_rest = inside.map(|share| depth_at(*end, share)).fold(0.0, f64::max);
+        // The straight way between two places at a round obstacle lies inside of it even where it rests, wherever it is in the step.
+        let at_rest = |time: f64| inside.clone().map(|share| depth_at(time, share)).fold(0.0, f64::max);
+        let at_rest = at_rest(*start).min(at_rest(*end));
         // The place of the point in the neighbouring steps is not known; that of the obstacle is. A depth that is no number is ignored.
         let length = end - start;
         let around = [
