@@ -52,11 +52,6 @@ impl LinearOutcome {
         linear_reason(self.reason)
     }
 
-    /// Whether it has reached the maximum number of iterations.
-    pub fn ran_out(self) -> bool {
-        self.reason == TOO_MANY
-    }
-
     /// The combined outcome of two consecutive solves.
     pub fn followed_by(self, next: Self) -> Self {
         Self { iterations: self.iterations + next.iterations, ..next }

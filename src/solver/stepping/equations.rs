@@ -716,8 +716,8 @@ impl<const D: usize> ContactEquations<'_, D> {
             && !leaves_at_most(FALSE_SOLUTION, &mut operator, velocity)?;
         let mut has_definite_factor = false;
         // Cells that have yielded, and bonds and friction, which hold the body, are not in the constant matrix.
-        let has_failed = stiffening.is_some() && !outcome.linear.converged() && !outcome.indefinite;
-        if most.is_some() && (outcome.linear.ran_out() || has_failed || is_false) {
+        let has_failed = !outcome.linear.converged() && !outcome.indefinite;
+        if most.is_some() && (has_failed || is_false) {
             let rebuilt = match &operator.cells {
                 Some(_) if stiffening.is_some() => operator.stiffen(self.linear_solver, open)?,
                 _ => self.matrix.set_linearised(Rigid::Free, &mut |map, column| operator.act(map, column))?,
