@@ -13,7 +13,7 @@ use crate::mpirun;
 /// Jobs of `make test`; `CLARKE_RANDOM_SCENES=5000`, or `=17..18`, tries others.
 const JOBS: u64 = 60;
 /// Jobs for each start of the launcher.
-const BATCH: u64 = 100;
+const BATCH: u64 = 20;
 
 fn chosen() -> std::ops::Range<u64> {
     let Some(words) = std::env::var("CLARKE_RANDOM_SCENES").ok() else { return 0..JOBS };
