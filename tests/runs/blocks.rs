@@ -143,7 +143,7 @@ fn free_blocks_are_named_as_two_bodies_and_unsuitable_ones_by_their_names() {
 #[test]
 fn blocks_that_touch_and_have_no_contact_between_them_are_warned_of() {
     let said = |case: Case| case.set("output.probe", "[]").run_with(1, &[]).expect(0).stdout;
-    let square = || squares("auto").set("time.end", "0.03125");
+    let square = || squares("auto").set("time.end", "0.0625");
     let touching = |[one, other]: [&str; 2]| format!("blocks touch at the boundaries {one} and {other}");
     assert!(unwrapped(&said(square())).contains(&touching(["a.right", "b.left"])));
     assert!(unwrapped(&said(cubes("auto"))).contains(&touching(["a.back", "b.front"])));

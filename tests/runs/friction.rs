@@ -703,6 +703,7 @@ fn friction_that_falls_with_the_speed_moves_a_block_without_mass_from_sticking_t
 /// A block that flows, pressed on a plane by a load that stays: the friction rises steeply from rest, and is part of what holds the block.
 const PRESSED: &str = "
     mesh.rectangle = {size = [1.0, 0.5], cells = [8, 4]}
+    output.probe = [{name = 'top', point = [0.5, 0.5]}]
     time = {end = 0.4, step = 0.02, scheme = 'implicit_euler'}
     [material]
     hypothesis = 'plane_stress'
