@@ -1080,7 +1080,7 @@ fn uniform_stress_passes_through_facets_that_face_the_bodies_of_two_contacts() {
         let case = two_punches(7).set("mesh.order", order).set("support", support);
         let case =
             case.set("contact.0.sliding", sliding).set("contact.1.sliding", sliding).run_and_keep(ranks);
-        assert!(!log_of(&case).contains("warning"), "{}", log_of(&case));
+        assert!(!log_of(&case).contains("warning: contact"), "{}", log_of(&case));
         let table = case.results().table("resultants.csv");
         for source in ["contact l.bottom", "contact r.bottom"] {
             for column in ["force_y", "largest_pressure"] {
@@ -1168,8 +1168,10 @@ fn a_stage_keeps_the_side_that_carries_the_law() {
     let punches = || two_punches(7).set("support", held);
     let first = punches().set("checkpoint.every", "1").run_and_keep(1);
     let log = log_of(&punches().set("initial.from", &from(&first)).run_and_keep(2));
-    let is_changed = log.contains("the other side carried the law in the run from which this one starts");
-    assert!(!is_changed && log.contains("l.bottom is faced in another contact"), "{log}");
+    assert!(
+        !log.contains("warning: contact") && log.contains("l.bottom is faced in another contact"),
+        "{log}"
+    );
 }
 
 /// Three blocks that touch each other and meet at an edge, the lower and the right one on a rigid plane; each contact has the entries `law`.
