@@ -133,7 +133,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearElasticity {
             // What is stored in addition to the work of the stress at the end.
             let of_linear = dot(&linear.apply(&strain), &beside) - 0.5 * dot(&change, &linear.apply(&change));
             let work = dot(&law.stress(&strain), &add_scaled(&change, -1.0, &beside));
-            let of_rest = law.energy(&strain) - law.energy(&before) - work;
+            let of_rest = law.energy_change([&before, &strain]) - work;
             energy[NUMERICAL] += batch.cells.volume[lane] * (of_linear + of_rest);
         }
     }

@@ -159,9 +159,17 @@ impl StrainElasticity {
 
     /// The energy in J/m^3 that this stress stores.
     pub fn energy<const S: usize>(&self, strain: &Mandel<S>) -> f64 {
-        let Point { size, .. } = Point::of(strain);
-        let whole = self.stored.between(&self.formula.shear_factor, [0.0, size]);
-        0.5 * self.elasticity.shear * (whole - 0.5 * self.least * size * size)
+        self.energy_between([0.0, Point::of(strain).size])
+    }
+
+    /// How much more energy in J/m^3 this stress stores at the second strain than at the first.
+    pub fn energy_change<const S: usize>(&self, strains: [&Mandel<S>; 2]) -> f64 {
+        self.energy_between(strains.map(|strain| Point::of(strain).size))
+    }
+
+    fn energy_between(&self, [from, to]: [f64; 2]) -> f64 {
+        let whole = self.stored.between(&self.formula.shear_factor, [from, to]);
+        0.5 * self.elasticity.shear * (whole - 0.5 * self.least * (to - from) * (to + from))
     }
 
     /// The mean stress in Pa beyond that of the linear elasticity between two strains, whose work is the change of the energy, given their
@@ -353,11 +361,11 @@ mod tests {
         let mean_stress = |mean: &Mandel<S>| law.mean_stress([&other, mean, &end(mean)]);
         let last = end(&strain);
         let work: f64 = (0..S).map(|c| mean_stress(&strain)[c] * (last[c] - other[c])).sum();
-        let change = law.energy(&last) - law.energy(&other);
-        assert!(
-            (work - change).abs() < 1e-12 * (1.0 + law.energy(&last).abs() + law.energy(&other).abs()),
-            "{work} {change}"
-        );
+        let change = law.energy_change([&other, &last]);
+        let difference = law.energy(&last) - law.energy(&other);
+        let accepted = 1e-12 * (1.0 + law.energy(&last).abs() + law.energy(&other).abs());
+        assert!((work - change).abs() < accepted, "{work} {change}");
+        assert!((difference - change).abs() < accepted, "{difference} {change}");
         let tangent = law.mean_tangent([&other, &strain, &last]);
         let slopes: [Mandel<S>; S] = std::array::from_fn(|j| derivative(&mean_stress, j));
         for i in 0..S {

@@ -60,9 +60,12 @@ impl Stored {
         if first == last {
             return integral(formula, [from, to]);
         }
-        integral(formula, [from, self.ends[first]])
-            + (self.values[last - 1] - self.values[first])
-            + integral(formula, [self.ends[last - 1], to])
+        let whole = self.values[last - 1] - self.values[first];
+        let start = match from == self.ends[first - 1] {
+            true => self.values[first] - self.values[first - 1],
+            false => integral(formula, [from, self.ends[first]]),
+        };
+        start + whole + integral(formula, [self.ends[last - 1], to])
     }
 
     /// The mean of the formula over the squares of the strains between two.

@@ -111,7 +111,7 @@ impl<const D: usize> Condensed<D> {
         Self::of(Rc::new(Unknowns {
             own: start..start + nodes.motions.len(),
             nodes,
-            substructures: RefCell::new(Substructures::new(session, &body.mesh, &frames)?),
+            substructures: RefCell::new(Substructures::new(session, &body.mesh, D, &frames)?),
             frames,
             owned: body.mesh.owned * D,
         }))

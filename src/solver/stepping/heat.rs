@@ -3,7 +3,7 @@
 //!
 //! [`Heat`]: crate::fem::effect::Heat
 
-use super::step_error::TemperatureError;
+use super::{linear_solver::Preconditioner, step_error::TemperatureError, substructuring::SharedFactor};
 use crate::{
     error::{Error, Result},
     fem::{
@@ -25,8 +25,8 @@ use crate::{
 const TOLERANCE: f64 = 1e-13;
 /// Iterations after which a solve fails.
 const ITERATIONS: usize = 10_000;
-/// The largest conduction within a step over the capacity at which the diagonal is a good preconditioner.
-const SHORT: f64 = 100.0;
+/// The largest conduction within a step over the capacity at which the diagonal is a better preconditioner than multigrid, and than a factor.
+const SHORT: [f64; 2] = [100.0, 10.0];
 
 /// The solver of the temperature at the end of steps.
 #[derive(Debug)]
@@ -37,6 +37,8 @@ pub(super) struct HeatStep {
     diagonal: Vec<usize>,
     /// Whether the temperature of each owned node is given, or is that of an edge.
     is_known: Vec<bool>,
+    /// A factor, not yet computed, where that of the velocities is one; it does not pay for a single step.
+    factor: Option<SharedFactor>,
     solver: Option<Ksp>,
     /// The length in s of the step for which the solver is prepared.
     length: f64,
@@ -61,9 +63,10 @@ impl HeatStep {
     pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
+        preconditioner: Preconditioner,
     ) -> Result<Option<Self>> {
         let Some(heat) = &body.heat else { return Ok(None) };
-        let mesh = &body.mesh;
+        let (mesh, film_varies) = (&body.mesh, heat.has_varying_film());
         let mut known = DistributedVector::ghosted(1, mesh.owned, &mesh.ghosts)?;
         {
             let mut flags = known.owned_mut()?;
@@ -94,10 +97,11 @@ impl HeatStep {
             conduction,
             diagonal,
             is_known,
+            factor: if film_varies { None } else { preconditioner.shared_factor(session, mesh, 1)? },
             solver: None,
             length: 0.0,
             is_held: session.total(heat.held.len()) > 0,
-            film_varies: heat.has_varying_film(),
+            film_varies,
             conditions: Conditions::default(),
             right_hand_side: known.like()?,
             change: known.like()?,
@@ -274,7 +278,7 @@ impl HeatStep {
         if self.solver.is_some() && self.length == length && !self.film_varies {
             return Ok(());
         }
-        let Self { conduction, diagonal, is_known, conditions, .. } = self;
+        let Self { conduction, diagonal, is_known, conditions, factor, .. } = self;
         let mut rows = conduction.clone();
         let mut most = 0.0f64;
         for (node, &at) in diagonal.iter().enumerate() {
@@ -288,7 +292,11 @@ impl HeatStep {
         let matrix = session.agree(Matrix::symmetric(1, &rows))?;
         let mut solver = Ksp::new("heat_")?;
         solver.set_method("cg")?;
-        solver.set_preconditioner(if most < SHORT { "jacobi" } else { "gamg" }, None)?;
+        match factor {
+            Some(factor) if most >= SHORT[1] => solver.precondition_by(Box::new(factor.unfactored()))?,
+            None if most >= SHORT[0] => solver.set_preconditioner("gamg", None)?,
+            _ => solver.set_preconditioner("jacobi", None)?,
+        }
         solver.set_tolerances(TOLERANCE, 0.0, ITERATIONS)?;
         solver.apply_options()?;
         solver.set_matrices(&matrix, &matrix)?;

@@ -4,6 +4,8 @@ use super::substructuring::SharedFactor;
 use crate::{
     error::Result,
     linear_algebra::petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, Precision, require, set_default_option},
+    mesh::Mesh,
+    parallel::session::Session,
 };
 
 pub(super) use crate::job::Solver as SolverSettings;
@@ -78,6 +80,20 @@ impl Preconditioner {
             seconds(multigrid)
         );
         (chosen, reason)
+    }
+
+    /// The factor, not yet computed, of matrices with this number of unknowns of each node, if that is the choice and ranks can share it.
+    /// Collective.
+    pub(super) fn shared_factor<const D: usize>(
+        self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        unknowns: usize,
+    ) -> Result<Option<SharedFactor>> {
+        match self {
+            Self::Auto | Self::Cholesky => SharedFactor::new(session, mesh, unknowns),
+            Self::Gamg | Self::Boomeramg => Ok(None),
+        }
     }
 
     /// Number of iterations that take as long as rebuilding it; in 3D rebuilding never pays (measured, see

@@ -133,7 +133,7 @@ impl Stepper {
             right_hand_side: state.velocity.like()?,
             moving_supports: MovingSupports::new(body, state)?,
             force_scale: ForceScale::new(body, &state.velocity)?,
-            heat: HeatStep::new(session, body)?,
+            heat: HeatStep::new(session, body, settings.preconditioner)?,
             heat_of_step: None,
             thermal_work: None,
             trial: state.velocity.like()?,

@@ -154,19 +154,27 @@ impl Numbering {
 }
 
 impl Substructures {
-    /// The interface of the subdomains of a mesh, and contact nodes with these frames. Collective.
-    pub(super) fn new<const D: usize>(session: &Session, mesh: &Mesh<D>, frames: &Frames) -> Result<Self> {
+    /// The interface of the subdomains of a mesh, whose nodes have this number of unknowns, and contact nodes with these frames. Collective.
+    pub(super) fn new<const D: usize>(
+        session: &Session,
+        mesh: &Mesh<D>,
+        dimension: usize,
+        frames: &Frames,
+    ) -> Result<Self> {
         let shared = interface_nodes(session, mesh)?;
         let mut nodes = [&shared[..], frames.nodes()].concat();
         nodes.sort_unstable();
         nodes.dedup();
-        let mut numbers = vec![NONE; nodes.len() * D];
+        let mut numbers = vec![NONE; nodes.len() * dimension];
         let position = |node: u32| nodes.binary_search(&node).unwrap_or(nodes.len());
-        let contact: Vec<usize> =
-            frames.unknowns.iter().map(|unknown| position((unknown / D) as u32) * D + unknown % D).collect();
+        let first = |node: u32| position(node) * dimension;
+        let of_frames = frames.unknowns.iter();
+        let contact: Vec<usize> = of_frames
+            .map(|unknown| first((unknown / dimension) as u32) + unknown % dimension)
+            .collect();
         contact.iter().for_each(|&at| numbers[at] = 0);
         let mut interface = 0;
-        for at in shared.iter().flat_map(|&node| position(node) * D..(position(node) + 1) * D) {
+        for at in shared.iter().flat_map(|&node| first(node)..first(node) + dimension) {
             if numbers[at] == NONE {
                 numbers[at] = interface;
                 interface += 1;
@@ -174,15 +182,15 @@ impl Substructures {
         }
         (interface..).zip(&contact).for_each(|(number, &at)| numbers[at] = number);
         let mut last: Vec<(u32, usize)> = Vec::new();
-        for (&node, numbers) in nodes.iter().zip(numbers.chunks_exact(D)) {
+        for (&node, numbers) in nodes.iter().zip(numbers.chunks_exact(dimension)) {
             let Some(local) = local_node(mesh.owned, mesh.first_node, &mesh.ghosts, node) else { continue };
             let numbered = numbers.iter().enumerate().filter(|(_, number)| **number != NONE);
-            last.extend(numbered.map(|(i, &number)| (number, local * D + i)));
+            last.extend(numbered.map(|(i, &number)| (number, local * dimension + i)));
         }
         last.sort_unstable();
         let (own, last): (Vec<u32>, Vec<usize>) = last.into_iter().unzip();
         Ok(Self {
-            dimension: D,
+            dimension,
             owned: mesh.owned,
             first_node: mesh.first_node,
             ghosts: mesh.ghosts.clone(),
@@ -512,9 +520,15 @@ pub(super) struct SharedFactor {
 }
 
 impl SharedFactor {
-    /// For matrices on the nodes of a mesh; `None` where the dense matrix of the interface would be too large. Collective.
-    pub(super) fn new<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Result<Option<Self>> {
-        let substructures = Substructures::new(session, mesh, &Frames::new::<D>(session, mesh, &[])?)?;
+    /// For matrices with this number of unknowns of each node of a mesh; `None` where the dense matrix of the interface would be too large.
+    /// Collective.
+    pub(super) fn new<const D: usize>(
+        session: &Session,
+        mesh: &Mesh<D>,
+        unknowns: usize,
+    ) -> Result<Option<Self>> {
+        let no_frames = Frames::new::<D>(session, mesh, &[])?;
+        let substructures = Substructures::new(session, mesh, unknowns, &no_frames)?;
         Ok((substructures.total <= MAX_INTERFACE_UNKNOWNS).then_some(Self { substructures, factors: None }))
     }
 

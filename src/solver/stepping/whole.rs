@@ -46,10 +46,7 @@ impl Whole {
     ) -> Result<Self> {
         body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| node));
         let preconditioner = settings.preconditioner;
-        let factor = match preconditioner {
-            Preconditioner::Auto | Preconditioner::Cholesky => SharedFactor::new(session, &body.mesh)?,
-            _ => None,
-        };
+        let factor = preconditioner.shared_factor(session, &body.mesh, D)?;
         let kind = Kind {
             preconditioner,
             dimension: D,
