@@ -143,14 +143,25 @@ impl<const N: usize> Machine for Slopes<'_, N> {
 
     fn binary(&mut self, function: &Binary, [left, right]: [Self::Entry; 2]) -> Self::Entry {
         let value = (function.value)(left.0, right.0);
-        if left.1 == [0.0; N] && right.1 == [0.0; N] {
-            return (value, [0.0; N]);
-        }
-        let [by_left, by_right] = match function.by_left {
-            Some(by_left) if right.1 == [0.0; N] => [by_left(left.0, right.0, value), 0.0],
-            _ => (function.slopes)(left.0, right.0),
+        let slopes = match [left, right].map(|(_, slopes)| slopes == [0.0; N]) {
+            [true, true] => [0.0; N],
+            [false, true] => {
+                let slope = match function.by_left {
+                    Some(by_left) => by_left(left.0, right.0, value),
+                    None => (function.slopes)(left.0, right.0)[0],
+                };
+                left.1.map(|inner| chain(slope, inner))
+            }
+            [true, false] => {
+                let [_, slope] = (function.slopes)(left.0, right.0);
+                right.1.map(|inner| chain(slope, inner))
+            }
+            [false, false] => {
+                let [by_left, by_right] = (function.slopes)(left.0, right.0);
+                std::array::from_fn(|k| chain(by_left, left.1[k]) + chain(by_right, right.1[k]))
+            }
         };
-        (value, std::array::from_fn(|k| chain(by_left, left.1[k]) + chain(by_right, right.1[k])))
+        (value, slopes)
     }
 
     fn ternary(&mut self, function: &Ternary, [first, then, otherwise]: [Self::Entry; 3]) -> Self::Entry {
