@@ -70,9 +70,10 @@ struct Cli {
 enum Command {
     /// Run a job; `solver JOB` is an abbreviation.
     Run(RunArguments),
-    /// Check a job without running it: keys, mesh, effects, certificates, memory and time.
+    /// Check a job without running it: keys, mesh, effects, certificates, memory and time; of a study, its base job and the keys of each
+    /// run.
     Check {
-        /// The job file.
+        /// The job file, or a study file.
         job: PathBuf,
         /// Override a key: time.step=0.01, contact.0.quadrature=gauss.
         #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -279,7 +280,7 @@ fn describe(table: Option<&str>, form: Option<Form>) -> Result<Exit> {
         ("outputs", rest, None) => outputs::describe(rest)?,
         ("outputs", "", Some(Form::Json)) => outputs::describe_json(),
         ("outputs", "", Some(Form::Markdown)) => outputs::describe_markdown(),
-        (_, _, None) => job::describe_kind(job::Kind::job(), table, &outputs::named())?,
+        (_, _, None) => described(table)?,
         ("", "", Some(Form::Json)) => job::describe_json(),
         ("", "", Some(Form::Markdown)) => job::describe_markdown(),
         _ => {
@@ -289,6 +290,11 @@ fn describe(table: Option<&str>, form: Option<Form>) -> Result<Exit> {
         }
     };
     say(&text)
+}
+
+/// Tables and keys of jobs, or, by any word, those of studies and what is in output files, too.
+fn described(table: Option<&str>) -> Result<String> {
+    job::describe_kind(job::Kind::job(), table, &[study::named(), outputs::named()].concat())
 }
 
 fn completion(shell: Shell) -> Result<Exit> {
@@ -547,12 +553,30 @@ fn stages(stages: Vec<Loaded>) -> Result<Vec<Loaded>> {
 }
 
 fn check(job: &Path, overrides: &[String], (json, is_trusted): (bool, bool)) -> Result<Exit> {
+    if job::file_is_study(job) {
+        return check_study(job, overrides, json);
+    }
     on_all_ranks(job, overrides, |session, loaded, clock| {
         let report = run::check(session, loaded.trusted(is_trusted), Some(clock.began))?;
         if session.is_first() {
             print(&if json { report.json()? } else { report.text() });
         }
         Ok(Exit::Done)
+    })
+}
+
+/// Checks the study and the keys of all of its runs.
+fn check_study(path: &Path, overrides: &[String], json: bool) -> Result<Exit> {
+    if json {
+        let words = format!("{} is a study; --json prints the check of a job: leave it out", path.display());
+        return Err(Error::Refused(words));
+    }
+    in_session(|session, _| {
+        let plan = session.agree(study::Plan::load(path, overrides, std::io::stderr().is_terminal()))?;
+        if session.is_first() {
+            print(&plan.text());
+        }
+        Ok(if plan.refused.is_empty() { Exit::Done } else { Exit::Refused })
     })
 }
 
@@ -602,6 +626,42 @@ fn in_session(work: impl FnOnce(&Session, Clock) -> Result<Exit>) -> Result<Exit
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_of_engineers_lead_to_keys() {
+        for (word, key) in [
+            ("brake", "contact.friction: "),
+            ("stick-slip", "contact.friction: "),
+            ("stick", "contact.friction.coulomb: "),
+            ("slip", "contact.friction: "),
+            ("amplitude", "study response.of: "),
+            ("map", "study response: "),
+            ("Hertz", "contact.obstacle.sphere: "),
+            ("indentation", "contact.obstacle_load: "),
+            ("layer", "region: "),
+            ("coating", "region: "),
+            ("belt", "contact.friction: "),
+            ("sweep", "study sweep: "),
+            ("penalty", "contact.normal.compliance: "),
+            ("creep", "material.viscoplasticity.norton: "),
+            ("relaxation", "material.viscoplasticity.maxwell"),
+            ("impact", "contact.redistribute_mass: "),
+            ("restitution", "contact.normal.compliance.damping: "),
+            ("wear", "contact.wear: "),
+            ("thermal", "material.heat: "),
+            ("convection", "heat.convection: "),
+            ("units", "mesh.scale: "),
+            ("millimetre", "mesh.scale: "),
+            ("hexahedra", "mesh.file: "),
+            ("abaqus", "mesh.file: "),
+            ("gmsh", "mesh.file: "),
+            ("restart", "checkpoint: "),
+            ("Slurm", "checkpoint"),
+        ] {
+            let found = described(Some(word)).unwrap_or_else(|error| panic!("{word}: {error}"));
+            assert!(found.lines().any(|line| line.trim().starts_with(key)), "{word}: {found}");
+        }
+    }
 
     #[test]
     fn a_fault_says_error_once_in_colour_and_without() {

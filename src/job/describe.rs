@@ -14,6 +14,8 @@ struct DescribedTable {
     several: bool,
     keys: Vec<Key>,
     meaning: String,
+    /// Other words by which a search finds it, with commas.
+    also: &'static str,
 }
 
 /// A key of a table.
@@ -31,7 +33,8 @@ pub fn describe(table: Option<&str>) -> Result<String> {
     describe_kind(Kind::job(), table, &[])
 }
 
-/// A name that is no key, for searches by a word.
+/// A name, for searches by a word.
+#[derive(Clone)]
 pub(crate) struct Named {
     /// The name.
     pub name: String,
@@ -39,6 +42,8 @@ pub(crate) struct Named {
     pub shown: String,
     /// What it means.
     pub meaning: String,
+    /// Other words by which a search finds it, with commas.
+    pub also: &'static str,
 }
 
 /// As [`describe`], of any kind of document; words are also searched among `others`.
@@ -62,7 +67,7 @@ pub(crate) fn describe_kind(kind: Kind, table: Option<&str>, others: &[Named]) -
         })
         .collect();
     if shown.is_empty() {
-        return occurrences(&all, wanted, others).ok_or_else(|| unknown_table(kind, wanted, &all));
+        return occurrences(kind, wanted, others).ok_or_else(|| unknown_table(kind, wanted, &all));
     }
     let mut opening = String::new();
     if wanted.is_empty() {
@@ -127,35 +132,45 @@ fn entry(path: &str, meaning: &str) -> String {
     lines(&format!("{path}: {sentence}."), 2)
 }
 
-/// The tables, keys and other names that are a word or, if it has three letters, contain it or have it in their meanings, those with the
-/// name first; `None` if there are none.
-fn occurrences(all: &[DescribedTable], word: &str, others: &[Named]) -> Option<String> {
-    let wanted = word.to_lowercase();
-    let mut found: Vec<(usize, String, String)> = Vec::new();
-    let mut add = |name: &str, path: String, meaning: String| {
-        let rank = match name.to_lowercase() {
-            name if name == wanted => 0,
-            _ if wanted.len() < 3 => return,
-            name if name.contains(&wanted) => 1,
-            _ if meaning.to_lowercase().contains(&wanted) => 2,
-            _ => return,
-        };
-        found.push((rank, path, meaning));
-    };
+/// All tables and keys of a kind of document, for searches by a word.
+pub(crate) fn named(kind: Kind) -> Vec<Named> {
+    let mut found = Vec::new();
     // Materials of regions have the keys of `material`.
-    for table in all.iter().filter(|table| !table.path.starts_with("region.material")) {
-        add(table.path.rsplit('.').next().unwrap_or_default(), table.path.clone(), table.meaning.clone());
+    for table in tables(kind).iter().filter(|table| !table.path.starts_with("region.material")) {
+        let prefix = kind.prefix.replace('.', " ");
+        let mut add = |name: &str, path: &str, meaning: String, also: &'static str| {
+            found.push(Named { name: name.to_owned(), shown: format!("{prefix}{path}"), meaning, also });
+        };
+        add(table.path.rsplit('.').next().unwrap_or_default(), &table.path, table.meaning.clone(), table.also);
         for key in &table.keys {
             let choices: String =
                 key.choices().iter().map(|(word, text)| format!(" \"{word}\": {text}")).collect();
-            add(key.name, format!("{}.{}", table.path, key.name), key.meaning() + &choices);
+            let also = key.schema.text("also").unwrap_or_default();
+            add(key.name, &format!("{}.{}", table.path, key.name), key.meaning() + &choices, also);
         }
     }
-    for Named { name, shown, meaning } in others {
-        add(name, shown.clone(), meaning.clone());
+    found
+}
+
+/// The tables, keys and other names that are a word or, if it has three letters, contain it or have it among their other words or in their
+/// meanings, those with the name first; `None` if there are none.
+fn occurrences(kind: Kind, word: &str, others: &[Named]) -> Option<String> {
+    let plain = |text: &str| text.to_lowercase().replace(['-', '_'], " ");
+    let wanted = plain(word);
+    let own = named(kind);
+    let mut found: Vec<(usize, &Named)> = Vec::new();
+    for one in own.iter().chain(others) {
+        let rank = match plain(&one.name) {
+            name if name == wanted => 0,
+            _ if wanted.len() < 3 => continue,
+            name if name.contains(&wanted) || one.also.split(", ").any(|also| plain(also) == wanted) => 1,
+            _ if plain(&one.meaning).contains(&wanted) => 2,
+            _ => continue,
+        };
+        found.push((rank, one));
     }
-    found.sort_by_key(|(rank, ..)| *rank);
-    let list: String = found.iter().map(|(_, path, meaning)| entry(path, meaning)).collect();
+    found.sort_by_key(|(rank, _)| *rank);
+    let list: String = found.iter().map(|(_, one)| entry(&one.shown, &one.meaning)).collect();
     (!found.is_empty()).then(|| format!("`{word}` occurs in\n\n{list}"))
 }
 
@@ -235,7 +250,8 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<DescribedTa
             if free.accepts("array") { "\"name\" = [..]".to_owned() } else { format!("[{path}.\"name\"]") };
         meaning.push_str(&format!(" Each: {other} or \"name\" = {{ .. }}."));
     }
-    all.insert(at, DescribedTable { path: path.to_owned(), several, keys, meaning });
+    let also = schema.text("also").or(body.text("also")).unwrap_or_default();
+    all.insert(at, DescribedTable { path: path.to_owned(), several, keys, meaning, also });
 }
 
 /// Whether it is a table of keys; an expression, in place of which a table over time may stand, is a value.

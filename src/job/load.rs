@@ -85,7 +85,7 @@ impl Document {
         refuse_long(kind, text.len(), name)?;
         let texts = Texts::new(kind.name, name, text, overrides, colour);
         let mut root = parse(text).map_err(|fault| texts.refuse(vec![fault]))?;
-        if let Some(what) = other_document(kind, &root) {
+        if let Some(what) = other_document(kind, &root, name) {
             return Err(Error::Refused(format!("{name} is {what}")));
         }
         let mut faults = Vec::new();
@@ -103,6 +103,18 @@ impl Document {
     /// Adds a fault at the value of `path`, or at the innermost existing table on this path.
     pub(crate) fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
         self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
+    }
+
+    /// Adds a fault at a free name in a table, which may contain dots.
+    pub(crate) fn fault_at_name(
+        &mut self,
+        (table, name): (&str, &str),
+        message: impl Into<String>,
+        help: impl AsRef<str>,
+    ) {
+        let node = self.root.deepest(table);
+        let place = node.child(name).map_or(&node.at, |child| &child.key);
+        self.faults.push(Fault::new(place.clone(), message, "").help(help));
     }
 
     /// The struct of the document, with neutral values in place of those that could not be read.
@@ -236,18 +248,25 @@ fn refuse_long(kind: Kind, bytes: usize, name: &str) -> Result<()> {
     Err(Error::Refused(format!("{name}: a {} file has at most {LARGEST} bytes", kind.name)))
 }
 
-/// What a document is that is not of this kind, if it is a study or a job.
-fn other_document(kind: Kind, root: &Node) -> Option<&'static str> {
-    let is_study = root.find("base.job").is_some();
-    match kind.name {
-        "job" if is_study && root.find("time").is_none() => {
-            Some("a study, not a job: run it with solver study FILE")
-        }
-        "study" if !is_study && root.find("time").is_some() && root.find("mesh").is_some() => {
-            Some("a job, not a study: run it with solver run FILE, or name it in [base] job of a study")
-        }
+/// What the document with this name is, if it is a study or a job and not of this kind.
+fn other_document(kind: Kind, root: &Node, name: &str) -> Option<String> {
+    match (kind.name, is_study(root)) {
+        ("job", true) => Some(format!("a study, not a job: run it with solver study {name}, check it with solver check {name}")),
+        ("study", false) if root.find("time").is_some() && root.find("mesh").is_some() => Some(format!(
+            "a job, not a study: run it with solver run {name}, check it with solver check {name}, or name it in [base] job of a study"
+        )),
         _ => None,
     }
+}
+
+fn is_study(root: &Node) -> bool {
+    root.find("base.job").is_some()
+}
+
+/// Whether the file can be read and is a study.
+pub(crate) fn file_is_study(path: &Path) -> bool {
+    let text = std::fs::read_to_string(path).ok();
+    text.and_then(|text| parse(&text).ok()).is_some_and(|root| is_study(&root))
 }
 
 /// What a file with this extension is, if it is one that is often given in place of another.

@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 use super::report::Fault;
 use super::schema::Kind;
 use super::source::{Node, Value};
-use crate::laws::expression::{Expression, Fault as ExpressionFault, Names, Resolved, Variable, is_known};
+use crate::laws::expression::{Expression, Fault as ExpressionFault, Names, Resolved, Variable};
 
 /// Largest number of parameters.
 const MOST: usize = 1000;
 /// Largest number of parameters that a message lists.
 const LISTED: usize = 20;
-/// Names that no parameter may have, beside those of expressions.
-const RESERVED: [&str; 7] = ["d", "g", "l", "p", "q", "temperature", "v"];
+/// Constants, whose names no parameter may have.
+const RESERVED: [&str; 2] = ["inf", "pi"];
 /// The largest number below which all whole numbers are exact.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
@@ -81,18 +81,25 @@ impl Parameters {
         self.listed.is_empty()
     }
 
-    /// Compiles an expression in time and place in which parameters may occur.
+    /// Compiles the expression of a number, in which parameters may occur; in time and place, too, so that its fault can name these.
     pub(super) fn resolve(&mut self, text: &str) -> Result<Resolved, ExpressionFault> {
-        self.resolve_in(text, Variable::OF_TIME_AND_PLACE)
+        self.resolve_in(text, Variable::OF_TIME_AND_PLACE, "")
     }
 
-    /// Compiles an expression in these variables in which parameters may occur.
+    /// Compiles an expression in these variables in which parameters may occur; parameters hide variables that are not `allowed`, which
+    /// is a list with commas.
     pub(super) fn resolve_in(
         &mut self,
         text: &str,
         variables: &[Variable],
+        allowed: &str,
     ) -> Result<Resolved, ExpressionFault> {
-        let resolved = Expression::resolve(text, variables, &self.names)?;
+        let is_seen = |variable: &&Variable| {
+            let name = variable.name();
+            !self.names.contains_key(name) || allowed.split(", ").any(|allowed| allowed == name)
+        };
+        let variables: Vec<Variable> = variables.iter().filter(is_seen).copied().collect();
+        let resolved = Expression::resolve(text, &variables, &self.names)?;
         self.used.extend(resolved.names.iter().cloned());
         Ok(resolved)
     }
@@ -201,15 +208,9 @@ fn refusal(name: &str) -> Option<[String; 2]> {
         let help = "names are made of the letters a-z and A-Z, digits and _, and do not start with a digit";
         return Some([message, help.into()]);
     }
-    if is_known(name) {
-        let message = format!("`{name}` has a meaning in expressions already");
-        return Some([message, "choose another name for the parameter".into()]);
-    }
     if RESERVED.contains(&name) {
-        let message = format!("`{name}` is reserved for what laws depend on");
-        let help =
-            format!("choose another name for the parameter; {} are not available", RESERVED.join(", "));
-        return Some([message, help]);
+        let message = format!("`{name}` is a constant in expressions");
+        return Some([message, "choose another name for the parameter".into()]);
     }
     None
 }
@@ -277,6 +278,23 @@ mod tests {
     }
 
     #[test]
+    fn names_of_variables_and_functions_are_names_of_parameters_where_these_are_none() {
+        let (mut parameters, faults) = read("d = 0.01\nx = '2*d'\ne = 3.0\nstep = 0.5\nt = 7\n");
+        assert_eq!(faults, 0);
+        let values: Vec<f64> = ["d", "x", "e", "step"].map(|name| parameters.names[name]).to_vec();
+        assert_eq!(values, [0.01, 0.02, 3.0, 0.5]);
+        let number = parameters.resolve("x*e + step*step(2)").expect("a number").expression;
+        assert_eq!(number.evaluate(100.0, &[100.0]), 0.56);
+        let place = parameters.resolve_in("2*d*y + t", Variable::OF_TIME_AND_PLACE, "y").expect("of place");
+        assert_eq!(place.expression.evaluate(100.0, &[1.0, 2.0]), 7.04);
+        for (text, variables, allowed) in [("1 + d", &[Variable::V, Variable::D][..], "v, d"), ("t*y", Variable::OF_TIME_AND_PLACE, "t, x, y, z")] {
+            let fault = parameters.resolve_in(text, variables, allowed).expect_err("two meanings");
+            assert!(fault.message.contains("is a parameter, but here also the "), "{fault:?}");
+            assert!(parameters.resolve_in("1 + step", variables, allowed).is_ok(), "no variable");
+        }
+    }
+
+    #[test]
     fn what_gives_no_number_is_refused_once() {
         for (table, count) in [
             ("a = 'a'", 1),
@@ -287,7 +305,7 @@ mod tests {
             ("a = '2*B'", 1),
             ("a = '2*'", 1),
             ("a = ''", 1),
-            ("v = 1\ne = 1\nsin = 1\n1a = 1\na-b = 1\n\"\" = 1\n\"\u{e4}\" = 1", 7),
+            ("pi = 1\ninf = 1\n1a = 1\na-b = 1\n\"\" = 1\n\"\u{e4}\" = 1", 6),
             // The schema refuses these.
             ("a = []\nb = inf\nc = true\nf = { g = 1 }", 0),
         ] {

@@ -135,7 +135,11 @@ fn syntax_fault(error: &toml::de::Error, file: usize, range: Range<usize>) -> Fa
     let at = error.span().map_or(range.end..range.end, |span| {
         (range.start + span.start).min(range.end)..(range.start + span.end).min(range.end)
     });
-    Fault::new(Place::new(file, at), format!("not TOML: {}", error.message()), "")
+    let fault = Fault::new(Place::new(file, at), format!("not TOML: {}", error.message()), "");
+    match error.message().contains("inline table") {
+        true => fault.help("a table in braces is complete: write this key inside the braces, or all of its keys under a header such as [time]"),
+        false => fault,
+    }
 }
 
 fn node(spanned: Spanned<DeValue<'_>>, file: usize, offset: usize) -> Node {

@@ -278,9 +278,11 @@ impl Walk<'_> {
         let may_be = number.is_finite() || (number == f64::INFINITY && schema.may_be_infinite());
         if !may_be {
             let message = format!("`{path}` is not a finite number");
-            self.checked
-                .faults
-                .push(Fault::new(node.at.clone(), message, "not finite").help("give a number"));
+            let help = match number == f64::INFINITY {
+                true => at_infinity(schema),
+                false => "give a number".to_owned(),
+            };
+            self.checked.faults.push(Fault::new(node.at.clone(), message, "not finite").help(help));
             return true;
         }
         let most = schema
@@ -352,8 +354,8 @@ impl Walk<'_> {
         if !is_expression && !self.may_give_number(text, schema) {
             return Ok(None);
         }
-        let variables = of_formula(schema.text("variables").unwrap_or_default());
-        let resolved = self.parameters.resolve_in(text, &variables);
+        let allowed = schema.text("variables").unwrap_or(if is_expression { "t, x, y, z" } else { "" });
+        let resolved = self.parameters.resolve_in(text, &of_formula(allowed), allowed);
         if resolved.as_ref().is_err_and(|fault| fault.is_unknown_name)
             && !is_expression
             && self.parameters.are_none()
@@ -470,6 +472,17 @@ impl Walk<'_> {
         }
         fault
     }
+}
+
+/// How to say what an infinite number would mean.
+fn at_infinity(schema: Schema) -> String {
+    let absent = || {
+        let meaning = schema.text("description")?.replace('\n', " ");
+        let (_, absent) = meaning.split_once("Absent: ")?;
+        let absent = absent.split_once(". ").map_or(absent, |(first, _)| first).trim_end_matches('.');
+        Some(format!("leave this key out: {absent}; or give a number"))
+    };
+    schema.text("at_infinity").map(str::to_owned).or_else(absent).unwrap_or_else(|| "give a number".into())
 }
 
 /// The fault of a number that depends on a variable.

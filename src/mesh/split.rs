@@ -185,16 +185,18 @@ impl<const D: usize> GlobalMesh<D> {
     /// Splits the mesh along the facets inside the body that have this name: their nodes become two, except on the edge of the surface
     /// inside the body, where cells stay joined. The sides become two boundaries: that below the surface, left of a vertical one, has this
     /// name, the other one that of [`other_side`]. Refused where the surface branches, meets another fault, has one side only, or has no
-    /// node that can become two.
-    pub fn split_along(&mut self, name: &str) -> Result<()> {
+    /// node that can become two. Gives what the user should know, who may have meant a part of the surface; `None` if there are no facets of
+    /// this name inside the body.
+    pub fn split_along(&mut self, name: &str) -> Result<Option<String>> {
         let named = |name: &str| self.inner_groups.iter().position(|group| group.name == name);
-        let Some(at) = named(name).or_else(|| named(number_of_group(name)?)) else { return Ok(()) };
+        let Some(at) = named(name).or_else(|| named(number_of_group(name)?)) else { return Ok(None) };
         let facets = self.inner_facets[at].clone();
         if facets.is_empty() {
             let place = &self.inner_groups[at].place;
             return Err(Error::Refused(format!("the fault \"{name}\", around {place}, meets another fault")));
         }
         let fault = Fault::new(self, name, facets)?;
+        let note = self.note_of(&fault);
         let carriers = fault.carriers(self);
         let carries = |side: Side| carriers[&fault.group(side)];
         self.double_nodes(&fault, carries);
@@ -205,7 +207,27 @@ impl<const D: usize> GlobalMesh<D> {
         let meets =
             |facets: &Vec<Sorted<D>>| facets.iter().flatten().any(|node| fault.split.contains_key(node));
         self.inner_facets.iter_mut().filter(|facets| meets(facets)).for_each(Vec::clear);
-        Ok(())
+        Ok(Some(note))
+    }
+
+    /// That facets of this name are inside the body, between which cells, and what to do if they were not meant.
+    fn note_of(&self, fault: &Fault<'_, D>) -> String {
+        let corners = fault.facets[0].map(|node| self.nodes[node as usize]);
+        let regions: BTreeSet<&str> =
+            fault.cells[0].iter().map(|(cell, _)| &*self.regions[usize::from(self.cell_regions[*cell])]).collect();
+        let parted: Vec<String> = regions.into_iter().map(|region| format!("\"{region}\"")).collect();
+        let parted = match &*parted {
+            [one] => format!("two cells of region {one}"),
+            several => format!("cells of the regions {}", several.join(" and ")),
+        };
+        format!(
+            "\"{}\" lies inside the body: {} of its facets have a cell on both sides, for example {parted} around {}; the mesh is split there into two \
+             sides that touch each other. If you mean a part of the surface, correct this name in the mesh file, which may have the wrong \
+             number of a face of an element",
+            fault.name,
+            fault.facets.len(),
+            place(&centroid(&corners))
+        )
     }
 
     /// Gives the cells on the side that carries the law, and their facets, new nodes in place of those that become two.

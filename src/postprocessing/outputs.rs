@@ -96,6 +96,7 @@ pub(crate) fn named() -> Vec<Named> {
         let named = move |name: String, meaning: &str| Named {
             shown: format!("outputs {} {name}", file.name),
             meaning: meaning.to_owned(),
+            also: "",
             name,
         };
         file.names

@@ -139,8 +139,12 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let start = Instant::now();
         let Simulation { body, state, scheme, totals, .. } = simulation;
         let mut written = Ok(());
+        let mean_temperature = body.heat.as_ref().map_or(0.0, |heat| {
+            let [heats, capacities] = session.sum(heat.heat_and_capacity());
+            heats / capacities
+        });
         if let Some(history) = &mut self.history {
-            written = history.row(state.step, state.time, state.step_length, outcome, totals);
+            written = history.row(state, outcome, totals, mean_temperature);
         }
         session.agree(written)?;
         let motion = scheme.balanced_motion(state);

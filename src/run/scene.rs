@@ -170,10 +170,13 @@ fn from_file(session: &Session, path: &Path, loaded: &Loaded) -> Result<(Scene, 
         let mut file = file::read(path, &placement(&job.mesh))?;
         let named = |error| Error::Refused(format!("{}: {error}", path.display()));
         let faults = job.contact.iter().filter(|contact| contact.against.is_empty());
-        faults
-            .flat_map(|contact| &contact.on)
-            .try_for_each(|fault| file.mesh.split_along(fault))
-            .map_err(named)?;
+        for (contact, fault) in faults.flat_map(|contact| contact.on.iter().map(move |name| (contact, name))) {
+            let Some(note) = file.mesh.split_along(fault).map_err(named)? else { continue };
+            if contact.obstacle.is_some() {
+                return Err(named(Error::Refused(format!("{note}. A contact with an obstacle is on the surface"))));
+            }
+            file.notes.push(format!("{}: {note}", path.display()));
+        }
         Ok(file)
     };
     let (whole, notes) = session.on_first(read)?.map(|file| (file.mesh, file.notes)).unzip();

@@ -202,9 +202,13 @@ fn keys_and_values_of_a_sweep_are_refused_with_their_place() {
     let text = refused(&format!("[sweep]\n\"time.step\" = [{}]\n", steps.join(", ")));
     assert!(text.contains("the job of run step-2.5 is refused"), "{text}");
     assert!(
-        text.contains("the step is longer than the whole run") && text.contains("3 more runs are refused"),
+        text.contains("the step is longer than the whole run")
+            && text.contains("7 more runs of the sweep have the same fault")
+            && !text.contains("step-3.5"),
         "{text}"
     );
+    let text = refused("[sweep]\n\"time.step\" = [0.1]\n\"parameters.mu\" = [1.0]\n");
+    assert!(text.contains("no parameter `mu`") && text.contains("| \"parameters.mu\" = [1.0]\n"), "{text}");
     let text = refused("[sweep]\n\"material.densty\" = [1.0]\n");
     assert!(text.contains("did you mean `density`?"), "{text}");
 }

@@ -143,6 +143,30 @@ fn carried(session: &Session) {
     assert!(work.abs() < 1e-12 * 1000.0, "a work of {work:e}");
 }
 
+/// The faces through the origin of a brick, each a part of its whole surface, hold it along their normals alone: in uniaxial tension the
+/// strain is uniform.
+fn held_by_faces(session: &Session) {
+    let on = "on = [\"left\", \"right\", \"front\", \"back\", \"bottom\", \"top\"]\n";
+    let face = |axis: &str| format!("[[support]]\n{on}where = \"{axis} < 1e-9\"\nfix = \"normal\"\n");
+    let text = format!(
+        "{}[time]\nscheme = \"implicit_euler\"\nend = 1.0\nstep = 1.0\n[material]\n\
+         elasticity = {{ youngs_modulus = 1000, poisson_ratio = 0.3 }}\n{}{}{}\
+         [[traction]]\n{on}where = \"x > 1 - 1e-9\"\npressure = -10\n",
+        any_mesh::<3>(),
+        face("x"),
+        face("y"),
+        face("z")
+    );
+    let mut run: Simulation<3, 6> = simulation(session, &text, &brick([3, 2, 3]));
+    while run.advance(session).expect("a step").is_some() {}
+    let found = run.state.displacement.owned().expect("values");
+    for (found, place) in found.chunks_exact(3).zip(&run.body.mesh.nodes) {
+        let expected = [0.01 * place[0], -0.003 * place[1], -0.003 * place[2]];
+        let error = found.iter().zip(expected).map(|(found, expected)| (found - expected).abs()).fold(0.0, larger);
+        assert!(error < 1e-10, "{found:?} is not {expected:?} at {place:?}");
+    }
+}
+
 /// Contradicting motions of a node, and parts of boundaries that are nothing, are refused.
 fn contradictions(session: &Session) {
     let held = "[[support]]\non = [\"left\"]\nfix = \"all\"\nvelocity = [0.5, 0]\n";
@@ -178,6 +202,7 @@ fn all(session: &Session) {
     in_dimension::<2, 4>(session, &crossed([4, 3]));
     in_dimension::<3, 6>(session, &brick([3, 2, 3]));
     carried(session);
+    held_by_faces(session);
     contradictions(session);
 }
 

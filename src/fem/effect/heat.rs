@@ -252,6 +252,16 @@ impl<const D: usize> Heat<D> {
         &self.capacity
     }
 
+    /// The sums over the owned nodes of the temperature times the capacity, in J, and of the capacity, in J/K.
+    pub fn heat_and_capacity(&self) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (temperature, capacity) in self.temperature_of_owned().iter().zip(self.capacity()) {
+            sums[0] += temperature * capacity;
+            sums[1] += capacity;
+        }
+        sums
+    }
+
     /// Whether the convection depends on time.
     pub fn has_varying_film(&self) -> bool {
         let coefficients = self.boundaries.iter().filter_map(|boundary| boundary.given.convection.as_ref());

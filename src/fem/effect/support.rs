@@ -151,10 +151,20 @@ fn constraints<'a, const D: usize>(
             Fix::Axes(axes) => axes.iter().map(|a| axis(a.index())).collect(),
             Fix::Keyword(FixedDirections::Normal) => normals.iter().map(|point| point.normal).collect(),
         };
-        let points = surface_points(session, mesh, &facets(mesh, names.iter().copied()))?;
-        let around = points.chunk_by(|a: &SurfacePoint<D>, b| a.node == b.node);
-        let mut nodes: BTreeMap<u32, Vec<Vector<D>>> =
-            around.map(|points| (points[0].node, directions(points))).collect();
+        let held_at = |facets: &[u32]| -> Result<BTreeMap<u32, Vec<Vector<D>>>, Agreed> {
+            let points = surface_points(session, mesh, facets)?;
+            let around = points.chunk_by(|a: &SurfacePoint<D>, b| a.node == b.node);
+            Ok(around.map(|points| (points[0].node, directions(points))).collect())
+        };
+        let mut on = facets(mesh, names.iter().copied());
+        let mut nodes = held_at(&on)?;
+        if let Some(part) = support.part.as_ref().filter(|_| *fix == Fix::Keyword(FixedDirections::Normal)) {
+            // On an edge between faces the normals are those of the faces of which the part has facets.
+            let is_in = |node: u32| part.evaluate(0.0, &mesh.nodes[node as usize]) != 0.0;
+            on.retain(|&facet| mesh.facet_nodes(facet).all(is_in));
+            let of_part = held_at(&on)?.into_iter();
+            nodes.extend(of_part.filter(|(node, _)| nodes.get(node).is_some_and(|all| all.len() > 1)).collect::<Vec<_>>());
+        }
         nodes.extend(mesh.nodes_of_point_sets(&names).into_iter().map(|node| (node, directions(&[]))));
         if let Some(part) = &support.part {
             let share = |node: u32| part.evaluate(0.0, &mesh.nodes[node as usize]);

@@ -6,7 +6,10 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, FIRST_OF_HEAT, Peaks, Role},
+    fem::{
+        effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, FIRST_OF_HEAT, Peaks, Role},
+        state::State,
+    },
     linear_algebra::tensor::larger,
     solver::stepping::{StepLevel, StepOutcome, StepRange, Work},
 };
@@ -23,10 +26,12 @@ fn in_columns(totals: &Totals) -> [f64; FIRST_OF_HEAT + 1] {
 }
 
 /// Those of heat in the order of the file.
-fn heat_in_columns(totals: &Totals) -> [f64; ENERGIES.len() - FIRST_OF_HEAT + 1] {
-    std::array::from_fn(|at| match ENERGIES.get(FIRST_OF_HEAT + at) {
-        Some(kind) => totals.energy[*kind],
-        None => totals.heat_imbalance,
+fn heat_in_columns(totals: &Totals, mean_temperature: f64) -> [f64; ENERGIES.len() - FIRST_OF_HEAT + 2] {
+    const COUNT: usize = ENERGIES.len() - FIRST_OF_HEAT;
+    std::array::from_fn(|at| match at {
+        COUNT => totals.heat_imbalance,
+        at if at > COUNT => mean_temperature,
+        at => totals.energy[ENERGIES[FIRST_OF_HEAT + at]],
     })
 }
 
@@ -320,21 +325,22 @@ impl History {
         Ok(Self { file, has_heat })
     }
 
-    /// Writes the row of a step.
+    /// Writes the row of a step, with the mean temperature in K if there is heat.
     pub fn row(
         &mut self,
-        step: u64,
-        time: f64,
-        length: f64,
+        state: &State,
         outcome: &StepOutcome,
         totals: &Totals,
+        mean_temperature: f64,
     ) -> Result<()> {
-        let (comma, heat) = (if self.has_heat { "," } else { "" }, heat_in_columns(totals));
+        let comma = if self.has_heat { "," } else { "" };
+        let heat = heat_in_columns(totals, mean_temperature);
         let heat = if self.has_heat { &heat[..] } else { &[] };
         self.file.row(format_args!(
-            "{step},{},{},{},{},{},{},{}{comma}{}",
-            Time(time),
-            Number(length),
+            "{},{},{},{},{},{},{},{}{comma}{}",
+            state.step,
+            Time(state.time),
+            Number(state.step_length),
             outcome.newton_iterations,
             outcome.linear_iterations,
             outcome.active_changes,

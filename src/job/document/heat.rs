@@ -10,6 +10,7 @@ use crate::job::findings::{MeshNames, Table};
 /// A boundary at which the temperature is given, or heat enters or leaves. A table has one of `temperature`, `flux` and `convection`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "thermal, temperature, cooling"))]
 pub struct HeatBoundary {
     /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["top"])]

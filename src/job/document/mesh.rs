@@ -20,7 +20,7 @@ pub struct Mesh {
     /// Factor of the coordinates in a mesh file, such as 1e-3 for a mesh in millimetres. A file is first scaled, then rotated about
     /// the origin, then translated: x = R (scale X) + translate. All else in the job refers to the moved mesh. Absent: 1.
     #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("also" = "units, millimetres, mm", "exclusiveMinimum" = 0))]
     pub scale: f64,
     /// Rotation of the mesh of a file about the origin, after `scale` and before `translate`. Absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]

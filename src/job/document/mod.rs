@@ -50,8 +50,8 @@ pub struct Job {
     pub about: Option<About>,
     /// Numbers with names, for example V = 0.05 and T = "2*pi/V". Wherever a key expects a number, it accepts an expression of them
     /// in quotes, such as end = "3*T" and cells = ["2*n", "n"]; expressions in t, x, y, z may contain them, too. A parameter may
-    /// depend on others, in any order. A name is made of letters, digits and _ and does not start with a digit; the names of
-    /// functions, variables and constants are not available, and neither are d, g, l, p, q, v and temperature.
+    /// depend on others, in any order. A name is any word of letters, digits and _ that does not start with a digit, except pi and inf. A
+    /// formula with a variable of this name, such as x or d, does not accept it, because it is not clear which is meant.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Parameter>,
     /// The values that expressions of parameters give, as the job file has them.
@@ -63,6 +63,7 @@ pub struct Job {
     pub material: Material,
     /// Regions of the body with their own material, named by the groups or sets of the mesh file, or by the names of generated blocks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("also" = "coating, layer, inclusion, composite"))]
     pub region: Vec<Region>,
     /// Boundaries on which components of the displacement are held or moved, or which rest on springs and dashpots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -44,7 +44,7 @@ pub struct Adhesion {
     #[schemars(range(min = 0), extend("unit" = "Pa/m"), example = 5e5)]
     pub tangential_stiffness: Option<f64>,
     /// Dupré's energy of adhesion: the energy that separates a unit of area slowly.
-    #[schemars(range(min = 0), extend("unit" = "J/m^2"), example = 10.0)]
+    #[schemars(range(min = 0), extend("at_infinity" = "give a large number: with 1e9 no bond breaks", "unit" = "J/m^2"), example = 10.0)]
     pub energy: f64,
     /// Largest normal traction of the bonds, as in a bilinear cohesive law: the traction grows with `stiffness` up to `strength`,
     /// then decreases linearly, and vanishes at the opening `2 energy / strength`. Unloading follows the secant to the origin.

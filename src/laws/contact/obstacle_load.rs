@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 /// in the same way for the rotation. Both motions are solved together with each step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "indentation, rolling"))]
 pub struct ObstacleLoad {
     /// The direction of the motion and of the force, one component per axis, of any length. Absent: no force moves the obstacle.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -121,6 +121,7 @@ pub struct Contact {
     /// inertia stay the same; gravity and body forces move with the mass. Between bodies, the boundaries `against` take part. Requires an
     /// implicit scheme.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("also" = "restitution, rebound"))]
     pub redistribute_mass: bool,
     /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;
     /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
@@ -132,6 +133,7 @@ pub struct Contact {
     pub obstacle_load: Option<ObstacleLoad>,
     /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("also" = "brake, clutch, belt, stick-slip, stick, slip"))]
     pub friction: Option<FrictionLaw>,
     /// Share of the heat of friction that enters the body, with [material.heat]; the rest enters the obstacle, or the body of `against`. No
     /// heat is conducted from one body to the other. Absent: 1, between bodies 0.5.

@@ -30,10 +30,12 @@ const SUBTRACT: Binary = smooth_of_two!(left - right, (left, right) => [R::from(
 const MULTIPLY: Binary = smooth_of_two!(left * right, (left, right) => [right, left])
     .linear(|[a, p], [b, q]| (p == 0.0 || q == 0.0).then_some([a * b, a * q + b * p]))
     .sharing(|_, _| [one(); 2]);
-const DIVIDE: Binary =
-    smooth_of_two!(left / right, (left, right) => [R::from(1.0) / right, -left / right.square()])
+const DIVIDE: Binary = Binary {
+    by_left: Some(|_, right, _| 1.0 / right),
+    ..smooth_of_two!(left / right, (left, right) => [R::from(1.0) / right, -left / right.square()])
         .linear(|[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]))
-        .sharing(|_, _| [one(), -one()]);
+        .sharing(|_, _| [one(), -one()])
+};
 const POWER: Binary = {
     fn slopes<R: Real>(base: R, exponent: R) -> [R; 2] {
         [exponent * base.power(exponent - R::from(1.0)), base.power(exponent) * base.ln()]
@@ -344,8 +346,14 @@ impl Parser<'_> {
         let name = &self.text[span.clone()];
         let called = self.peek() == Some('(');
         let known = meaning(name, self.variables);
-        let number = self.names.get(name).copied().filter(|_| known.is_none());
-        match known.or(number.map(|number| Meaning::Value(Instruction::Number(number)))) {
+        let number = self.names.get(name).copied();
+        // A name that is called is that of a function.
+        let number = number.filter(|_| !called || known.is_none());
+        if let (Some(Meaning::Value(Instruction::Variable(variable))), Some(_)) = (known, number) {
+            let message = format!("`{name}` is a parameter, but here also the {}", variable.meaning());
+            return Err(Fault::new(span, message, "give the parameter another name"));
+        }
+        match number.map(|number| Meaning::Value(Instruction::Number(number))).or(known) {
             None => Err(self.unknown(span)),
             Some(Meaning::Value(_)) if called => {
                 let help = format!("a product is written {name}*(...)");
@@ -396,10 +404,17 @@ impl Parser<'_> {
         let name = &self.text[span.clone()];
         let known: Vec<&str> = names(self.variables).collect();
         let all = known.iter().copied().chain(self.names.keys().map(String::as_str));
-        let help = match nearest(name, all) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => format!("known names: {}", known.join(", ")),
-        };
+        let lower = name.to_lowercase();
+        let meant = self.variables.iter().find(|variable| {
+            let mut words = variable.meaning().split(|c: char| !c.is_alphanumeric());
+            lower.len() > 2 && words.any(|word| word == lower)
+        });
+        let near = meant.map(|variable| variable.name()).or_else(|| nearest(name, all));
+        let near = near.map_or(String::new(), |near| format!("did you mean `{near}`? "));
+        let variables: Vec<String> =
+            self.variables.iter().map(|variable| format!("{} ({})", variable.name(), variable.meaning())).collect();
+        let (variables, others) = (variables.join(", "), known[self.variables.len()..].join(", "));
+        let help = format!("{near}known variables: {variables}; constants and functions: {others}");
         let message = format!("unknown name `{name}` in an expression");
         Fault { is_unknown_name: true, ..Fault::new(span, message, help) }
     }

@@ -83,6 +83,11 @@ impl<S: Scope> Formula<S> {
         self.expression.uses(variable)
     }
 
+    /// Whether it is piecewise, for example because of min or abs.
+    pub fn has_pieces(&self) -> bool {
+        self.expression.program.has_pieces()
+    }
+
     /// Whether its derivative by a variable of its scope is known to be zero for all values from 0 on, and all values of the others.
     pub fn is_constant_along(&self, variable: Variable) -> bool {
         let from_zero = Interval::new(0.0, REACH);

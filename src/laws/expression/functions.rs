@@ -189,11 +189,6 @@ const HYPOT: Binary = smooth_of_two!(left.length(right), (left, right) => {
     [left / length, right / length]
 });
 
-/// Whether expressions in time and place know a name of their own: a function, a variable or a constant.
-pub fn is_known(name: &str) -> bool {
-    meaning(name, Variable::OF_TIME_AND_PLACE).is_some()
-}
-
 /// The meaning of `name`, if it is one of these variables, a constant or a function.
 pub(super) fn meaning(name: &str, variables: &[Variable]) -> Option<Meaning> {
     let variable = variables.iter().find(|variable| variable.name() == name);

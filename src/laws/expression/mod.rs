@@ -28,7 +28,7 @@ pub use compile::Fault;
 pub use enclosure::Enclosure;
 use evaluate::{Arguments, COUNT};
 pub use formula::{Formula, OfCreep, OfMotion, OfRate, OfSliding, OfStrain, Scope, short};
-pub use functions::{Names, is_known};
+pub use functions::Names;
 pub use interval::Interval;
 use program::Program;
 pub use program::Variable;

@@ -60,6 +60,24 @@ impl Variable {
     pub fn name(self) -> &'static str {
         ["t", "x", "y", "z", "v", "d", "l", "p", "q", "e", "g", "temperature"][self as usize]
     }
+
+    /// What it is, with its unit.
+    pub fn meaning(self) -> &'static str {
+        [
+            "time in s",
+            "first coordinate in m",
+            "second coordinate in m",
+            "third coordinate in m",
+            "normal or sliding velocity (speed) in m/s",
+            "penetration in m",
+            "slip distance in m",
+            "contact pressure or mean stress in Pa",
+            "von Mises norm of the stress in Pa",
+            "equivalent or accumulated strain",
+            "equivalent strain rate in 1/s",
+            "temperature in K",
+        ][self as usize]
+    }
 }
 
 /// A compiled program; clones share the instructions.
@@ -69,6 +87,7 @@ pub(super) struct Program {
     /// Points of the tables that the instructions interpolate.
     pub(super) tables: Arc<[Table]>,
     depth: usize,
+    has_pieces: bool,
 }
 
 /// What the instructions of a program act on, and how: numbers, numbers with derivatives, enclosures.
@@ -91,8 +110,8 @@ pub(super) trait Machine {
 
 impl Program {
     pub(super) fn new(instructions: Vec<Instruction>, tables: Vec<Table>) -> Self {
-        let depth = stack_depth(&instructions);
-        Self { instructions: instructions.into(), tables: tables.into(), depth }
+        let (depth, has_pieces) = (stack_depth(&instructions), instructions.iter().any(Instruction::has_pieces));
+        Self { instructions: instructions.into(), tables: tables.into(), depth, has_pieces }
     }
 
     /// Whether it contains `variable`.
@@ -102,12 +121,7 @@ impl Program {
 
     /// Whether one of its functions is piecewise.
     pub(super) fn has_pieces(&self) -> bool {
-        self.instructions.iter().any(|instruction| match instruction {
-            Instruction::Unary(function) => function.piece.is_some(),
-            Instruction::Binary(function) => function.piece.is_some(),
-            Instruction::Ternary(_) | Instruction::Interpolate(_) => true,
-            Instruction::Number(_) | Instruction::Variable(_) => false,
-        })
+        self.has_pieces
     }
 
     /// The result on this machine.
@@ -167,6 +181,16 @@ pub(super) enum Instruction {
 }
 
 impl Instruction {
+    /// Whether it is a piecewise function.
+    fn has_pieces(&self) -> bool {
+        match self {
+            Self::Unary(function) => function.piece.is_some(),
+            Self::Binary(function) => function.piece.is_some(),
+            Self::Ternary(_) | Self::Interpolate(_) => true,
+            Self::Number(_) | Self::Variable(_) => false,
+        }
+    }
+
     /// How many of the topmost values it replaces by its own.
     pub(super) fn operands(&self) -> usize {
         match self {

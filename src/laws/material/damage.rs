@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 pub struct Damage {
     /// Elastic energy per volume Y above which damage grows. In uniaxial tension, Y is the square of the stress divided by twice
     /// Young's modulus.
-    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 50.0)]
+    #[schemars(range(min = 0), extend("at_infinity" = "leave out the table `damage`: this material is then never damaged", "unit" = "Pa"), example = 50.0)]
     pub threshold: f64,
     /// Viscosity of damage: the larger, the slower damage grows. With Y at twice the threshold a cell breaks in a time of about
     /// viscosity / threshold.

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 /// loads stays at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "thermal, temperature"))]
 pub struct Heat {
     /// Thermal conductivity.
     #[schemars(extend("unit" = "W/(m K)", "exclusiveMinimum" = 0), example = 50.0)]

@@ -78,13 +78,13 @@ impl Material {
             } else {
                 continue;
             };
-            return Err(LawFault::at_value(
-                self.key(k),
-                format!("the value {number} is not {wrong}"),
-                format!(
-                    "correct the expression so that it is {wrong} in the whole body, for example with max(..)"
-                ),
-            ));
+            let help = match k == KEYS.len() && number == f64::INFINITY {
+                true => "write a large number, such as 1e30, where the material does not flow, or give this region its own material without \
+                         `viscoplasticity`"
+                    .into(),
+                false => format!("correct the expression so that it is {wrong} in the whole body, for example with max(..)"),
+            };
+            return Err(LawFault::at_value(self.key(k), format!("the value {number} is not {wrong}"), help));
         }
         let material = self.with(numbers);
         let fault = material.fault_of_viscosity(normal_strains).or_else(|| material.fault_of_flow());

@@ -18,7 +18,7 @@ mod thickness;
 
 pub use creep_formula::CreepFormula;
 pub use drucker_prager::DruckerPrager;
-pub use flow::{Flow, InPlaces, Parameters, Room};
+pub use flow::{Flow, InPlaces, Parameters, Room, WITHOUT_FLOW};
 pub use maxwell::{Dashpots, Maxwell};
 pub use norton::Norton;
 pub use perzyna::{Metric, Perzyna};

@@ -30,7 +30,7 @@ pub enum AnyMesh {
 
 impl AnyMesh {
     /// As [`GlobalMesh::split_along`].
-    pub fn split_along(&mut self, fault: &str) -> Result<()> {
+    pub fn split_along(&mut self, fault: &str) -> Result<Option<String>> {
         match self {
             Self::Two(mesh) => mesh.split_along(fault),
             Self::Three(mesh) => mesh.split_along(fault),

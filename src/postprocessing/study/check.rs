@@ -85,17 +85,18 @@ fn check_sweep(study: &Study, base: &Job, document: &mut Document) {
                 None if known.is_empty() => "give numbers names in its table [parameters]".into(),
                 None => format!("parameters: {}", known.join(", ")),
             };
-            document.fault("sweep", format!("the base job has no parameter `{name}`"), help);
+            let message = format!("the base job has no parameter `{name}`");
+            document.fault_at_name(("sweep", key), message, help);
         }
         let Values::Draws(draws) = values else { continue };
         if draws.from >= draws.to {
             let message = format!("`{key}` has no values from {} to {}", draws.from, draws.to);
-            document.fault("sweep", message, "`from` must be below `to`");
+            document.fault_at_name(("sweep", key), message, "`from` must be below `to`");
         }
         match first {
             Some((other, count)) if count != draws.draws => {
                 let message = format!("`{key}` has {} draws, but `{other}` has {count}", draws.draws);
-                document.fault("sweep", message, "give all random keys the same number of draws");
+                document.fault_at_name(("sweep", key), message, "give all random keys the same number of draws");
             }
             _ => first = Some((key.as_str(), draws.draws)),
         }

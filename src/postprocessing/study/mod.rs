@@ -40,14 +40,14 @@ pub(crate) use write::{COLUMNS, ROWS};
 
 use crate::{
     error::{Exit, Result},
-    job::{describe_kind, markdown_of},
+    job::{Named, describe_kind, markdown_of, named as named_of},
     parallel::session::Session,
     run::version,
 };
 use compare::Compared;
 use document::Take;
 use execute::{Speaker, announced};
-use plan::{Planned, PlannedReference, RefusedRun};
+use plan::{Planned, PlannedReference, RefusedRun, one_of_each_fault};
 use record::{Counts, Ran, seconds_of};
 use results::RunResult;
 use side_by_side::{Numbered, execute_all};
@@ -55,6 +55,11 @@ use side_by_side::{Numbered, execute_all};
 /// The reference of the keys of studies: of all tables, or of one table or key.
 pub fn describe(table: Option<&str>) -> Result<String> {
     describe_kind(document::kind(), table, &[])
+}
+
+/// All tables and keys of studies, for searches by a word.
+pub(crate) fn named() -> Vec<Named> {
+    named_of(document::kind())
 }
 
 /// The JSON Schema (draft 2020-12) of a study.
@@ -149,9 +154,9 @@ fn reference_run(plan: &Plan) -> Option<&Planned> {
 
 /// Says which runs of the sweep are refused, each with its first fault, before the first run starts.
 fn announce_refused(plan: &Plan, speaker: Speaker<'_>) {
-    for run in &plan.refused {
-        let fault = run.error.lines().next().unwrap_or_default();
-        speaker.complain(&format!("run refused   {:<40} {fault}", run.name));
+    for (run, others) in one_of_each_fault(&plan.refused) {
+        let more = if others > 0 { format!(" (and {others} more)") } else { String::new() };
+        speaker.complain(&format!("run refused   {:<40} {}{more}", run.name, run.fault()));
     }
 }
 

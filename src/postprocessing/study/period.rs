@@ -2,28 +2,32 @@
 
 /// Swings below this share of the amplitude around the mean are noise.
 const NOISE: f64 = 0.05;
-/// Values that differ by less than this share of the largest are constant.
-const ROUNDING: f64 = 1e-12;
+/// Values that differ by less than this share of the largest are constant but for errors of the solver.
+const CONSTANT: f64 = 1e-8;
+/// Steps in a period below which an oscillation is told from noise by its regularity.
+const FEW: f64 = 8.0;
+/// Largest deviation of the periods of a regular oscillation from their mean, relative to it.
+const REGULAR: f64 = 0.25;
 
 /// The mean period in s of values at ascending times, from the times at which they cross a level, their mean; `None` if they cross it
-/// less than twice in the same direction, are constant, or are not all numbers.
+/// less than twice in the same direction, are constant beside the `largest` magnitude of the run, are irregular from step to step, or are
+/// not all numbers.
 ///
 /// Crossings in the same direction are a period apart whatever the level is. One counts if the values then swing beyond the level by a
 /// twentieth of the amplitude; its time is that at which the line between two values crosses the level.
-pub(super) fn period(times: &[f64], values: &[f64], level: f64) -> Option<f64> {
+pub(super) fn period(times: &[f64], values: &[f64], [level, largest]: [f64; 2]) -> Option<f64> {
     let extremes = values
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
     let amplitude = 0.5 * (extremes[1] - extremes[0]);
-    let largest = extremes[0].abs().max(extremes[1].abs());
     let are_numbers = level.is_finite() && values.iter().chain(times).all(|value| value.is_finite());
-    if !are_numbers || amplitude <= ROUNDING * largest {
+    if !are_numbers || amplitude <= CONSTANT * largest {
         return None;
     }
     let (mut side, mut last_change) = (None, f64::NAN);
-    // Time of the first and of the last crossing in each direction, and their number.
-    let mut found = [[0.0; 2]; 2];
-    let mut counts = [0_u32; 2];
+    // Times of the last crossing in each direction, and the periods.
+    let mut last = [f64::NAN; 2];
+    let mut periods: Vec<f64> = Vec::new();
     for (at, value) in values.iter().enumerate() {
         let off = value - level;
         if let Some(before) = at.checked_sub(1).map(|before| values[before] - level)
@@ -38,17 +42,16 @@ pub(super) fn period(times: &[f64], values: &[f64], level: f64) -> Option<f64> {
         let is_above = off > 0.0;
         if side.is_some_and(|side| side != is_above) {
             let direction = usize::from(is_above);
-            counts[direction] += 1;
-            if counts[direction] == 1 {
-                found[direction][0] = last_change;
-            }
-            found[direction][1] = last_change;
+            let since = last_change - last[direction];
+            periods.extend((!since.is_nan()).then_some(since));
+            last[direction] = last_change;
         }
         side = Some(is_above);
     }
-    let periods = counts.iter().map(|count| count.saturating_sub(1)).sum::<u32>();
-    let spans: f64 = found.iter().map(|[first, last]| last - first).sum();
-    (periods > 0).then(|| spans / f64::from(periods))
+    let (count, step) = (periods.len() as f64, (times.last()? - times.first()?) / (times.len() as f64 - 1.0));
+    let mean = periods.iter().sum::<f64>() / count;
+    let deviation = (periods.iter().map(|period| (period - mean).powi(2)).sum::<f64>() / count).sqrt();
+    (mean >= FEW * step || deviation <= REGULAR * mean).then_some(mean)
 }
 
 #[cfg(test)]
@@ -61,9 +64,13 @@ mod tests {
         (0..=200).map(|n| f64::from(n) * end / 200.0).map(|t| (t, value(t))).unzip()
     }
 
+    fn largest(values: &[f64]) -> f64 {
+        values.iter().fold(0.0, |most: f64, value| most.max(value.abs()))
+    }
+
     fn of(end: f64, level: f64, value: impl Fn(f64) -> f64) -> Option<f64> {
         let (times, values) = sampled(end, value);
-        period(&times, &values, level)
+        period(&times, &values, [level, largest(&values)])
     }
 
     #[test]
@@ -78,7 +85,7 @@ mod tests {
             .enumerate()
             .map(|(n, value)| (0.25 * n as f64, *value))
             .unzip();
-        assert_eq!(period(&times, &values, 0.0), Some(1.0));
+        assert_eq!(period(&times, &values, [0.0, largest(&values)]), Some(1.0));
     }
 
     #[test]
@@ -95,7 +102,7 @@ mod tests {
             turn = -turn;
             *value += 0.03 * turn;
         });
-        let noisy = period(&times, &values, 0.0).expect("a period");
+        let noisy = period(&times, &values, [0.0, largest(&values)]).expect("a period");
         assert!((noisy - 0.5).abs() < 0.02, "{noisy}");
     }
 
@@ -106,13 +113,24 @@ mod tests {
         assert!(of(1.0, 0.0, |t| (1.2 * TAU * t + 0.1).sin()).is_none());
         assert!(of(1.0, 0.0, |t| (1.6 * TAU * t + 0.1).sin()).is_some(), "two downward");
         assert_eq!(of(1.0, 3.0, |_| 3.0), None, "constant");
-        assert_eq!(of(1.0, 1.0, |t| 1.0 + 1e-16 * (90.0 * t).sin()), None, "rounding");
-        assert_eq!(period(&[], &[], f64::NAN), None);
-        assert_eq!(period(&[1.0], &[2.0], 2.0), None);
+        assert_eq!(of(1.0, 1.0, |t| 1.0 + 1e-9 * (90.0 * t).sin()), None, "errors of the solver");
+        let (times, still) = sampled(1.0, |t| 1e-9 * (90.0 * t).sin());
+        assert!(period(&times, &still, [0.0, 1e-9]).is_some());
+        assert_eq!(period(&times, &still, [0.0, 1.0]), None, "at rest after a motion");
+        // A linear congruential generator.
+        let mut state = 12345_u64;
+        let mut random = |_| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let noise: Vec<f64> = times.iter().map(&mut random).collect();
+        assert_eq!(period(&times, &noise, [0.0, 0.5]), None, "noise");
+        assert_eq!(period(&[], &[], [f64::NAN, 0.0]), None);
+        assert_eq!(period(&[1.0], &[2.0], [2.0, 2.0]), None);
         for wrong in [f64::NAN, f64::INFINITY] {
             let (times, mut values) = sampled(1.0, |t| (TAU * t / 0.2).sin());
             values[77] = wrong;
-            assert_eq!(period(&times, &values, 0.0), None, "{wrong}");
+            assert_eq!(period(&times, &values, [0.0, largest(&values)]), None, "{wrong}");
         }
     }
 }

@@ -126,7 +126,14 @@ impl Plan {
         }
         if runs.is_empty() {
             // No value can be used: more likely an error in the study than a limit that the sweep crosses.
-            refusals.extend(refused.iter().map(|run| refusal(&run.name, &run.error)));
+            refusals.extend(one_of_each_fault(&refused).iter().map(|(run, others)| {
+                let same = match others {
+                    0 => String::new(),
+                    1 => "\n1 more run of the sweep has the same fault".to_owned(),
+                    more => format!("\n{more} more runs of the sweep have the same fault"),
+                };
+                refusal(&run.name, &run.error) + &same
+            }));
         }
         let mut split = Vec::new();
         let reference = match &study.reference {
@@ -164,6 +171,40 @@ impl Plan {
         let mut plan = Self { study, name, folder: output, base, runs, refused, reference, split };
         plan.choose_times()?;
         Ok(plan)
+    }
+
+    /// The runs and their values, for a reader who has not run the study, and which of them are refused.
+    pub fn text(&self) -> String {
+        let Study { base, response, norm, .. } = &self.study;
+        let mut text = format!(
+            "study {}: base job {}, output in {}\n{} runs, {} quantities of response, {} norms of errors; nothing has run\n\n",
+            self.name,
+            base.job.display(),
+            self.folder.display(),
+            self.runs.len() + self.refused.len(),
+            response.len(),
+            norm.len()
+        );
+        let reference = match &self.reference {
+            Some(PlannedReference::Run(run)) => Some(&**run),
+            _ => None,
+        };
+        for run in self.runs.iter().chain(reference).chain(&self.split) {
+            let cells = if run.cells.is_empty() { String::new() } else { format!("{} cells, ", cells_name(&run.cells)) };
+            let step = run.adaptive.map_or(format!("step {} s", run.step), |tolerance| format!("adaptive {tolerance}"));
+            let set: String = run.set.iter().map(|set| format!(", {set}")).collect();
+            text += &format!("accepted  {:<30} {cells}{step}, {}{set}\n", run.name, run.scheme.name());
+        }
+        for run in &self.refused {
+            text += &format!("refused   {:<30} {}\n", run.name, run.set.join(", "));
+        }
+        for (run, others) in one_of_each_fault(&self.refused) {
+            text += &format!("\n{}\n", refusal(&run.name, &run.error));
+            if others > 0 {
+                text += &format!("runs with the same fault: {others} more\n");
+            }
+        }
+        text
     }
 
     /// Sets the output times: every run writes its fields at the times of comparison, the reference at all of these times.
@@ -214,6 +255,25 @@ impl Plan {
             reference.loaded.job.output.fields = every;
         }
         if faults.is_empty() { Ok(()) } else { Err(Error::Refused(faults.join("\n"))) }
+    }
+}
+
+/// For each fault the first run with it, and the number of others.
+pub(super) fn one_of_each_fault(refused: &[RefusedRun]) -> Vec<(&RefusedRun, usize)> {
+    let mut found: Vec<(&RefusedRun, usize)> = Vec::new();
+    for run in refused {
+        match found.iter_mut().find(|(first, _)| first.fault() == run.fault()) {
+            Some((_, others)) => *others += 1,
+            None => found.push((run, 0)),
+        }
+    }
+    found
+}
+
+impl RefusedRun {
+    /// The first line of what is wrong.
+    pub fn fault(&self) -> &str {
+        self.error.lines().next().unwrap_or_default()
     }
 }
 

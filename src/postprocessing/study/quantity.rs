@@ -73,11 +73,13 @@ pub(super) fn quantity_in(folder: &Path, name: &str, window: Window) -> Option<R
     if window.is_whole() && !is_over_time {
         return over_steps(side, &numbers(field)?).map(RunQuantity::Number);
     }
-    let rows = numbers("time")?.into_iter().zip(numbers(field)?).filter(|(time, _)| window.contains(*time));
+    let all = numbers(field)?;
+    let largest = all.iter().fold(0.0, |most, value| larger(most, value.abs()));
+    let rows = numbers("time")?.into_iter().zip(all).filter(|(time, _)| window.contains(*time));
     let (times, values): (Vec<f64>, Vec<f64>) = rows.unzip();
     let level = mean(&times, &values)?;
     let time = match side {
-        Some("period") => period(&times, &values, level),
+        Some("period") => period(&times, &values, [level, largest]),
         Some("arrival") => arrival(&times, &values),
         Some("mean") => return Some(RunQuantity::Number(level)),
         _ => return over_steps(side, &values).map(RunQuantity::Number),

@@ -41,6 +41,7 @@ const SMALL: f64 = 0.1;
 /// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "penalty, spring, Winkler, foundation, Hertz"))]
 pub struct Compliance {
     /// Contact pressure at a penetration of 1 m.
     #[schemars(extend("unit" = "Pa/m^exponent", "exclusiveMinimum" = 0), example = 1e4)]
@@ -52,7 +53,7 @@ pub struct Compliance {
     /// Coefficient of a dashpot beside the springs: the pressure is max(0, stiffness * penetration^exponent + damping * d/dt
     /// penetration) while there is penetration. The contact never pulls. 0: no dashpot.
     #[serde(default)]
-    #[schemars(range(min = 0), extend("unit" = "Pa s/m"), example = 50.0)]
+    #[schemars(range(min = 0), extend("also" = "restitution, rebound, impact", "unit" = "Pa s/m"), example = 50.0)]
     pub damping: f64,
     /// Gap: distance from the undeformed boundary to the obstacle along the outward normal, as a number or an expression in the
     /// time t and the undeformed coordinates x, y, z. inf: no obstacle. Absent: 0, or the distance to [contact.obstacle] if

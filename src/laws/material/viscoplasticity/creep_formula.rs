@@ -22,7 +22,7 @@ use crate::{
         law::{Derived, LawFault},
         material::{Elastic, Elasticity, Hypothesis, Isotropic},
     },
-    linear_algebra::tensor::{Mandel, larger, normal_components, trace, von_mises},
+    linear_algebra::tensor::{Mandel, add_scaled, dot, larger, normal_components, trace, von_mises},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -236,6 +236,8 @@ const ROUNDING: f64 = 1e-12;
 const SMALL: f64 = 1e-6;
 /// Change of a logarithm below which the next correction of Newton's method is a rounding error.
 const LAST: f64 = 1e-11;
+/// The same where the rate has no pieces: the next correction is about its square.
+const LAST_IF_SMOOTH: f64 = 1e-7;
 /// Largest size of a logarithm.
 const LARGEST: f64 = 690.0;
 
@@ -252,11 +254,27 @@ struct End {
     by_strain: f64,
 }
 
+impl End {
+    /// At this `x`, with `q(x)` and its `fall`, and the rate there.
+    fn new(x: f64, [norm, fall]: [f64; 2], length: f64, last: Rate) -> Self {
+        let by_norm = x - length * (last.by_norm + x * last.by_strain);
+        let by_x = norm * (1.0 - length * last.by_strain) - by_norm * norm * fall / x;
+        Self { x, norm, by_x, by_norm, by_strain: length * last.by_strain }
+    }
+}
+
 impl Elastic<CreepFormula> {
     /// The end of a step that flows at this rate at its start: the root `x`, whose logarithm is that of an increasing equation,
     /// `ln(x q(x)) - ln(k f(q(x), m, p + x q(x)))`, given `m` and `p`. Newton's method starts where the tangent of `f` has the end, which
-    /// is the end for a rate that is linear beyond a threshold.
-    fn solve(&self, release: &Release, start: Rate, length: f64, [mean, accumulated]: [f64; 2]) -> End {
+    /// is the end for a rate that is linear beyond a threshold, and ends with a step of at most `last_step`.
+    fn solve(
+        &self,
+        release: &Release,
+        start: Rate,
+        length: f64,
+        [mean, accumulated]: [f64; 2],
+        last_step: f64,
+    ) -> End {
         let mut last = start;
         let mut equation = |logarithm: f64| {
             let x = logarithm.exp();
@@ -274,23 +292,21 @@ impl Elastic<CreepFormula> {
         let growth = length * rate / (1.0 + length * (by_norm * stiffness - by_strain));
         let left = norm - stiffness * growth;
         let tangent = growth / if left > 0.0 { left } else { norm };
-        let x = root_from(tangent.ln().clamp(-LARGEST, LARGEST), &mut equation).exp();
-        let (norm, fall) = release.at(x);
-        let by_q = x - length * (last.by_norm + x * last.by_strain);
-        let by_x = norm * (1.0 - length * last.by_strain) - by_q * norm * fall / x;
-        End { x, norm, by_x, by_norm: by_q, by_strain: length * last.by_strain }
+        let x = root_from(tangent.ln().clamp(-LARGEST, LARGEST), last_step, &mut equation).exp();
+        End::new(x, release.at(x).into(), length, last)
     }
 }
 
 /// The root of an increasing function between two [`LARGEST`], which `function` returns with its derivative: Newton's method from `start`,
-/// with bisection once its steps leave a bracket or do not become half as long.
-fn root_from(start: f64, function: &mut impl FnMut(f64) -> [f64; 2]) -> f64 {
+/// up to a step of `last_step`, with
+/// bisection once its steps leave a bracket or do not become half as long.
+fn root_from(start: f64, last_step: f64, function: &mut impl FnMut(f64) -> [f64; 2]) -> f64 {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let (mut at, mut last, mut stride) = (start, f64::INFINITY, 1.0);
     for _ in 0..200 {
         let [value, slope] = function(at);
         let newton = at - value / slope;
-        if (newton - at).abs() <= LAST {
+        if (newton - at).abs() <= last_step {
             return newton;
         }
         if value > 0.0 {
@@ -346,7 +362,10 @@ impl Flow for Elastic<CreepFormula> {
             return None;
         }
         let release = Release::new(trial, norm, &self.elasticity);
-        let end = self.solve(&release, fastest, length, [mean, accumulated]);
+        // The derivatives are those before the last step.
+        let is_rough = tangent.is_some() || self.parameters.rate.has_pieces();
+        let last_step = if is_rough { LAST } else { LAST_IF_SMOOTH };
+        let end = self.solve(&release, fastest, length, [mean, accumulated], last_step);
         let growth = end.x * end.norm;
         let (left, [a, b]) = release.map::<S>(end.x);
         let weighted = WEIGHT.apply(&left.apply(trial));
@@ -364,23 +383,25 @@ impl Flow for Elastic<CreepFormula> {
         Some((weighted.map(|w| end.x * w), growth))
     }
 
+    /// The end is known: `E W s` is what each unit of `x` released.
     fn by_accumulated<const S: usize>(
         &self,
         trial: &Mandel<S>,
-        _: &Mandel<S>,
+        stress: &Mandel<S>,
         length: f64,
         accumulated: f64,
         _: &Tangent<S>,
     ) -> Mandel<S> {
-        let (norm, others) = (von_mises(trial), [mean_of(trial), accumulated]);
-        let fastest = self.parameters.at(norm, others);
-        if norm == 0.0 || fastest.rate == 0.0 {
+        let released = self.elasticity.apply(&WEIGHT.apply(stress));
+        let x = dot(&add_scaled(trial, -1.0, stress), &released) / dot(&released, &released);
+        if x.is_nan() || x <= 0.0 {
             return [0.0; S];
         }
-        let release = Release::new(trial, norm, &self.elasticity);
-        let end = self.solve(&release, fastest, length, others);
-        let (left, _) = release.map::<S>(end.x);
-        let gradient = left.apply(&WEIGHT.apply(&left.apply(trial)));
+        let release = Release::new(trial, von_mises(trial), &self.elasticity);
+        let (norm, fall) = release.at(x);
+        let last = self.parameters.at(norm, [mean_of(trial), accumulated + x * norm]);
+        let end = End::new(x, [norm, fall], length, last);
+        let gradient = release.map::<S>(x).0.apply(&WEIGHT.apply(stress));
         self.elasticity.apply(&gradient).map(|component| -end.by_strain / end.by_x * component)
     }
 
@@ -394,6 +415,10 @@ impl Flow for Elastic<CreepFormula> {
     ) -> Room<S> {
         let law = &self.parameters;
         let (norm, mean) = (von_mises(elastic), mean_of(elastic));
+        // A rate without pieces has no threshold.
+        if !law.rate.has_pieces() {
+            return Room::Everywhere;
+        }
         let nearly_none = SMALL * if norm > 0.0 { norm } else { law.reference_stress };
         if law.value(nearly_none, [mean, accumulated]) != 0.0 {
             return Room::Everywhere;

@@ -16,7 +16,7 @@
 //! regularisation: G. Duvaut, J.-L. Lions, Les inequations en mecanique et en physique, 1972, chapter 5.)
 
 use super::{
-    flow::{Flow, InPlaces, Parameters},
+    flow::{Flow, InPlaces, Parameters, WITHOUT_FLOW},
     tangent::{Tangent, add_product, write_isotropic},
     thickness::ThroughThickness,
 };
@@ -36,13 +36,13 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 #[schemars(rename = "DruckerPrager")]
 pub struct DruckerPrager<N = f64> {
     /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
-    #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
+    #[schemars(extend("at_infinity" = WITHOUT_FLOW, "unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
     pub relaxation: f64,
     /// Increase of the yield stress in shear, sqrt(J2), per pressure.
     #[schemars(range(min = 0), example = 0.6)]
     pub friction_coefficient: f64,
     /// Yield stress in pure shear at zero pressure. An expression in x, y, z is evaluated at the centre of each cell.
-    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "minimum" = 0), example = 1e4)]
+    #[schemars(extend("at_infinity" = WITHOUT_FLOW, "variables" = "x, y, z", "unit" = "Pa", "minimum" = 0), example = 1e4)]
     pub cohesion: N,
 }
 

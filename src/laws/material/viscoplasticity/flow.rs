@@ -12,6 +12,10 @@ use crate::{
     },
 };
 
+/// How to say that a material does not flow, in place of an infinite strength.
+pub const WITHOUT_FLOW: &str = "leave out the table `viscoplasticity`: this material then does not flow; where one region flows and another one \
+    does not, give each its own material in [[region]], this table in one of them";
+
 /// The parameters of a law.
 pub trait Parameters {
     /// The type that evaluates the law.

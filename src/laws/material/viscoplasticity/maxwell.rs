@@ -9,7 +9,7 @@
 //! Under `lagged_euler` a held deviatoric stress falls by the factor `1 - k / t_d` in a step of length `k`.
 
 use super::{
-    flow::{Flow, InPlaces, Parameters},
+    flow::{Flow, InPlaces, Parameters, WITHOUT_FLOW},
     tangent::{Tangent, write_isotropic},
 };
 use crate::{
@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Maxwell {
     /// Time in which the deviatoric stress decays to 1/e at constant strain.
-    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.5)]
+    #[schemars(extend("at_infinity" = WITHOUT_FLOW, "unit" = "s", "exclusiveMinimum" = 0), example = 0.5)]
     pub relaxation_time: f64,
     /// Time in which the mean stress decays to 1/e at constant strain. Absent: the mean stress does not relax.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -22,7 +22,7 @@
 //! ```
 
 use super::{
-    flow::{Flow, InPlaces, Parameters},
+    flow::{Flow, InPlaces, Parameters, WITHOUT_FLOW},
     release::{Release, WEIGHT, rate_along_deviator},
     tangent::{Tangent, add_product, write_isotropic},
 };
@@ -45,7 +45,7 @@ pub struct Norton {
     pub rate: f64,
     /// Von Mises norm of the stress at which the creep rate is `rate`. With scheme lagged_euler, explicit_step_bound holds only
     /// while the von Mises norm is at most reference_stress.
-    #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 1e8)]
+    #[schemars(extend("at_infinity" = WITHOUT_FLOW, "unit" = "Pa", "exclusiveMinimum" = 0), example = 1e8)]
     pub reference_stress: f64,
     /// Exponent of the stress.
     #[schemars(range(min = 1), example = 5.0)]

@@ -1,5 +1,6 @@
 //! The parameters of Perzyna's law, the projection on its yield set and its strain rate.
 
+use super::super::flow::WITHOUT_FLOW;
 use super::plane_projection::Surface;
 use crate::{
     laws::material::{Elastic, Isotropic},
@@ -29,11 +30,11 @@ pub(super) struct Overstressed {
 #[schemars(rename = "Perzyna")]
 pub struct Perzyna<N = f64> {
     /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
-    #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
+    #[schemars(extend("at_infinity" = WITHOUT_FLOW, "unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
     pub relaxation: f64,
     /// Yield stress: von Mises norm of the stress above which the material flows. An expression in x, y, z is evaluated at the
     /// centre of each cell.
-    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "minimum" = 0), example = 19.0)]
+    #[schemars(extend("at_infinity" = WITHOUT_FLOW, "variables" = "x, y, z", "unit" = "Pa", "minimum" = 0), example = 19.0)]
     pub yield_stress: N,
     /// Exponent of the overstress, relative to the yield stress with its hardening. 1: the law of Wang and Cheng (2022). Above 1 the yield
     /// stress must be positive, and with scheme
