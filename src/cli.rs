@@ -656,6 +656,8 @@ mod tests {
             ("abaqus", "mesh.file: "),
             ("gmsh", "mesh.file: "),
             ("restart", "checkpoint: "),
+            ("cylinder", "contact.obstacle.shape: "),
+            ("remesh", "output.error_indicator: "),
             ("Slurm", "checkpoint"),
         ] {
             let found = described(Some(word)).unwrap_or_else(|error| panic!("{word}: {error}"));

@@ -1,7 +1,8 @@
 //! Errors of the steps apart from those of the mesh, and what reaching an error takes.
 
-use super::scene::{Scene, number};
+use super::scene::{SQUARE, Scene, number};
 use crate::{browser::assert_fits, launch::run_alone};
+use clarke::postprocessing::study::Plan;
 use std::path::Path;
 
 fn paper() -> Scene {
@@ -71,5 +72,16 @@ fn errors_are_split_told_over_time_and_compared_by_what_they_take() {
         for ending in ["svg", "png"] {
             assert!(scene.path("out/study").join(format!("{name}.{ending}")).exists(), "{name}.{ending}");
         }
+    }
+}
+
+#[test]
+fn runs_with_a_step_have_steps_of_this_length_also_where_those_of_the_base_job_are_adaptive() {
+    let adaptive = "step = 0.01\nadaptive = { tolerance = 0.1, smallest_step = 1e-4, largest_step = 0.02 }";
+    let study = "[product]\nsteps = [0.5, 0.25]\nadaptive = [0.01]\n[reference.run]\nstep = 0.125\n";
+    let scene = Scene::new(&SQUARE.replace("step = 0.5", adaptive), study);
+    let text = Plan::load(&scene.path("study.toml"), &[], false).expect("a plan").text();
+    for steps in ["step 0.5 s", "step 0.25 s", "adaptive 0.01", "step 0.125 s"] {
+        assert!(text.contains(steps), "{steps}: {text}");
     }
 }

@@ -27,6 +27,7 @@ pub struct Output {
     /// Whether the field error_indicator is written with the other fields: for each cell an estimate of the discretisation error of
     /// its stress in the elastic energy norm, in J^(1/2), in two dimensions (J/m)^(1/2) (Zienkiewicz and Zhu, 1987). summary.json
     /// then contains the norm over the body and its ratio to the norm of the stress. Every material must have elasticity.
+    #[schemars(extend("also" = "remesh, refinement, adaptive mesh"))]
     pub error_indicator: bool,
     /// Whether the errors of the state at the end are estimated, relative to the state in the norm of energy: that of the stress by
     /// the mesh, with the error indicator, and that of stress and velocity by the time steps. For the latter the run is repeated

@@ -352,10 +352,15 @@ impl<'a> Boundary<'a> {
         let acts: Vec<usize> = (0..self.points.len()).filter(|n| self.is_in_contact[*n]).collect();
         let nodes: Vec<[f64; 2]> = acts.iter().map(|n| [law.abscissa(gap[*n], v[*n]), p[*n]]).collect();
         let mut on = vec![None; self.points.len()];
-        for (n, branch) in acts.iter().zip(law.branches_of(&nodes)) {
+        for (n, branch) in acts.iter().zip(law.branches_of(&nodes, self.farthest())) {
             on[*n] = Some(branch);
         }
         (!nodes.is_empty()).then_some(OnBranches { nodes, of_all: on })
+    }
+
+    /// The largest coordinate of its nodes in m.
+    fn farthest(&self) -> f64 {
+        self.points.as_flattened().iter().fold(0.0, |most, x| x.abs().max(most))
     }
 
     /// The nodes in the plane of the law's graph: abscissa and pressure.
@@ -373,7 +378,7 @@ impl<'a> Boundary<'a> {
         let mut series = vec![line];
         let mut counts = Vec::new();
         let on: Vec<usize> = on.into_iter().flatten().collect();
-        let others_on = law.branches_of(others);
+        let others_on = law.branches_of(others, self.farthest());
         for (at, branch) in law.branches().iter().enumerate() {
             let mine = nodes.iter().zip(&on).filter(|(_, other)| **other == at);
             let mine: Vec<[f64; 2]> = mine.map(|(node, _)| *node).collect();

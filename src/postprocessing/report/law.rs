@@ -124,16 +124,19 @@ impl Law {
         [0.5, 0.75].map(|share| self.law.slope(at(share), NodeContext::AT_THE_GAP))
     }
 
-    /// The branch of each of these nodes, given by abscissa and pressure.
-    pub(super) fn branches_of(&self, nodes: &[[f64; 2]]) -> Vec<usize> {
+    /// The branch of each of these nodes, given by abscissa and pressure, where places have coordinates in m up to this one: gaps below its
+    /// rounding are none.
+    pub(super) fn branches_of(&self, nodes: &[[f64; 2]], farthest: f64) -> Vec<usize> {
         let all = || self.law.corners().iter().chain(nodes);
         let reach = |axis: usize| all().map(|p| p[axis].abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
-        let steep = reach(1) / reach(0);
+        let rounding = if self.is_of_displacement { 1e-12 * farthest } else { 0.0 };
+        let along = reach(0).max(rounding);
+        let steep = reach(1) / along;
         let steep = if steep.is_finite() && steep > 0.0 { steep } else { 1.0 };
         let c = steep.max(2.0 * self.law.monotonicity_constant(1.0));
         // A node that has not touched the wall may be beyond it by rounding.
         let is_wall = self.is_of_displacement && self.law.has_vertical_parts();
-        let slack = if is_wall { 1e-9 * c * reach(0) } else { 0.0 };
+        let slack = if is_wall { 1e-9 * c * along } else { 0.0 };
         let branch = |s: f64| self.law.resolve(s, c, NodeContext::AT_THE_GAP).branch;
         nodes.iter().map(|[x, p]| branch(c * x + p - slack)).collect()
     }
@@ -209,7 +212,7 @@ mod tests {
     #[test]
     fn nodes_of_the_papers_law_sit_on_its_states() {
         let nodes = [[-0.004, 0.02], [-0.001, 0.01], [0.001, 0.01], [0.004, 0.02], [0.007, 0.03]];
-        assert_eq!(paper().branches_of(&nodes), [1, 2, 3, 4, 5]);
+        assert_eq!(paper().branches_of(&nodes, 1.0), [1, 2, 3, 4, 5]);
         let branches = paper().branches();
         let words: Vec<String> =
             branches.iter().map(|b| format!("{} {} {}", b.name, b.range, b.slope)).collect();
@@ -232,7 +235,8 @@ mod tests {
         let law = law(NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap }));
         let at = |u: f64| law.abscissa(0.01 - u, 0.0);
         let nodes = [[at(0.01), 5.0], [at(0.004), 0.0], [law.abscissa(f64::INFINITY, 0.0), 0.0]];
-        assert_eq!(law.branches_of(&nodes), [1, 0, 0], "the last has nothing to touch");
+        assert_eq!(law.branches_of(&nodes, 1.0), [1, 0, 0], "the last has nothing to touch");
+        assert_eq!(law.branches_of(&[[-3e-21, 1e6], [3e-21, 2e6]], 1.0), [1, 1], "gaps are rounding errors");
         let line = law.line(&[[at(0.01), 5.0], [at(0.004), 0.0]]);
         assert_eq!((line[2][0], line[2][1] > 5.0), (0.0, true));
     }
@@ -243,7 +247,7 @@ mod tests {
             Compliance { stiffness: 100.0, exponent: 2.0, damping: 5.0, gap: Some(Scalar::Number(0.1)) };
         let law = law(NormalLaw::Compliance(spring));
         let at = |u: f64| law.abscissa(0.1 - u, 0.0);
-        assert_eq!(law.branches_of(&[[at(0.3), 4.0], [at(0.05), 0.0]]), [1, 0]);
+        assert_eq!(law.branches_of(&[[at(0.3), 4.0], [at(0.05), 0.0]], 1.0), [1, 0]);
         assert_eq!(law.quantity().0, "penetration");
         assert_eq!(law.branches()[1].slope, "100 Pa × (penetration / m)^2 beside a dashpot of 5 Pa s/m");
         let [x, p] = law.line(&[[0.2, 4.0]])[SAMPLES];

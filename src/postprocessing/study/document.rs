@@ -98,7 +98,7 @@ pub struct Run {
     /// Cells along each axis of a generated mesh of one block; in a list, `set` gives those of each block.
     #[schemars(length(min = 2, max = 3), inner(range(min = 1)), example = [8, 8])]
     pub cells: Option<Vec<u32>>,
-    /// Length of a step.
+    /// Length of a step. Without `adaptive` all steps have it, also where the base job has [time.adaptive].
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
     pub step: Option<f64>,
     /// Tolerance of adaptive steps. The shortest and longest steps are those of [time.adaptive] of the base job or, if absent,

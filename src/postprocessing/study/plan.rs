@@ -190,8 +190,14 @@ impl Plan {
             _ => None,
         };
         for run in self.runs.iter().chain(reference).chain(&self.split) {
-            let cells = if run.cells.is_empty() { String::new() } else { format!("{} cells, ", cells_name(&run.cells)) };
-            let step = run.adaptive.map_or(format!("step {} s", run.step), |tolerance| format!("adaptive {tolerance}"));
+            let cells = if run.cells.is_empty() {
+                String::new()
+            } else {
+                format!("{} cells, ", cells_name(&run.cells))
+            };
+            let step = run
+                .adaptive
+                .map_or(format!("step {} s", run.step), |tolerance| format!("adaptive {tolerance}"));
             let set: String = run.set.iter().map(|set| format!(", {set}")).collect();
             text += &format!("accepted  {:<30} {cells}{step}, {}{set}\n", run.name, run.scheme.name());
         }
@@ -308,12 +314,19 @@ impl Source<'_> {
             overrides.push(format!("mesh.{kind}.cells={cells:?}"));
         }
         overrides.extend(run.step.map(|step| format!("time.step={step:?}")));
-        overrides.extend(run.adaptive.map(|tolerance| self.adaptive(run, tolerance)));
+        let has_fixed_steps = run.step.is_some() && run.adaptive.is_none();
+        // Steps of the given length must be possible until they are all that there are.
+        let tolerance =
+            self.base.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance).filter(|_| has_fixed_steps);
+        overrides.extend(run.adaptive.or(tolerance).map(|tolerance| self.adaptive(run, tolerance)));
         overrides.extend(run.scheme.map(|scheme| format!("time.scheme={}", scheme.name())));
         overrides.extend(run.tolerance.map(|tolerance| format!("solver.tolerance={tolerance:?}")));
         overrides.extend(run.set.iter().cloned());
         let mut loaded = Job::load(&self.file, &overrides)?;
         let job = &mut loaded.job;
+        if has_fixed_steps {
+            job.time.adaptive = None;
+        }
         let cells = job.mesh.source.cells();
         let mut name = match (fixed_name, &run.name) {
             (Some(fixed), _) => fixed.to_owned(),
@@ -352,7 +365,7 @@ impl Source<'_> {
     fn adaptive(&self, run: &Run, tolerance: f64) -> String {
         let step = run.step.unwrap_or(self.base.time.step);
         let [smallest, largest] = match &self.base.time.adaptive {
-            Some(given) => [given.smallest_step, given.largest_step],
+            Some(given) => [given.smallest_step.min(step), given.largest_step.max(step)],
             None => [step / 4096.0, (64.0 * step).min(self.base.time.end)],
         };
         format!(

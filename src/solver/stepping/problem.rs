@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Form, Friction, Step},
+        effect::{Form, Friction, LoadedMotion, Step},
         state::State,
     },
     laws::digits::Digits,
@@ -86,7 +86,10 @@ impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
             return self.failed(why, &rise_remedy(rise));
         }
         if !softens {
-            return self.failed(why, REMEDY);
+            let motions = body.contacts.iter().flat_map(|contact| contact.obstacle.motions.iter().flatten());
+            let has_massless = motions.map(LoadedMotion::inertia).any(|inertia| inertia == 0.0);
+            return self
+                .failed(why, &format!("{REMEDY}{}", if has_massless { MASS_OF_OBSTACLE } else { "" }));
         }
         let falls = body.contacts.iter().any(|contact| contact.monotonicity_constant() > 0.0);
         let weakens = body.contacts.iter().flat_map(|contact| &contact.friction).any(Friction::decreases);
@@ -117,6 +120,10 @@ impl System<'_> {
 /// A remedy if a solver does not converge.
 pub(super) const REMEDY: &str =
     "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
+
+/// The same of obstacles without mass that forces or moments move.
+const MASS_OF_OBSTACLE: &str =
+    "; or give the obstacle that a force or a moment moves a mass or a moment_of_inertia, which may be small";
 
 /// The same where laws soften, given whether the body has a density and a viscosity and whether bonds soften: shorter steps help only if
 /// something resists fast motions.

@@ -169,9 +169,8 @@ impl Substructures {
         let position = |node: u32| nodes.binary_search(&node).unwrap_or(nodes.len());
         let first = |node: u32| position(node) * dimension;
         let of_frames = frames.unknowns.iter();
-        let contact: Vec<usize> = of_frames
-            .map(|unknown| first((unknown / dimension) as u32) + unknown % dimension)
-            .collect();
+        let contact: Vec<usize> =
+            of_frames.map(|unknown| first((unknown / dimension) as u32) + unknown % dimension).collect();
         contact.iter().for_each(|&at| numbers[at] = 0);
         let mut interface = 0;
         for at in shared.iter().flat_map(|&node| first(node)..first(node) + dimension) {

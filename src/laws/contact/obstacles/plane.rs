@@ -22,6 +22,7 @@ pub(super) const PARALLEL: f64 = 1e-6;
 /// A plane that bounds an obstacle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "wall, floor, table, belt, conveyor"))]
 pub struct Plane {
     /// A point of the plane, one component per axis: numbers, or expressions in t. Motion of this point along the plane is a
     /// tangential motion of the obstacle's surface, such as that of a belt.

@@ -22,6 +22,7 @@ use std::{path::PathBuf, sync::Arc};
 /// An obstacle of any shape, given by its signed distance: by either `distance` or `surface`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "cylinder, cone, wedge, torus, punch, stamp, die, tool"))]
 pub struct Shape {
     /// The distance from the surface, positive outside of the obstacle and negative inside, as an expression in x, y, z relative to
     /// `centre`. A lower bound of the distance suffices: the expression must have the Lipschitz constant 1, as distances, their

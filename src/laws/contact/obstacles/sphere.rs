@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 /// A sphere as an obstacle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("also" = "ball, Hertz, indentation, indenter"))]
+#[schemars(extend("also" = "ball, cylinder, disc, roller, wheel, Hertz, indentation, indenter"))]
 pub struct Sphere {
     /// The centre, one component per axis: numbers, or expressions in t.
     #[schemars(extend("variables" = "t", "unit" = "m"), example = serde_json::json!([0.5, "-1.01 + 0.1*t"]))]
