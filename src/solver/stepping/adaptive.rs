@@ -295,13 +295,15 @@ impl<const D: usize> Adaptive<D> {
 
     /// The error relative to the norms so far; NaN if the error or a norm is NaN.
     fn relative(&self, found: StepError) -> f64 {
-        let StepError { error, size, negligible, contact, surface, temperature } = found;
+        let StepError { error, size, negligible, rounding, contact, surface, temperature } = found;
         let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.step_level.velocity.max(size.velocity);
         let largest_stress = self.step_level.stress.max(size.stress);
-        let velocity = ratio(error.velocity, largest_velocity.max(negligible.velocity * largest_stress));
+        let least_velocity = rounding.velocity.max(negligible.velocity * largest_stress);
+        let velocity = ratio(error.velocity, largest_velocity.max(least_velocity));
         let present_stress = size.stress.max(LEAST_SHARE * largest_stress);
-        let stress = ratio(error.stress, present_stress.max(negligible.stress * largest_velocity));
+        let least_stress = rounding.stress.max(negligible.stress * largest_velocity);
+        let stress = ratio(error.stress, present_stress.max(least_stress));
         let mut square = velocity * velocity + stress * stress;
         let own = self.step_level.contact.iter().chain([&self.step_level.surface]);
         for (largest, found) in own.zip(contact.into_iter().chain([surface])) {

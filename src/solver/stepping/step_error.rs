@@ -9,11 +9,14 @@ use crate::{
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
+    mesh::Mesh,
     parallel::session::Session,
 };
 
 /// Share of the root of the kinetic energy below which the root of the elastic energy is a rounding error, and vice versa.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Changes of displacements and velocities by this share from node to node are rounding errors.
+const ROUNDING: f64 = 1e4 * f64::EPSILON;
 
 /// Norms of velocity and stress.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -44,6 +47,8 @@ pub struct StepError {
     pub size: Norms,
     /// A velocity below this multiple of the stress is a rounding error, and a stress below this multiple of the velocity.
     pub negligible: Norms,
+    /// Without inertia, velocities and stresses below these are rounding errors of a body that moves as a whole.
+    pub rounding: Norms,
     /// Norms of the quantities of contacts, squares in the calculation of the step.
     pub contact: [Deviation; CONTACT_QUANTITIES],
     /// Norms of the forces of bonds and contact memory.
@@ -114,7 +119,26 @@ impl ErrorWorkspace {
         let stresses = [strains + histories.error, histories.size];
         let [velocity, all_velocity] = [square(form, curved), square(form, &trial)];
         let [error, size] = [surface.error, surface.size];
-        let mut squares = session.sum([velocity, stresses[0], all_velocity, stresses[1], error, size]);
+        // Norms of the motion if its sign differs from node to node.
+        let mut scattered = |form: Option<Form>, motion: &[f64]| {
+            if body.has_form(Form::Mass) {
+                return 0.0;
+            }
+            write(strained, motion.iter().zip(signs(&body.mesh)).map(|(x, sign)| sign * x));
+            square(form, strained)
+        };
+        let rounding = [scattered(form, &trial), scattered(elastic, end)];
+        let [of_velocity, of_stress] = rounding;
+        let mut squares = session.sum([
+            velocity,
+            stresses[0],
+            all_velocity,
+            stresses[1],
+            error,
+            size,
+            of_velocity,
+            of_stress,
+        ]);
         // Obstacles that forces move, alike on all ranks.
         for motion in body.obstacle_motions() {
             let unit = if form == Some(Form::Mass) { 1.0 } else { step.length };
@@ -122,7 +146,7 @@ impl ErrorWorkspace {
             squares[0] += error / unit;
             squares[2] += size / unit;
         }
-        let [velocity, stress, all_velocity, all_stress, error, size] =
+        let [velocity, stress, all_velocity, all_stress, error, size, of_velocity, of_stress] =
             squares.map(|square| if square > 0.0 { square.sqrt() } else { square });
         // With mass both norms are roots of energies: a free body has a stress of rounding errors, a fixed one a velocity of
         // rounding errors. Without mass the square of a velocity norm is a power.
@@ -131,6 +155,7 @@ impl ErrorWorkspace {
             error: Norms { velocity, stress },
             size: Norms { velocity: all_velocity, stress: all_stress },
             negligible: Norms { velocity: NEGLIGIBLE / unit, stress: NEGLIGIBLE * unit },
+            rounding: Norms { velocity: ROUNDING * of_velocity, stress: ROUNDING * of_stress },
             contact,
             surface: Deviation { error, size, negligible: NEGLIGIBLE * NEGLIGIBLE * all_stress },
             temperature: None,
@@ -165,6 +190,15 @@ fn contact_deviations<const D: usize, const S: usize>(
         *out = Deviation { error, size, negligible };
     }
     all
+}
+
+/// A sign for each component of the motion of each node, which differ from node to node as those of rounding errors do; the same on any
+/// number of ranks.
+fn signs<const D: usize>(mesh: &Mesh<D>) -> impl Iterator<Item = f64> {
+    mesh.node_ids.iter().flat_map(|id| {
+        let bits = u64::from(id + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        (0..D).map(move |i| if bits >> (40 + i) & 1 == 0 { 1.0 } else { -1.0 })
+    })
 }
 
 /// Replaces the previous values by these.
