@@ -141,7 +141,12 @@ pub(crate) fn named(kind: Kind) -> Vec<Named> {
         let mut add = |name: &str, path: &str, meaning: String, also: &'static str| {
             found.push(Named { name: name.to_owned(), shown: format!("{prefix}{path}"), meaning, also });
         };
-        add(table.path.rsplit('.').next().unwrap_or_default(), &table.path, table.meaning.clone(), table.also);
+        add(
+            table.path.rsplit('.').next().unwrap_or_default(),
+            &table.path,
+            table.meaning.clone(),
+            table.also,
+        );
         for key in &table.keys {
             let choices: String =
                 key.choices().iter().map(|(word, text)| format!(" \"{word}\": {text}")).collect();

@@ -251,7 +251,9 @@ fn refuse_long(kind: Kind, bytes: usize, name: &str) -> Result<()> {
 /// What the document with this name is, if it is a study or a job and not of this kind.
 fn other_document(kind: Kind, root: &Node, name: &str) -> Option<String> {
     match (kind.name, is_study(root)) {
-        ("job", true) => Some(format!("a study, not a job: run it with solver study {name}, check it with solver check {name}")),
+        ("job", true) => Some(format!(
+            "a study, not a job: run it with solver study {name}, check it with solver check {name}"
+        )),
         ("study", false) if root.find("time").is_some() && root.find("mesh").is_some() => Some(format!(
             "a job, not a study: run it with solver run {name}, check it with solver check {name}, or name it in [base] job of a study"
         )),

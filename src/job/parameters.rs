@@ -287,7 +287,10 @@ mod tests {
         assert_eq!(number.evaluate(100.0, &[100.0]), 0.56);
         let place = parameters.resolve_in("2*d*y + t", Variable::OF_TIME_AND_PLACE, "y").expect("of place");
         assert_eq!(place.expression.evaluate(100.0, &[1.0, 2.0]), 7.04);
-        for (text, variables, allowed) in [("1 + d", &[Variable::V, Variable::D][..], "v, d"), ("t*y", Variable::OF_TIME_AND_PLACE, "t, x, y, z")] {
+        for (text, variables, allowed) in [
+            ("1 + d", &[Variable::V, Variable::D][..], "v, d"),
+            ("t*y", Variable::OF_TIME_AND_PLACE, "t, x, y, z"),
+        ] {
             let fault = parameters.resolve_in(text, variables, allowed).expect_err("two meanings");
             assert!(fault.message.contains("is a parameter, but here also the "), "{fault:?}");
             assert!(parameters.resolve_in("1 + step", variables, allowed).is_ok(), "no variable");

@@ -213,8 +213,10 @@ impl<const D: usize> GlobalMesh<D> {
     /// That facets of this name are inside the body, between which cells, and what to do if they were not meant.
     fn note_of(&self, fault: &Fault<'_, D>) -> String {
         let corners = fault.facets[0].map(|node| self.nodes[node as usize]);
-        let regions: BTreeSet<&str> =
-            fault.cells[0].iter().map(|(cell, _)| &*self.regions[usize::from(self.cell_regions[*cell])]).collect();
+        let regions: BTreeSet<&str> = fault.cells[0]
+            .iter()
+            .map(|(cell, _)| &*self.regions[usize::from(self.cell_regions[*cell])])
+            .collect();
         let parted: Vec<String> = regions.into_iter().map(|region| format!("\"{region}\"")).collect();
         let parted = match &*parted {
             [one] => format!("two cells of region {one}"),

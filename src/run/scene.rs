@@ -170,10 +170,13 @@ fn from_file(session: &Session, path: &Path, loaded: &Loaded) -> Result<(Scene, 
         let mut file = file::read(path, &placement(&job.mesh))?;
         let named = |error| Error::Refused(format!("{}: {error}", path.display()));
         let faults = job.contact.iter().filter(|contact| contact.against.is_empty());
-        for (contact, fault) in faults.flat_map(|contact| contact.on.iter().map(move |name| (contact, name))) {
+        for (contact, fault) in faults.flat_map(|contact| contact.on.iter().map(move |name| (contact, name)))
+        {
             let Some(note) = file.mesh.split_along(fault).map_err(named)? else { continue };
             if contact.obstacle.is_some() {
-                return Err(named(Error::Refused(format!("{note}. A contact with an obstacle is on the surface"))));
+                return Err(named(Error::Refused(format!(
+                    "{note}. A contact with an obstacle is on the surface"
+                ))));
             }
             file.notes.push(format!("{}: {note}", path.display()));
         }

@@ -162,7 +162,8 @@ fn held_by_faces(session: &Session) {
     let found = run.state.displacement.owned().expect("values");
     for (found, place) in found.chunks_exact(3).zip(&run.body.mesh.nodes) {
         let expected = [0.01 * place[0], -0.003 * place[1], -0.003 * place[2]];
-        let error = found.iter().zip(expected).map(|(found, expected)| (found - expected).abs()).fold(0.0, larger);
+        let error =
+            found.iter().zip(expected).map(|(found, expected)| (found - expected).abs()).fold(0.0, larger);
         assert!(error < 1e-10, "{found:?} is not {expected:?} at {place:?}");
     }
 }

@@ -163,7 +163,11 @@ fn constraints<'a, const D: usize>(
             let is_in = |node: u32| part.evaluate(0.0, &mesh.nodes[node as usize]) != 0.0;
             on.retain(|&facet| mesh.facet_nodes(facet).all(is_in));
             let of_part = held_at(&on)?.into_iter();
-            nodes.extend(of_part.filter(|(node, _)| nodes.get(node).is_some_and(|all| all.len() > 1)).collect::<Vec<_>>());
+            nodes.extend(
+                of_part
+                    .filter(|(node, _)| nodes.get(node).is_some_and(|all| all.len() > 1))
+                    .collect::<Vec<_>>(),
+            );
         }
         nodes.extend(mesh.nodes_of_point_sets(&names).into_iter().map(|node| (node, directions(&[]))));
         if let Some(part) = &support.part {

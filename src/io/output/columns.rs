@@ -153,7 +153,11 @@ const OF_HEAT: [Column; ENERGIES.len() - FIRST_OF_HEAT + 2] = {
     let meaning = "imbalance of the heat of the step beyond rounding errors of what conduction and convection pass on, as a share of the \
                    largest of these heats so far";
     let imbalance = Column::plain("heat_imbalance", "", meaning);
-    let mean = Column::plain("mean_temperature", "K", "mean temperature of all bodies, weighted by their heat capacity");
+    let mean = Column::plain(
+        "mean_temperature",
+        "K",
+        "mean temperature of all bodies, weighted by their heat capacity",
+    );
     let mut columns = [imbalance; ENERGIES.len() - FIRST_OF_HEAT + 2];
     columns[ENERGIES.len() - FIRST_OF_HEAT + 1] = mean;
     let mut at = FIRST_OF_HEAT;

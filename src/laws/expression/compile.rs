@@ -411,8 +411,11 @@ impl Parser<'_> {
         });
         let near = meant.map(|variable| variable.name()).or_else(|| nearest(name, all));
         let near = near.map_or(String::new(), |near| format!("did you mean `{near}`? "));
-        let variables: Vec<String> =
-            self.variables.iter().map(|variable| format!("{} ({})", variable.name(), variable.meaning())).collect();
+        let variables: Vec<String> = self
+            .variables
+            .iter()
+            .map(|variable| format!("{} ({})", variable.name(), variable.meaning()))
+            .collect();
         let (variables, others) = (variables.join(", "), known[self.variables.len()..].join(", "));
         let help = format!("{near}known variables: {variables}; constants and functions: {others}");
         let message = format!("unknown name `{name}` in an expression");

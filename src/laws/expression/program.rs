@@ -110,7 +110,8 @@ pub(super) trait Machine {
 
 impl Program {
     pub(super) fn new(instructions: Vec<Instruction>, tables: Vec<Table>) -> Self {
-        let (depth, has_pieces) = (stack_depth(&instructions), instructions.iter().any(Instruction::has_pieces));
+        let (depth, has_pieces) =
+            (stack_depth(&instructions), instructions.iter().any(Instruction::has_pieces));
         Self { instructions: instructions.into(), tables: tables.into(), depth, has_pieces }
     }
 

@@ -96,7 +96,11 @@ fn check_sweep(study: &Study, base: &Job, document: &mut Document) {
         match first {
             Some((other, count)) if count != draws.draws => {
                 let message = format!("`{key}` has {} draws, but `{other}` has {count}", draws.draws);
-                document.fault_at_name(("sweep", key), message, "give all random keys the same number of draws");
+                document.fault_at_name(
+                    ("sweep", key),
+                    message,
+                    "give all random keys the same number of draws",
+                );
             }
             _ => first = Some((key.as_str(), draws.draws)),
         }

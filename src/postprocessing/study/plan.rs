@@ -190,8 +190,14 @@ impl Plan {
             _ => None,
         };
         for run in self.runs.iter().chain(reference).chain(&self.split) {
-            let cells = if run.cells.is_empty() { String::new() } else { format!("{} cells, ", cells_name(&run.cells)) };
-            let step = run.adaptive.map_or(format!("step {} s", run.step), |tolerance| format!("adaptive {tolerance}"));
+            let cells = if run.cells.is_empty() {
+                String::new()
+            } else {
+                format!("{} cells, ", cells_name(&run.cells))
+            };
+            let step = run
+                .adaptive
+                .map_or(format!("step {} s", run.step), |tolerance| format!("adaptive {tolerance}"));
             let set: String = run.set.iter().map(|set| format!(", {set}")).collect();
             text += &format!("accepted  {:<30} {cells}{step}, {}{set}\n", run.name, run.scheme.name());
         }
