@@ -84,6 +84,8 @@ pub struct Heat<const D: usize> {
     middles: Vec<[u32; 3]>,
     /// Work space for the exchange between ranks.
     exchange: DistributedVector,
+    /// Work space for the convection in W/K at the local nodes; empty without convection.
+    film: Vec<f64>,
 }
 
 /// Numbers at the owned nodes, and with ghosts at the local ones, that are kept from one step to the next.
@@ -195,6 +197,7 @@ impl<const D: usize> Heat<D> {
             held: Vec::new(),
             middles,
             exchange,
+            film: Vec::new(),
         })
     }
 
@@ -368,24 +371,25 @@ impl<const D: usize> Heat<D> {
         time: f64,
         out: &mut Conditions,
     ) -> Result<()> {
-        let boundaries = std::mem::take(&mut self.boundaries);
-        let [mut power, mut film] = [Ok(()), Ok(())];
-        let is_crossed = boundaries.iter().any(|boundary| boundary.given.temperature.is_none());
-        let is_filmed = boundaries.iter().any(|boundary| boundary.given.convection.is_some());
-        for (values, is_there, is_film) in
-            [(&mut out.power, is_crossed, false), (&mut out.film, is_filmed, true)]
-        {
+        let (boundaries, mut film) = (std::mem::take(&mut self.boundaries), std::mem::take(&mut self.film));
+        for values in [&mut out.power, &mut out.film] {
             values.clear();
-            if !is_there {
-                values.resize(self.owned, 0.0);
-                continue;
-            }
-            let fault = if is_film { &mut film } else { &mut power };
-            self.gather(|sums| *fault = add_passing(&boundaries, mesh, time, is_film, sums))?;
-            values.extend_from_slice(&self.exchange.owned()?);
+            values.resize(self.owned, 0.0);
         }
-        self.boundaries = boundaries;
-        session.agree(power.and(film).and_then(|()| self.write_held(mesh, time, out)))?;
+        let mut passed = Ok(());
+        if boundaries.iter().any(|boundary| boundary.given.temperature.is_none()) {
+            let is_filmed = boundaries.iter().any(|boundary| boundary.given.convection.is_some());
+            film.clear();
+            film.resize(if is_filmed { mesh.nodes.len() } else { 0 }, 0.0);
+            self.gather(|sums| passed = add_passing(&boundaries, mesh, time, [sums, &mut film]))?;
+            out.power.copy_from_slice(&self.exchange.owned()?);
+            if is_filmed {
+                self.gather(|sums| sums.copy_from_slice(&film))?;
+                out.film.copy_from_slice(&self.exchange.owned()?);
+            }
+        }
+        (self.boundaries, self.film) = (boundaries, film);
+        session.agree(passed.and_then(|()| self.write_held(mesh, time, out)))?;
         Ok(())
     }
 
@@ -673,13 +677,12 @@ fn add_to_corners<const D: usize>(mesh: &Mesh<D>, cell: usize, whole: f64, sums:
     mesh.cell(cell).iter().zip(shares).for_each(|(node, share)| sums[*node as usize] += share * whole);
 }
 
-/// Adds to the nodes of this rank the power in W that enters, of convection that of a body of 0 K, or the convection in W/K.
+/// Adds to the nodes of this rank the power in W that enters, of convection that of a body of 0 K, and the convection in W/K.
 fn add_passing<const D: usize>(
     boundaries: &[Boundary],
     mesh: &Mesh<D>,
     time: f64,
-    is_film: bool,
-    sums: &mut [f64],
+    [power, film]: [&mut [f64]; 2],
 ) -> Result<()> {
     for (number, Boundary { given, facets }) in boundaries.iter().enumerate() {
         let value = |value: &Scalar, what: &str, place: &Vector<D>| {
@@ -693,19 +696,19 @@ fn add_passing<const D: usize>(
             };
             is_sound.then_some(number_there).ok_or_else(fault)
         };
-        let passing = |place: &Vector<D>| match given {
-            HeatBoundary { flux: Some(flux), .. } if !is_film => value(flux, FLUX, place),
-            HeatBoundary { convection: Some(Convection { coefficient, ambient }), .. } => {
-                let film = value(coefficient, COEFFICIENT, place)?;
-                Ok(if is_film { film } else { film * value(ambient, "ambient temperature", place)? })
-            }
-            _ => Ok(0.0),
-        };
         for &facet in facets.iter().filter(|_| given.temperature.is_none()) {
             for (weight, shares, place) in points_of_facet(mesh, facet) {
-                let whole = weight * passing(&place)?;
-                let nodes = mesh.facets[facet as usize].iter().zip(shares);
-                nodes.for_each(|(node, share)| sums[*node as usize] += share * whole);
+                let nodes = || mesh.facets[facet as usize].iter().zip(shares);
+                if let Some(Convection { coefficient, ambient }) = &given.convection {
+                    let coefficient = value(coefficient, COEFFICIENT, &place)?;
+                    let whole = weight * coefficient;
+                    nodes().for_each(|(node, share)| film[*node as usize] += share * whole);
+                    let whole = weight * (coefficient * value(ambient, "ambient temperature", &place)?);
+                    nodes().for_each(|(node, share)| power[*node as usize] += share * whole);
+                } else if let Some(flux) = &given.flux {
+                    let whole = weight * value(flux, FLUX, &place)?;
+                    nodes().for_each(|(node, share)| power[*node as usize] += share * whole);
+                }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Evaluation of a program at numbers: its value, the pieces that determine it, and its derivative.
 
-use super::program::{Binary, Machine, Program, Table, Ternary, Unary, Variable, interpolate, points_before};
+use super::program::{Binary, Machine, Operator, Program, Table, Ternary, Unary, Variable, interpolate, points_before};
 
 /// The number of variables.
 pub(super) const COUNT: usize = Variable::Temperature as usize + 1;
@@ -50,7 +50,7 @@ impl Machine for Values<'_> {
     }
 
     fn binary(&mut self, function: &Binary, [left, right]: [f64; 2]) -> f64 {
-        (function.value)(left, right)
+        function.value(left, right)
     }
 
     fn ternary(&mut self, function: &Ternary, arguments: [f64; 3]) -> f64 {
@@ -142,26 +142,20 @@ impl<const N: usize> Machine for Slopes<'_, N> {
     }
 
     fn binary(&mut self, function: &Binary, [left, right]: [Self::Entry; 2]) -> Self::Entry {
-        let value = (function.value)(left.0, right.0);
-        let slopes = match [left, right].map(|(_, slopes)| slopes == [0.0; N]) {
-            [true, true] => [0.0; N],
-            [false, true] => {
-                let slope = match function.by_left {
-                    Some(by_left) => by_left(left.0, right.0, value),
-                    None => (function.slopes)(left.0, right.0)[0],
-                };
-                left.1.map(|inner| chain(slope, inner))
-            }
-            [true, false] => {
-                let [_, slope] = (function.slopes)(left.0, right.0);
-                right.1.map(|inner| chain(slope, inner))
-            }
-            [false, false] => {
-                let [by_left, by_right] = (function.slopes)(left.0, right.0);
-                std::array::from_fn(|k| chain(by_left, left.1[k]) + chain(by_right, right.1[k]))
-            }
+        let value = function.value(left.0, right.0);
+        let is_fixed = right.1 == [0.0; N];
+        if is_fixed && left.1 == [0.0; N] {
+            return (value, [0.0; N]);
+        }
+        let [by_left, by_right] = match (function.operator, function.by_left) {
+            (Some(Operator::Add), _) => [1.0, 1.0],
+            (Some(Operator::Subtract), _) => [1.0, -1.0],
+            (Some(Operator::Multiply), _) => [right.0, left.0],
+            (Some(Operator::Divide), _) if is_fixed => [1.0 / right.0, 0.0],
+            (None, Some(by_left)) if is_fixed => [by_left(left.0, right.0, value), 0.0],
+            _ => (function.slopes)(left.0, right.0),
         };
-        (value, slopes)
+        (value, std::array::from_fn(|k| chain(by_left, left.1[k]) + chain(by_right, right.1[k])))
     }
 
     fn ternary(&mut self, function: &Ternary, [first, then, otherwise]: [Self::Entry; 3]) -> Self::Entry {
@@ -180,6 +174,7 @@ impl<const N: usize> Machine for Slopes<'_, N> {
 }
 
 /// The derivative of a function by a variable of which its argument may not depend: 0, also where the function has none.
+#[inline(always)]
 fn chain(outer: f64, inner: f64) -> f64 {
     if inner == 0.0 { 0.0 } else { outer * inner }
 }
