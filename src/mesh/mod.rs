@@ -20,6 +20,7 @@ mod split;
 pub mod surface;
 mod surface_names;
 mod tags;
+mod touching;
 pub mod tree;
 
 pub use distributed::{Mesh, distribute};
@@ -28,3 +29,4 @@ pub use midsides::midpoint;
 pub use skeleton::{common_motions, count_free_motions, free_motions};
 pub use split::other_side;
 pub use tags::Tags;
+pub use touching::Meeting;

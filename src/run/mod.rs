@@ -31,6 +31,7 @@ mod start;
 mod step_line;
 mod steps;
 mod time_loop;
+mod touching;
 mod trial;
 mod units;
 

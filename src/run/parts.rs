@@ -69,25 +69,6 @@ pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh
     warnings
 }
 
-/// Warnings of blocks that touch and pass through each other, because there is no contact between them.
-pub(super) fn warnings_of_touching(job: &Job) -> Vec<String> {
-    let meets = |[one, other]: &[String; 2]| {
-        job.contact.iter().any(|contact| {
-            let [on, against] = [&contact.on, &contact.against];
-            (on.contains(one) && against.contains(other)) || (on.contains(other) && against.contains(one))
-        })
-    };
-    let apart = job.mesh.touching_boundaries().into_iter().filter(|boundaries| !meets(boundaries));
-    let words = |[one, other]: [String; 2]| {
-        format!(
-            "mesh: blocks touch at the boundaries {one} and {other}, and pass through each other, because no contact is between these: add \
-             [[contact]] with on = [\"{one}\"] and against = [\"{other}\"]; a body of layers is one block whose properties depend on the \
-             place; to blocks that have no effect on each other give a distance"
-        )
-    };
-    apart.map(words).collect()
-}
-
 /// Warnings of boundaries with heat at whose nodes other tables give the temperature. Collective, with the same warnings on all ranks.
 pub(super) fn warnings_of_heat<const D: usize, const S: usize>(
     session: &Session,

@@ -7,7 +7,7 @@ use super::{
     memory::require_for_run,
     obstacles, pairs, parts,
     restored::{StartState, sides_before, start_file, transfer},
-    side_words, steps,
+    side_words, steps, touching,
     validate::refuse_free_bodies,
 };
 use crate::{
@@ -62,7 +62,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;
     warnings.extend(bonds::warnings(session, job, &body));
     warnings.extend(parts::warnings(session, job, &body.mesh));
-    warnings.extend(parts::warnings_of_touching(job));
+    warnings.extend(touching::warning(session, job, &body.mesh)?);
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);
     warnings.extend(side_words::warnings_of_changes(&earlier, &body.pairs));
     warnings.extend(side_words::warnings_of_edges(session, job, &body.mesh, &body.pairs)?);

@@ -140,13 +140,93 @@ fn free_blocks_are_named_as_two_bodies_and_unsuitable_ones_by_their_names() {
     outcome.says("belongs to another problem").says("mesh.rectangle.1.corner");
 }
 
+/// What a run on these ranks says of bodies that pass through each other.
+fn said_of_meeting(case: &Case, ranks: usize) -> Option<String> {
+    let said = unwrapped(&case.run_with(ranks, &[]).expect(0).stdout);
+    let (_, after) = said.split_once("because no contact is between them: ")?;
+    Some(after.split_once("; add ").expect("a remedy").0.into())
+}
+
 #[test]
 fn blocks_that_touch_and_have_no_contact_between_them_are_warned_of() {
-    let said = |case: Case| case.set("output.probe", "[]").run_with(1, &[]).expect(0).stdout;
-    let square = || squares("auto").set("time.end", "0.0625");
-    let touching = |[one, other]: [&str; 2]| format!("blocks touch at the boundaries {one} and {other}");
-    assert!(unwrapped(&said(square())).contains(&touching(["a.right", "b.left"])));
-    assert!(unwrapped(&said(cubes("auto"))).contains(&touching(["a.back", "b.front"])));
-    let apart = blocks([("a", [0.0, 0.0], [6, 6]), ("b", [1.1, 0.0], [4, 5])], "auto");
-    assert!(!said(square().set("mesh.rectangle", &apart)).contains("blocks touch"));
+    let square = || squares("auto").set("time.end", "0.0625").set("output.probe", "[]");
+    for ranks in [1, 3] {
+        assert_eq!(said_of_meeting(&square(), ranks).as_deref(), Some("a.right and b.left"));
+    }
+    let cubes = cubes("auto").set("output.probe", "[]");
+    assert_eq!(said_of_meeting(&cubes, 2).as_deref(), Some("a.back and b.front"));
+    let apart = blocks([("a", [0.0, 0.0], [6, 6]), ("b", [1.01, 0.0], [4, 5])], "auto");
+    assert_eq!(said_of_meeting(&square().set("mesh.rectangle", &apart), 1), None);
+}
+
+/// A Gmsh file of two squares of this many cells a side with the lowest corners (0, 0) and `corner`, their surfaces named.
+fn squares_in_a_file(cells: [usize; 2], corner: [f64; 2]) -> String {
+    let (mut nodes, mut elements) = (Vec::new(), Vec::new());
+    for (body, (n, [x, y])) in cells.into_iter().zip([[0.0, 0.0], corner]).enumerate() {
+        let first = nodes.len() + 1;
+        let at = |i: usize, j: usize| first + j * (n + 1) + i;
+        let step = 1.0 / n as f64;
+        for j in 0..=n {
+            nodes.extend((0..=n).map(|i| format!("{} {} 0", x + step * i as f64, y + step * j as f64)));
+        }
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            elements.extend([[a, b, c], [a, c, d]].map(|[p, q, r]| format!("2 2 9 9 {p} {q} {r}")));
+        }
+        for i in 0..n {
+            let ends = [
+                [at(i, 0), at(i + 1, 0)],
+                [at(n, i), at(n, i + 1)],
+                [at(i, n), at(i + 1, n)],
+                [at(0, i), at(0, i + 1)],
+            ];
+            elements.extend(
+                (1..).zip(ends).map(|(side, [p, q])| format!("1 2 {0} {0} {p} {q}", 4 * body + side)),
+            );
+        }
+    }
+    let names =
+        ["a", "b"].map(|body| ["bottom", "right", "top", "left"].map(|side| format!("{body}.{side}")));
+    let names: Vec<String> =
+        (1..).zip(names.as_flattened()).map(|(n, name)| format!("1 {n} \"{name}\"")).collect();
+    let numbered = |lines: Vec<String>| -> Vec<String> {
+        (1..).zip(lines).map(|(number, line)| format!("{number} {line}")).collect()
+    };
+    let section = |name: &str, lines: Vec<String>| {
+        format!("${name}\n{}\n{}\n$End{name}\n", lines.len(), lines.join("\n"))
+    };
+    let [nodes, elements] = [nodes, elements].map(numbered);
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{}{}{}",
+        section("PhysicalNames", names),
+        section("Nodes", nodes),
+        section("Elements", elements)
+    )
+}
+
+#[test]
+fn bodies_of_a_mesh_file_that_touch_or_overlap_without_a_contact_are_warned_of() {
+    let square = |cells: [usize; 2], corner: [f64; 2]| {
+        let case = squares("auto").without("mesh.rectangle").set("mesh.file", "'two.msh'");
+        let case = case.set("time.end", "0.0625").set("output.probe", "[]").set("output.profile", "[]");
+        std::fs::write(case.folder().join("two.msh"), squares_in_a_file(cells, corner)).expect("written");
+        case
+    };
+    // The same nodes; others, apart by the last digit of a file; an overlap; a distance; a common corner.
+    let scenes = [
+        ([3, 3], [1.0, 0.0], Some("a.right and b.left")),
+        ([3, 4], [1.000_000_5, 0.2], Some("a.right and b.left")),
+        ([3, 4], [0.8, 0.1], Some("a.right, a.top and b.bottom, b.left")),
+        ([3, 4], [1.001, 0.0], None),
+        ([3, 4], [1.0, 1.0], None),
+    ];
+    for (number, (cells, corner, said)) in scenes.into_iter().enumerate() {
+        let ranks = if number < 3 { 1 + number } else { 1 };
+        assert_eq!(said_of_meeting(&square(cells, corner), ranks).as_deref(), said, "{corner:?}");
+    }
+    let contact = "[{ on = ['b.left'], against = ['a.right'], normal.unilateral = {} }]";
+    for corner in [[1.0, 0.2], [0.99, 0.2]] {
+        let joined = square([3, 4], corner).set("contact", contact);
+        assert_eq!(said_of_meeting(&joined, 2), None, "{corner:?}");
+    }
 }

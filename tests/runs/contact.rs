@@ -909,7 +909,7 @@ fn bodies_that_touch_are_named_where_nothing_holds_them_together() {
     let held = "[{on = ['low.bottom'], fix = 'all'}, {on = ['a.left'], fix = ['x']}]";
     Case::written_as(SIDE_BY_SIDE).set("support", held).run(1);
     let told = Case::written_as(SIDE_BY_SIDE).set("material.density", "1.0").run_with(1, &[]).expect(0);
-    assert!(!told.stdout.contains("blocks touch"), "there are contacts between them");
+    assert!(!told.stdout.contains("bodies touch"), "there are contacts between them");
 }
 
 #[test]

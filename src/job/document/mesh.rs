@@ -357,23 +357,6 @@ impl Block<'_> {
         self.is_known() && other.is_known() && (0..self.size.len()).all(overlaps_along)
     }
 
-    /// The sides of both blocks, as their boundaries are called, where this one ends and the other begins along an axis.
-    fn side_before(&self, other: &Self) -> Option<[String; 2]> {
-        let end = self.end();
-        let slack = |axis: usize| TOUCHING * self.size[axis].min(other.size[axis]);
-        let common = |axis: usize| {
-            end[axis].min(other.corner[axis] + other.size[axis]) - self.corner[axis].max(other.corner[axis])
-        };
-        let axes = 0..self.size.len();
-        let meets = |axis: &usize| {
-            (end[*axis] - other.corner[*axis]).abs() <= slack(*axis)
-                && axes.clone().all(|across| across == *axis || common(across) > slack(across))
-        };
-        let axis = axes.clone().find(meets)?;
-        let boundary = |block: &Self, side: usize| boundary_of_block(block.name, block.sides()[side]);
-        Some([boundary(self, 2 * axis + 1), boundary(other, 2 * axis)])
-    }
-
     /// The number of unknowns, if 64 bits can count them.
     fn unknowns(&self, order: u8) -> Option<u64> {
         // Quadratic cells have the nodes of a grid of twice as many lines, and four more in each crossed rectangle.
@@ -390,13 +373,6 @@ impl Block<'_> {
 }
 
 impl Mesh {
-    /// Boundaries of blocks that touch each other.
-    pub fn touching_boundaries(&self) -> Vec<[String; 2]> {
-        let blocks = self.blocks();
-        let pairs = blocks.iter().flat_map(|one| blocks.iter().map(move |other| (one, other)));
-        pairs.filter_map(|(one, other)| one.side_before(other)).collect()
-    }
-
     /// The blocks of a generated mesh; none for a file.
     pub(in crate::job) fn blocks(&self) -> Vec<Block<'_>> {
         match &self.source {
