@@ -1,6 +1,8 @@
 //! Evaluation of a program at numbers: its value, the pieces that determine it, and its derivative.
 
-use super::program::{Binary, Machine, Operator, Program, Table, Ternary, Unary, Variable, interpolate, points_before};
+use super::program::{
+    Binary, Machine, Operator, Program, Table, Ternary, Unary, Variable, interpolate, points_before,
+};
 
 /// The number of variables.
 pub(super) const COUNT: usize = Variable::Temperature as usize + 1;
