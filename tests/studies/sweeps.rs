@@ -236,7 +236,10 @@ fn warnings_of_runs_are_counted_and_their_first_words_said() {
     let said = |outcome: crate::launch::Outcome| {
         let text = outcome.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains("s, 1 warning: the strain reached "), "{text}");
-        assert!(text.contains("end-0.3: 1 warning: the strain reached "), "{text}");
+        assert!(
+            text.contains("warning of end-0.3: the strain reached ") && text.contains("assume small strains"),
+            "{text}"
+        );
         assert_eq!(text.matches("warning").count(), 3, "the table has a column: {text}");
     };
     said(scene.study(1, &[]).expect(0));
@@ -251,7 +254,7 @@ fn warnings_of_runs_are_counted_and_their_first_words_said() {
     let row = |at: usize| csv.lines().nth(at).expect("a row").split(',').collect::<Vec<_>>();
     assert_eq!(row(0)[2..4], ["status", "warnings"]);
     assert_eq!([row(1)[3], row(2)[3]], ["0", "1"]);
-    assert!(read("study.md").contains("end-0.3: 1 warning: the strain reached "));
+    assert!(read("study.md").contains("warning of end-0.3: the strain reached "));
     assert!(read("study.csv").lines().nth(2).is_some_and(|row| row.contains(",completed,1,")));
     // Those of runs that are used again are not forgotten.
     let again = scene.study(1, &[]).expect(0);

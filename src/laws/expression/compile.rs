@@ -124,9 +124,7 @@ pub(super) fn compile(text: &str, variables: &[Variable], names: &Names) -> Resu
         }
         Some('*') => Err(parser.here("an operator without a left side", "powers are written x^2")),
         Some('<' | '>' | '=' | '!') => Err(parser.no_comparison()),
-        Some(c) if c == '(' || c == '.' || c.is_alphanumeric() => {
-            Err(parser.here("an operator is missing here", "products are written with a star: 2*x"))
-        }
+        Some(c) if c == '(' || c == '.' || c.is_alphanumeric() => Err(parser.missing_operator()),
         Some(c) => Err(parser.unexpected(c)),
     }
 }
@@ -154,6 +152,10 @@ impl Operand {
         }
     }
 }
+
+/// Names of units that numbers do not have.
+const UNITS: [&str; 16] =
+    ["Pa", "kPa", "MPa", "GPa", "N", "kN", "mm", "cm", "m", "s", "ms", "kg", "K", "C", "W", "J"];
 
 struct Parser<'a> {
     text: &'a str,
@@ -505,9 +507,7 @@ impl Parser<'_> {
                 Ok(())
             }
             None => Err(Fault::new(open..open + 1, "this parenthesis is never closed", "add a `)`")),
-            Some(c) if c == '(' || c == '.' || c.is_alphanumeric() => {
-                Err(self.here("an operator is missing here", "products are written with a star: 2*x"))
-            }
+            Some(c) if c == '(' || c == '.' || c.is_alphanumeric() => Err(self.missing_operator()),
             Some('<' | '>' | '=' | '!') => Err(self.no_comparison()),
             Some(c) => Err(self.unexpected(c)),
         }
@@ -522,6 +522,16 @@ impl Parser<'_> {
     fn take_while(&mut self, accept: impl Fn(char) -> bool) {
         let rest = &self.text[self.at..];
         self.at += rest.len() - rest.trim_start_matches(accept).len();
+    }
+
+    fn missing_operator(&self) -> Fault {
+        let rest = &self.text[self.at..];
+        let word = rest.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
+        let help = match UNITS.contains(&word) {
+            true => "numbers are in SI units, without their names: 2e6 for 2 MPa",
+            false => "products are written with a star: 2*x",
+        };
+        self.here("an operator is missing here", help)
     }
 
     fn unexpected(&self, c: char) -> Fault {

@@ -55,6 +55,7 @@ fn faults_point_into_the_text() {
         ("", 0..0, "empty", "number"),
         ("1 +", 3..3, "ends too early", "follow"),
         ("2x", 1..2, "operator is missing", "2*x"),
+        ("2 MPa", 2..3, "operator is missing", "2e6 for 2 MPa"),
         ("(1)(2)", 3..4, "operator is missing", "2*x"),
         ("(1", 0..1, "never closed", ")"),
         ("1)", 1..2, "no matching", "delete"),

@@ -204,11 +204,16 @@ impl Record {
 
 /// The number of warnings, if there are any, and the first words of the first one.
 pub(super) fn counted(warnings: &[String]) -> Option<String> {
-    let words: Vec<&str> = warnings.first()?.split_whitespace().collect();
-    let more = if words.len() > FIRST_WORDS { " .." } else { "" };
-    let words = words[..words.len().min(FIRST_WORDS)].join(" ");
-    let count = warnings.len();
+    let first = warnings.first()?;
+    let (words, count) = (first_words(first), warnings.len());
+    let more = if words.len() < first.len() { " .." } else { "" };
     Some(format!("{count} warning{}: {words}{more}", if count == 1 { "" } else { "s" }))
+}
+
+/// The first words of a warning, in which warnings of the same kind agree but for numbers.
+pub(super) fn first_words(warning: &str) -> &str {
+    let end = warning.split_inclusive(' ').take(FIRST_WORDS).map(str::len).sum::<usize>();
+    warning[..end].trim_end()
 }
 
 /// Digest of all data that determine a run; of the number of ranks only if the run is not one of several side by side.

@@ -47,7 +47,7 @@ pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
             let why = if response.of.contains(".arrival.") {
                 "arrival: its values are all 0"
             } else {
-                "period: its values do not oscillate, they cross their mean less than twice in the same direction or only by errors"
+                "period: its values do not oscillate, or not for two periods, for which a longer window helps"
             };
             format!("`{}` has no {why}", response.name())
         }));

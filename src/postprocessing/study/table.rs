@@ -2,7 +2,7 @@
 
 use super::{
     document::{Norm, Over, ProbeError, Quantity, Space, Study},
-    record::counted,
+    record::first_words,
     results::{ErrorResult, NormResult, Results, RunResult},
 };
 use crate::{
@@ -372,10 +372,23 @@ fn ablation(results: &Results) -> Option<ResultTable> {
 
 fn failures(results: &Results) -> Option<ResultTable> {
     let mut table = ResultTable { title: "Failed runs, warnings and notes".into(), ..ResultTable::default() };
+    // Each kind of warning once: its first words without their numbers.
+    let kind = |warning: &str| first_words(warning).replace(|c: char| c.is_ascii_digit() || c == '.', "");
+    let mut warned: Vec<(String, String, &str, usize)> = Vec::new();
     for run in results.runs.iter().chain(&results.reference) {
         table.notes.extend(run.error.iter().map(|words| format!("{}: {}", run.name, words.trim())));
-        table.notes.extend(counted(&run.warnings).map(|words| format!("{}: {words}", run.name)));
         table.notes.extend(run.notes.iter().map(|words| format!("{}: {words}", run.name)));
+        for warning in &run.warnings {
+            let kind = kind(warning);
+            match warned.iter_mut().find(|(other, ..)| *other == kind) {
+                Some((.., others)) => *others += 1,
+                None => warned.push((kind, format!("warning of {}", run.name), warning, 0)),
+            }
+        }
+    }
+    for (_, of_run, warning, others) in warned {
+        let more = if others > 0 { format!(", and {others} more of this kind") } else { String::new() };
+        table.notes.push(format!("{of_run}{more}: {warning}"));
     }
     (!table.notes.is_empty()).then_some(table)
 }

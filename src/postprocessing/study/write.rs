@@ -68,7 +68,24 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<()> {
         write(&folder.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
         write(&folder.join(format!("{}.png", picture.name)), &picture.png()?)?;
     }
+    let names: Vec<&str> = pictures.iter().map(|picture| &*picture.name).collect();
+    remove_other_pictures(folder, &names)?;
     write(&folder.join("study.md"), markdown(results, &pictures).as_bytes())
+}
+
+/// Removes the pictures that the page of an earlier study in this folder shows and that are not among these.
+fn remove_other_pictures(folder: &Path, names: &[&str]) -> Result<()> {
+    let page = std::fs::read_to_string(folder.join("study.md")).unwrap_or_default();
+    let shown = page.split("](").skip(1).filter_map(|rest| Some(rest.split_once(".svg)")?.0));
+    let is_plain = |name: &&str| name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c));
+    for name in shown.filter(is_plain).filter(|name| !names.contains(name)) {
+        for file in ["svg", "png"].map(|kind| folder.join(format!("{name}.{kind}"))) {
+            if file.is_file() {
+                std::fs::remove_file(&file).map_err(|error| Error::unwritable(&file, error))?;
+            }
+        }
+    }
+    Ok(())
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -204,6 +221,20 @@ fn markdown(results: &Results, pictures: &[Picture]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_an_earlier_study_are_removed_and_no_other_files() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        for name in ["map-old.svg", "map-old.png", "map-new.svg", "own.svg"] {
+            write(&at(name), b"").expect("written");
+        }
+        let page = "![a](map-old.svg)\n\n![b](map-new.svg)\n\n![c](../map-old.svg) [d](own.md)\n";
+        write(&at("study.md"), page.as_bytes()).expect("written");
+        remove_other_pictures(folder.path(), &["map-new"]).expect("removed");
+        let left = ["map-old.svg", "map-old.png", "map-new.svg", "own.svg"].map(|name| at(name).exists());
+        assert_eq!(left, [false, false, true, true]);
+    }
 
     #[test]
     fn swept_values_are_numbers_or_text_that_is_no_formula() {

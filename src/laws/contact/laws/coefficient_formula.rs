@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 pub struct CoefficientFormula {
     /// Friction coefficient as a formula of the sliding velocity v in m/s, the slip distance l of a point since the start of the run in m,
     /// the contact pressure p in Pa, the time t in s, the undeformed coordinates x, y, z in m and, with [material.heat], the temperature of
-    /// the body at the start of a step in K; between bodies, coordinates and temperature are those of the boundaries `on`. It must not be
+    /// the body in K that a step is expected to end with (under lagged_euler that at its start, under midpoint the mean); between bodies, coordinates and temperature are those of the boundaries `on`. It must not be
     /// negative for any v, l, p, t and temperature from 0 on and any place, and not jump with v, l or p. A bound, the coefficient times p,
     /// that grows by much more than 1 Pa for each Pa from p = 0 on, such as 300/(p + 1e-3), makes steps fail where contact opens: for a
     /// constant bound use `tresca`. Where it contains l, field files and checkpoints contain the slip as `slip`.

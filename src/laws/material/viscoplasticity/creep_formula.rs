@@ -32,9 +32,9 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct CreepFormula {
     /// Rate of the equivalent creep strain as a formula of the von Mises norm q of the stress in Pa, the mean stress p in Pa, positive in
-    /// tension, the equivalent creep strain e and, with [material.heat], the temperature at the start of a step in K. It is zero at q = 0,
-    /// must not decrease with q nor increase with e, and must not jump with them, at any temperature from 0 on. In plane stress it must not
-    /// depend on p.
+    /// tension, the equivalent creep strain e and, with [material.heat], the temperature in K that a step is expected to end with (under
+    /// lagged_euler that at its start, under midpoint the mean). It is zero at q = 0, must not decrease with q nor increase with e, and must
+    /// not jump with them, at any temperature from 0 on. In plane stress it must not depend on p.
     #[schemars(extend("unit" = "1/s"), example = &"1e-3*sinh(q/20e6)^4", example = &"1e9*(q/20e6)^4*exp(-24e3/max(temperature, 1))")]
     pub rate: Formula<OfCreep>,
     /// Von Mises norm of the stress, and size of a mean stress that the rate contains, up to which explicit_step_bound holds with scheme
