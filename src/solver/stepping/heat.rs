@@ -37,7 +37,7 @@ pub(super) struct HeatStep {
     diagonal: Vec<usize>,
     /// Whether the temperature of each owned node is given, or is that of an edge.
     is_known: Vec<bool>,
-    /// A factor, not yet computed, where that of the velocities is one; it does not pay for a single step.
+    /// A factor, not yet computed, where the velocities have one and convection does not depend on time.
     factor: Option<SharedFactor>,
     solver: Option<Ksp>,
     /// The length in s of the step for which the solver is prepared.
