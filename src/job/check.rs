@@ -274,18 +274,18 @@ fn check_density_and_elasticity(job: &Job, table: &mut Table<'_>) {
     }
 }
 
-/// A shear modulus that is a formula of the strain is taken at the end of implicit steps.
+/// What a shear modulus that is a formula of the strain excludes.
 fn check_formulas_of_strain(job: &Job, table: &mut Table<'_>, has_initial_stress: bool) {
     let has_formula =
         |material: &Material| material.elasticity.as_ref().is_some_and(|law| law.expression.is_some());
     let Some((path, _)) = job.materials().find(|(_, material)| has_formula(material)) else { return };
     let formula = header(&format!("{path}.elasticity.expression"));
     if !job.time.scheme.is_implicit() {
-        let scheme = job.time.scheme.name();
-        let message = format!(
-            "with scheme \"{scheme}\" the stress is that of the step before, and no bound of the step is known for {formula}"
-        );
-        table.fault("time.scheme", message, "use \"implicit_euler\", \"bdf2\" or \"midpoint\"");
+        for (path, material) in job.materials() {
+            let law = material.elasticity.as_ref().and_then(|law| law.expression.as_ref());
+            let fault = law.and_then(|law| law.fault_of_explicit_steps());
+            table.refuse(fault.map(|fault| fault.within("elasticity.expression").within(&path)));
+        }
     }
     if has_initial_stress {
         let message =

@@ -28,6 +28,12 @@ const LAST: [[f64; 2]; 5] = {
     last
 };
 
+/// The points of the quadrature on [0, 1] and their weights, whose sum is 1.
+pub fn unit_rule() -> impl Iterator<Item = [f64; 2]> {
+    let side = |sign: f64| RULE.into_iter().map(move |[at, weight]| [0.5 + 0.5 * sign * at, 0.5 * weight]);
+    side(-1.0).chain(side(1.0))
+}
+
 /// The means of a smooth function and of its absolute value from `a` to `b`, and the larger one of its coefficients of the Legendre
 /// polynomials of degrees 8 and 9: where they fall geometrically with the degree, the error of the mean is about the square of this one,
 /// as it is made by the degrees from 20 on.

@@ -21,7 +21,7 @@ use crate::{
     job::{self, Job, Sliding},
     laws::{
         contact::{Gap, NormalResponse, Quadrature},
-        material::{ByMaterial, Hypothesis, Material},
+        material::{ByMaterial, Comparison, Hypothesis, Material},
     },
     linear_algebra::tensor::{Mandel, Vector, component, norm},
     mesh::Mesh,
@@ -41,7 +41,8 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut state = session.agree(State::at_rest(&mesh))?;
     let supports = Supports::of_body(session, &mesh, &job.support, &state.velocity)?;
     let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
-    let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
+    let comparison = if job.time.scheme.is_implicit() { Comparison::Softer } else { Comparison::Stiffer };
+    let effects = session.agree(effects(&materials.all, &geometry, &initial_stress, comparison))?;
     let load = load(session, job, &mesh, &materials.all)?;
     let elastic_support = elastic_support::<D, S>(session, job, &mesh, &supports.held, materials)?;
     let coupling = coupling(session, &mesh, &pairs, &supports.held)?;

@@ -42,7 +42,7 @@ use crate::{
     error::{Error, Result},
     fem::space::{CellRun, Geometry, SurfacePoint},
     job::{self, Material},
-    laws::material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
+    laws::material::{ByMaterial, Comparison, FlowLaw, Hypothesis, Viscoplasticity},
     linear_algebra::{simd::Pack, tensor::Mandel},
     mesh::Mesh,
     parallel::session::Session,
@@ -115,11 +115,12 @@ pub const ENERGIES: &[EnergyKind] = &[
 const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at its declared position");
 
 /// The effects in the interior of bodies of these materials, with the initial stress at each point of the cells, cell by cell, if there
-/// is any. A table that is absent creates none.
+/// is any, and the linear elasticity to which that by formula is compared. A table that is absent creates none.
 pub fn effects<const D: usize, const S: usize>(
     materials: &[Material<f64>],
     geometry: &Geometry<D>,
     initial_stress: &[Mandel<S>],
+    comparison: Comparison,
 ) -> Result<Vec<Box<dyn Effect<D, S>>>> {
     let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
     if let Some(density) = by_material(materials, |m| m.density) {
@@ -146,7 +147,7 @@ pub fn effects<const D: usize, const S: usize>(
         effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, geometry)));
     }
     let elastic = |m: &Material<f64>| match m.viscoplasticity {
-        None => Some(m.linear_elasticity()?.tensor(Hypothesis::of(S))),
+        None => m.elasticity.as_ref()?.linear_tensor(Hypothesis::of(S)),
         Some(_) => None,
     };
     if let Some(laws) = by_material(materials, elastic).filter(|_| !initial_stress.is_empty()) {
@@ -168,8 +169,8 @@ pub fn effects<const D: usize, const S: usize>(
     if let Some(formulas) = by_material(materials, |m| m.rate_viscosity().cloned()) {
         effects.push(Box::new(NonlinearViscosity::new(formulas)));
     }
-    if let Some(laws) = by_material(materials, |m| m.elasticity.as_ref()?.strain_elasticity()) {
-        effects.push(Box::new(NonlinearElasticity::new(laws)));
+    if let Some(laws) = by_material(materials, |m| m.elasticity.as_ref()?.strain_elasticity(comparison)) {
+        effects.push(Box::new(NonlinearElasticity::new::<S>(laws)));
     }
     Ok(effects)
 }
@@ -209,7 +210,7 @@ fn by_material<T>(
 }
 
 fn elastic_law<const S: usize>(material: &Material<f64>) -> Option<ElasticLaw> {
-    let tensor = material.linear_elasticity()?.tensor(Hypothesis::of(S));
+    let tensor = material.elasticity.as_ref()?.linear_tensor(Hypothesis::of(S))?;
     Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
 }
 

@@ -11,9 +11,9 @@ use crate::{
     },
 };
 
-/// Elastic stress with a shear modulus that is a formula of the strain, at the end of an implicit step: a linear part like that of
-/// [`Elasticity`](super::Elasticity), which the matrix contains, and what the law adds to it. Where the end of the step is extrapolated, the
-/// stress is one whose work in the step is the change of the stored energy.
+/// Elastic stress with a shear modulus that is a formula of the strain: that of the converged displacement, or at the end of an implicit step
+/// a linear part like that of [`Elasticity`](super::Elasticity), which the matrix contains, and what the law adds to it. Where the end of the
+/// step is extrapolated, the stress is one whose work in the step is the change of the stored energy.
 #[derive(Debug)]
 pub struct NonlinearElasticity {
     laws: ByMaterial<StrainElasticity>,
@@ -26,10 +26,15 @@ fn strains<const S: usize>(strain: &Mandel<S>, blend: Blend, rate: &Mandel<S>) -
     [start, *strain, add_scaled(&start, blend.way(), rate)]
 }
 
+/// Adds to the stresses that of each cell.
+fn add<const S: usize>(stresses: &mut Pack<S>, of: impl Fn(usize) -> Mandel<S>) {
+    *stresses = Pack::from_lanes(|lane| add_scaled(&stresses.lane(lane), 1.0, &of(lane)));
+}
+
 impl NonlinearElasticity {
     /// With these laws.
-    pub fn new(laws: ByMaterial<StrainElasticity>) -> Self {
-        let linear = laws.map(|law| ElasticLaw { tensor: law.linear(), with_history: false });
+    pub fn new<const S: usize>(laws: ByMaterial<StrainElasticity>) -> Self {
+        let linear = laws.map(|law| ElasticLaw { tensor: law.linear::<S>(), with_history: false });
         Self { laws, linear }
     }
 }
@@ -43,11 +48,12 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearElasticity {
         let strain = Needs { strain: true, ..Needs::default() };
         let both = Needs { strain_rate: true, ..strain };
         let is_mean = matches!(at, Evaluation::End(blend) if blend.extrapolates());
+        let is_explicit = at == Evaluation::Converged;
         Phases {
             start: Some(strain),
-            end: if self.laws.laws().all(StrainElasticity::is_constant) { None } else { Some(both) },
-            energy: Some(strain),
-            stress: Some(if is_mean { both } else { strain }),
+            end: if is_explicit { None } else { Some(both) },
+            energy: Some(if is_explicit { both } else { strain }),
+            stress: Some(if is_mean || is_explicit { both } else { strain }),
             error: Some(strain),
             is_monotone: true,
             ..Phases::default()
@@ -61,7 +67,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearElasticity {
     fn evaluate(&mut self, at: Evaluation, _: Step, batch: &mut Batch<D, S>, outcome: &mut Outcome) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Evaluation::End(blend) = at else {
-            linear::add_stresses(&law.linear(), 1.0, &batch.strain, &Integrity::default(), &mut batch.stress);
+            let linear = law.linear::<S>();
+            linear::add_stresses(&linear, 1.0, &batch.strain, &Integrity::default(), &mut batch.stress);
+            if at == Evaluation::Converged {
+                add(&mut batch.stress, |lane| law.stress(&batch.strain.lane(lane)));
+            }
             return;
         };
         for lane in 0..batch.count {
@@ -82,20 +92,19 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearElasticity {
         outcome.has_flowed = true;
     }
 
-    fn add_stress(&self, at: Evaluation, _: Step, batch: &mut Batch<D, S>) {
+    fn add_stress(&self, at: Evaluation, step: Step, batch: &mut Batch<D, S>) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let linear = law.linear();
-        batch.stress = Pack::from_lanes(|lane| {
-            let strain = batch.strain.lane(lane);
-            let added = match at {
+        let linear = law.linear::<S>();
+        add(&mut batch.stress, |lane| {
+            let (strain, rate) = (batch.strain.lane(lane), batch.strain_rate.lane(lane));
+            match at {
+                Evaluation::Converged => law.whole_stress(&add_scaled(&strain, -step.length, &rate)),
                 Evaluation::End(blend) if blend.extrapolates() => {
-                    let [start, mean, end] = strains(&strain, blend, &batch.strain_rate.lane(lane));
-                    law.mean_stress([&start, &mean, &end])
+                    let [start, mean, end] = strains(&strain, blend, &rate);
+                    add_scaled(&linear.apply(&strain), 1.0, &law.mean_stress([&start, &mean, &end]))
                 }
-                _ => law.stress(&strain),
-            };
-            let stress = add_scaled(&linear.apply(&strain), 1.0, &added);
-            add_scaled(&batch.stress.lane(lane), 1.0, &stress)
+                _ => law.whole_stress(&strain),
+            }
         });
     }
 
@@ -110,22 +119,30 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearElasticity {
     }
 
     fn cover(&mut self, multiple: f64) {
-        *self = Self::new(self.laws.map(|law| law.covering(multiple).unwrap_or_else(|| law.clone())));
+        *self = Self::new::<S>(self.laws.map(|law| law.covering(multiple).unwrap_or_else(|| law.clone())));
     }
 
-    fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+    fn add_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let linear = law.linear();
+        let linear = law.linear::<S>();
         for lane in 0..batch.count {
-            let strain = batch.strain.lane(lane);
+            let (volume, strain) = (batch.cells.volume[lane], batch.strain.lane(lane));
             let stored = 0.5 * dot(&linear.apply(&strain), &strain) + law.energy(&strain);
-            energy[ELASTIC] += batch.cells.volume[lane] * stored;
+            energy[ELASTIC] += volume * stored;
+            if at == Evaluation::Converged {
+                let change = batch.strain_rate.lane(lane).map(|rate| step.length * rate);
+                let before = add_scaled(&strain, -1.0, &change);
+                // What is stored in addition to the work of the stress at the start.
+                let of_linear = 0.5 * dot(&linear.apply(&change), &change);
+                let of_rest = law.energy_change([&before, &strain]) - dot(&law.stress(&before), &change);
+                energy[NUMERICAL] += volume * (of_linear + of_rest);
+            }
         }
     }
 
     fn add_step_energy(&self, _: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let linear = law.linear();
+        let linear = law.linear::<S>();
         for lane in 0..batch.count {
             let [strain, before] = [batch.strain.lane(lane), batch.strain_before.lane(lane)];
             let change = add_scaled(&strain, -1.0, &before);
@@ -141,6 +158,6 @@ impl<const D: usize, const S: usize> Effect<D, S> for NonlinearElasticity {
     fn add_error(&self, _: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let whole = Integrity::default();
-        error.size += linear::square(&law.linear(), batch.cells, &whole, &batch.strain);
+        error.size += linear::square(&law.linear::<S>(), batch.cells, &whole, &batch.strain);
     }
 }

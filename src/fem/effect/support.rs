@@ -273,7 +273,9 @@ impl<const D: usize> SupportMotion<D> {
             }
         }
         let moved = moved.into_iter().filter(|(_, all)| all.iter().any(|(_, value)| value.is_some()));
-        let nodes = moved.map(|(node, all)| MovedNode::new(mesh, node, &all)).collect::<Result<_>>()?;
+        let is_rest = |number: usize| values[number].value == Scalar::Number(0.0);
+        let nodes = moved.map(|(node, all)| MovedNode::new(mesh, node, &all, is_rest));
+        let nodes = nodes.collect::<Result<_>>()?;
         Ok(Self { values, nodes })
     }
 
@@ -365,8 +367,12 @@ fn what() -> String {
 }
 
 /// Independent directions among these, each with the number of its value, if it moves. `None` if another direction, a combination of
-/// them, contradicts: it is at rest only where all of them are, and moves only as one of them alone.
-fn parts<const D: usize>(all: &[(Vector<D>, Option<usize>)]) -> Option<Vec<Part<D>>> {
+/// them, contradicts: it is at rest only where all of them are, also by a value that is always 0, and moves only as one of them alone.
+fn parts<const D: usize>(
+    all: &[(Vector<D>, Option<usize>)],
+    is_rest: impl Fn(usize) -> bool,
+) -> Option<Vec<Part<D>>> {
+    let moving = |value: Option<usize>| value.filter(|number| !is_rest(*number));
     let (mut independent, mut others) = (Vec::new(), Vec::new());
     // An orthonormal basis of the same span.
     let mut basis: Vec<Vector<D>> = Vec::new();
@@ -389,8 +395,8 @@ fn parts<const D: usize>(all: &[(Vector<D>, Option<usize>)]) -> Option<Vec<Part<
     let agrees = |(direction, value): (&Vector<D>, Option<usize>)| {
         let share = |part: &Part<D>| dot(&part.dual, direction);
         let mut combined = parts.iter().filter(|part| share(part).abs() > INDEPENDENT);
-        match value {
-            None => combined.all(|part| part.value.is_none()),
+        match moving(value) {
+            None => combined.all(|part| moving(part.value).is_none()),
             Some(_) => combined.all(|part| part.value == value && share(part) > 1.0 - INDEPENDENT),
         }
     };
@@ -398,9 +404,14 @@ fn parts<const D: usize>(all: &[(Vector<D>, Option<usize>)]) -> Option<Vec<Part<
 }
 
 impl<const D: usize> MovedNode<D> {
-    fn new(mesh: &Mesh<D>, node: u32, all: &[(Vector<D>, Option<usize>)]) -> Result<Self> {
+    fn new(
+        mesh: &Mesh<D>,
+        node: u32,
+        all: &[(Vector<D>, Option<usize>)],
+        is_rest: impl Fn(usize) -> bool,
+    ) -> Result<Self> {
         let place = mesh.nodes[node as usize];
-        let parts = parts(all).ok_or_else(|| {
+        let parts = parts(all, is_rest).ok_or_else(|| {
             Error::Refused(format!(
                 "support at {place:?} m: two supports determine the same component of the displacement there and move \
                  it differently; leave this component, or the boundary, out of one of them, or give both the same motion"
@@ -432,9 +443,9 @@ mod tests {
         let (s, c) = 0.5f64.sin_cos();
         let [x, y, z, slanted] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [c, s, 0.0]];
         let back = x.map(|x: f64| -x);
-        // The value of each independent direction, or a contradiction.
+        // The value of each independent direction, or a contradiction; number 9 is always 0.
         let values = |all: &[(Vector<3>, Option<usize>)]| {
-            Some(parts(all)?.into_iter().map(|part| part.value).collect::<Vec<_>>())
+            Some(parts(all, |number| number == 9)?.into_iter().map(|part| part.value).collect::<Vec<_>>())
         };
         for moved in [y, z] {
             assert_eq!(values(&[(back, None), (moved, Some(0)), (x, None)]), Some(vec![None, Some(0)]));
@@ -443,6 +454,9 @@ mod tests {
         for (more, agrees) in [
             ((slanted, None), true),
             ((back, None), true),
+            ((x, Some(9)), true),
+            ((slanted, Some(9)), true),
+            ((z, Some(9)), false),
             ((z, Some(1)), true),
             ((z, None), false),
             ((z, Some(0)), false),

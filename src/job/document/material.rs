@@ -19,10 +19,6 @@ pub struct Region {
     pub material: Material,
 }
 
-/// Why a shear modulus that is a formula of the strain is refused in plane stress.
-const PLANE_STRESS: &str = "a shear modulus that depends on the strain is not available in plane stress, where it decides the strain across \
-     the thickness";
-
 /// Poisson's ratio above which linear elements lock.
 const LOCKING: f64 = 0.45;
 
@@ -103,14 +99,6 @@ pub(in crate::job) fn check_in_body(
     table.refuse(material.constant().fault_of_viscosity(normal_strains));
     let orthotropic = material.orthotropic.iter().flat_map(|law| law.faults(dimension));
     orthotropic.for_each(|fault| table.refuse(Some(fault.within("orthotropic"))));
-    let has_formula = material.elasticity.as_ref().is_some_and(|law| law.expression.is_some());
-    if hypothesis == Some(Hypothesis::PlaneStress) && has_formula {
-        table.fault(
-            "elasticity.expression",
-            PLANE_STRESS,
-            "use plane strain, axisymmetric or 3D, or delete the table",
-        );
-    }
     if hypothesis == Some(Hypothesis::PlaneStress) {
         table.refuse(material.constant().fault_in_plane_stress());
     }

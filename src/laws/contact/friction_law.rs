@@ -189,8 +189,8 @@ pub trait FrictionBound {
         let slope = self.slope(speed, pressure, at);
         Slip {
             speed,
-            // Without a bound the traction is exactly zero.
-            traction: if at_rest > 0.0 { s - c * speed } else { 0.0 },
+            // What remains of s would have lost the digits of c v.
+            traction: self.bound(speed, pressure, at),
             derivative: 1.0 / (c + slope),
             slope,
             coefficient: if pressure > 0.0 { self.by_pressure(speed, pressure, at) } else { 0.0 },

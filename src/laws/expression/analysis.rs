@@ -3,9 +3,8 @@
 //! Ranges are halved until enclosures are sharp: the bounds hold for every number in them, not only for those that were tried.
 
 use super::enclosure::{Enclosure, Ranges};
-use super::evaluate::COUNT;
 use super::interval::Interval;
-use super::program::{Instruction, Program, Variable};
+use super::program::{COUNT, Program, Variable};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -94,7 +93,7 @@ impl Program {
         by: Variable,
         of: impl Fn(&Enclosure) -> Interval,
     ) -> Result<Supremum, Unproven> {
-        let axes: Vec<usize> = (0..COUNT).filter(|axis| self.uses_number(*axis)).collect();
+        let axes: Vec<usize> = self.variables().collect();
         let part = |ranges: Ranges| {
             let there = of(&self.enclose(&ranges.map(|range| Interval::from(centre(range))), by));
             let known = self.enclose(&ranges, by);
@@ -144,12 +143,6 @@ impl Program {
             }
         }
         Ok(Supremum { bound: f64::NEG_INFINITY, place: [0.0; COUNT] })
-    }
-
-    fn uses_number(&self, number: usize) -> bool {
-        self.instructions.iter().any(|instruction| {
-            matches!(instruction, Instruction::Variable(variable) if *variable as usize == number)
-        })
     }
 }
 

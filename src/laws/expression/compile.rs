@@ -6,10 +6,10 @@
 
 use std::ops::Range;
 
-use super::evaluate::{COUNT, Values};
+use super::evaluate::Values;
 use super::functions::{Meaning, Names, comparison, meaning, names, smooth_of_two};
 use super::interval::{Interval, Real};
-use super::program::{Binary, Instruction, Machine, Operator, Program, Table, Unary, Variable};
+use super::program::{Binary, COUNT, Instruction, Machine, Operator, Program, Table, Unary, Variable};
 use crate::laws::nearest::nearest;
 use crate::linear_algebra::tensor::larger;
 
@@ -21,23 +21,24 @@ const DEEPEST: usize = 200;
 fn one() -> Interval {
     Interval::from(1.0)
 }
-const ADD: Binary = smooth_of_two!(left + right, (left, right) => [R::from(1.0), R::from(1.0)])
-    .operator(Operator::Add)
+macro_rules! operator {
+    ($operator:expr) => {
+        smooth_of_two!($operator.value(left, right), (left, right) => $operator.slopes(left, right))
+            .operator($operator)
+    };
+}
+const ADD: Binary = operator!(Operator::Add)
     .linear(|[a, p], [b, q]| Some([a + b, p + q]))
     .sharing(|left, right| [one() / (one() + right / left), one() / (one() + left / right)]);
-const SUBTRACT: Binary = smooth_of_two!(left - right, (left, right) => [R::from(1.0), R::from(-1.0)])
-    .operator(Operator::Subtract)
+const SUBTRACT: Binary = operator!(Operator::Subtract)
     .linear(|[a, p], [b, q]| Some([a - b, p - q]))
     .sharing(|left, right| [one() / (one() - right / left), one() / (one() - left / right)]);
-const MULTIPLY: Binary = smooth_of_two!(left * right, (left, right) => [right, left])
-    .operator(Operator::Multiply)
+const MULTIPLY: Binary = operator!(Operator::Multiply)
     .linear(|[a, p], [b, q]| (p == 0.0 || q == 0.0).then_some([a * b, a * q + b * p]))
     .sharing(|_, _| [one(); 2]);
-const DIVIDE: Binary =
-    smooth_of_two!(left / right, (left, right) => [R::from(1.0) / right, -left / right.square()])
-        .operator(Operator::Divide)
-        .linear(|[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]))
-        .sharing(|_, _| [one(), -one()]);
+const DIVIDE: Binary = operator!(Operator::Divide)
+    .linear(|[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]))
+    .sharing(|_, _| [one(), -one()]);
 const POWER: Binary = {
     fn slopes<R: Real>(base: R, exponent: R) -> [R; 2] {
         [exponent * base.power(exponent - R::from(1.0)), base.power(exponent) * base.ln()]

@@ -1,8 +1,9 @@
 //! Enclosures of a program: all values and derivatives that it takes while its variables are in intervals.
 
-use super::evaluate::COUNT;
 use super::interval::Interval;
-use super::program::{Binary, Machine, Program, Table, Ternary, Unary, Variable, interpolate, points_before};
+use super::program::{
+    Binary, COUNT, Machine, Program, Table, Ternary, Unary, Variable, interpolate, points_before,
+};
 
 /// Intervals of the variables, in their order.
 pub(super) type Ranges = [Interval; COUNT];

@@ -1,11 +1,8 @@
 //! Evaluation of a program at numbers: its value, the pieces that determine it, and its derivative.
 
 use super::program::{
-    Binary, Machine, Operator, Program, Table, Ternary, Unary, Variable, interpolate, points_before,
+    Binary, COUNT, Machine, Program, Table, Ternary, Unary, Variable, interpolate, points_before,
 };
-
-/// The number of variables.
-pub(super) const COUNT: usize = Variable::Temperature as usize + 1;
 
 /// Values of the variables, in their order; 0 for those that have none.
 pub(super) type Arguments = [f64; COUNT];
@@ -51,6 +48,7 @@ impl Machine for Values<'_> {
         (function.value)(argument)
     }
 
+    #[inline(always)]
     fn binary(&mut self, function: &Binary, [left, right]: [f64; 2]) -> f64 {
         function.value(left, right)
     }
@@ -143,20 +141,14 @@ impl<const N: usize> Machine for Slopes<'_, N> {
         (value, slopes.map(|inner| chain(slope, inner)))
     }
 
+    #[inline(always)]
     fn binary(&mut self, function: &Binary, [left, right]: [Self::Entry; 2]) -> Self::Entry {
         let value = function.value(left.0, right.0);
         let is_fixed = right.1 == [0.0; N];
         if is_fixed && left.1 == [0.0; N] {
             return (value, [0.0; N]);
         }
-        let [by_left, by_right] = match (function.operator, function.by_left) {
-            (Some(Operator::Add), _) => [1.0, 1.0],
-            (Some(Operator::Subtract), _) => [1.0, -1.0],
-            (Some(Operator::Multiply), _) => [right.0, left.0],
-            (Some(Operator::Divide), _) if is_fixed => [1.0 / right.0, 0.0],
-            (None, Some(by_left)) if is_fixed => [by_left(left.0, right.0, value), 0.0],
-            _ => (function.slopes)(left.0, right.0),
-        };
+        let [by_left, by_right] = function.slopes([left.0, right.0], value, is_fixed);
         (value, std::array::from_fn(|k| chain(by_left, left.1[k]) + chain(by_right, right.1[k])))
     }
 

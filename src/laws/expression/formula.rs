@@ -2,9 +2,9 @@
 
 use super::analysis::{Border, Place, REACH, Supremum, Unproven};
 use super::enclosure::{Enclosure, Ranges};
-use super::evaluate::{Arguments, COUNT};
+use super::evaluate::Arguments;
 use super::interval::Interval;
-use super::program::Variable;
+use super::program::{COUNT, Variable};
 use super::{Expression, Fault, Scalar};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer, Visitor};

@@ -26,12 +26,12 @@ pub use analysis::{Border, Place, REACH, Supremum, Unproven};
 pub use breakpoints::Breakpoints;
 pub use compile::Fault;
 pub use enclosure::Enclosure;
-use evaluate::{Arguments, COUNT};
+use evaluate::Arguments;
 pub use formula::{Formula, OfCreep, OfMotion, OfRate, OfSliding, OfStrain, Scope, short};
 pub use functions::Names;
 pub use interval::Interval;
-use program::Program;
 pub use program::Variable;
+use program::{COUNT, Program};
 
 /// A number, or an expression in t, x, y, z.
 #[derive(Debug, Clone, PartialEq)]

@@ -80,14 +80,19 @@ impl Variable {
     }
 }
 
+/// The number of variables.
+pub(super) const COUNT: usize = Variable::Temperature as usize + 1;
+
 /// A compiled program; clones share the instructions.
 #[derive(Debug, Clone)]
 pub(super) struct Program {
-    pub(super) instructions: Arc<[Instruction]>,
+    instructions: Arc<[Instruction]>,
     /// Points of the tables that the instructions interpolate.
     pub(super) tables: Arc<[Table]>,
     depth: usize,
     has_pieces: bool,
+    /// Whether it contains each variable.
+    used: [bool; COUNT],
 }
 
 /// What the instructions of a program act on, and how: numbers, numbers with derivatives, enclosures.
@@ -110,19 +115,31 @@ pub(super) trait Machine {
 
 impl Program {
     pub(super) fn new(instructions: Vec<Instruction>, tables: Vec<Table>) -> Self {
+        let instructions = with_numbers(instructions);
         let (depth, has_pieces) =
             (stack_depth(&instructions), instructions.iter().any(Instruction::has_pieces));
-        Self { instructions: instructions.into(), tables: tables.into(), depth, has_pieces }
+        let mut used = [false; COUNT];
+        for instruction in &instructions {
+            if let Instruction::Variable(variable) = instruction {
+                used[*variable as usize] = true;
+            }
+        }
+        Self { instructions: instructions.into(), tables: tables.into(), depth, has_pieces, used }
     }
 
     /// Whether it contains `variable`.
     pub(super) fn uses(&self, variable: Variable) -> bool {
-        self.instructions.contains(&Instruction::Variable(variable))
+        self.used[variable as usize]
     }
 
     /// Whether one of its functions is piecewise.
     pub(super) fn has_pieces(&self) -> bool {
         self.has_pieces
+    }
+
+    /// The numbers of the variables that it contains.
+    pub(super) fn variables(&self) -> impl Iterator<Item = usize> {
+        (0..COUNT).filter(|number| self.used[*number])
     }
 
     /// The result on this machine.
@@ -156,6 +173,10 @@ impl Program {
                     top -= 1;
                     stack[top - 1] = machine.binary(function, [stack[top - 1], stack[top]]);
                 }
+                Instruction::BinaryWith(function, number) => {
+                    let number = machine.number(*number);
+                    stack[top - 1] = machine.binary(function, [stack[top - 1], number]);
+                }
                 Instruction::Ternary(function) => {
                     top -= 2;
                     stack[top - 1] = machine.ternary(function, [stack[top - 1], stack[top], stack[top + 1]]);
@@ -176,6 +197,8 @@ pub(super) enum Instruction {
     Variable(Variable),
     Unary(Unary),
     Binary(Binary),
+    /// Of the topmost value and this number.
+    BinaryWith(Binary, f64),
     Ternary(Ternary),
     /// The value of the table of this number, linear between its points.
     Interpolate(usize),
@@ -186,7 +209,7 @@ impl Instruction {
     fn has_pieces(&self) -> bool {
         match self {
             Self::Unary(function) => function.piece.is_some(),
-            Self::Binary(function) => function.piece.is_some(),
+            Self::Binary(function) | Self::BinaryWith(function, _) => function.piece.is_some(),
             Self::Ternary(_) | Self::Interpolate(_) => true,
             Self::Number(_) | Self::Variable(_) => false,
         }
@@ -196,7 +219,7 @@ impl Instruction {
     pub(super) fn operands(&self) -> usize {
         match self {
             Self::Number(_) | Self::Variable(_) => 0,
-            Self::Unary(_) | Self::Interpolate(_) => 1,
+            Self::Unary(_) | Self::BinaryWith(..) | Self::Interpolate(_) => 1,
             Self::Binary(_) => 2,
             Self::Ternary(_) => 3,
         }
@@ -345,6 +368,29 @@ pub(super) enum Operator {
     Divide,
 }
 
+impl Operator {
+    #[inline(always)]
+    pub(super) fn value<R: Real>(self, left: R, right: R) -> R {
+        match self {
+            Self::Add => left + right,
+            Self::Subtract => left - right,
+            Self::Multiply => left * right,
+            Self::Divide => left / right,
+        }
+    }
+
+    /// Its derivatives by both arguments.
+    #[inline(always)]
+    pub(super) fn slopes<R: Real>(self, left: R, right: R) -> [R; 2] {
+        match self {
+            Self::Add => [R::from(1.0); 2],
+            Self::Subtract => [R::from(1.0), R::from(-1.0)],
+            Self::Multiply => [right, left],
+            Self::Divide => [R::from(1.0) / right, -left / right.square()],
+        }
+    }
+}
+
 /// Which piece of a function of two arguments is active: at numbers, and for intervals, if it is one piece.
 #[derive(Clone, Copy)]
 pub(super) struct Piece {
@@ -374,12 +420,16 @@ impl Binary {
     /// Its value.
     #[inline(always)]
     pub(super) fn value(&self, left: f64, right: f64) -> f64 {
-        match self.operator {
-            Some(Operator::Add) => left + right,
-            Some(Operator::Subtract) => left - right,
-            Some(Operator::Multiply) => left * right,
-            Some(Operator::Divide) => left / right,
-            None => (self.value)(left, right),
+        self.operator.map_or_else(|| (self.value)(left, right), |operator| operator.value(left, right))
+    }
+
+    /// Its derivatives by both arguments, given its value; that by the right one is 0 where that is a number.
+    #[inline(always)]
+    pub(super) fn slopes(&self, [left, right]: [f64; 2], value: f64, has_number: bool) -> [f64; 2] {
+        match (self.operator, self.by_left) {
+            (Some(operator), _) => operator.slopes(left, right),
+            (None, Some(by_left)) if has_number => [by_left(left, right, value), 0.0],
+            _ => (self.slopes)(left, right),
         }
     }
 
@@ -448,6 +498,21 @@ impl PartialEq for Binary {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::fn_addr_eq(self.value, other.value)
     }
+}
+
+/// The same instructions, with a number that is the second argument of a function in one with that function.
+fn with_numbers(instructions: Vec<Instruction>) -> Vec<Instruction> {
+    let mut joined: Vec<Instruction> = Vec::with_capacity(instructions.len());
+    for instruction in instructions {
+        match (joined.last().copied(), instruction) {
+            (Some(Instruction::Number(number)), Instruction::Binary(function)) => {
+                joined.pop();
+                joined.push(Instruction::BinaryWith(function, number));
+            }
+            _ => joined.push(instruction),
+        }
+    }
+    joined
 }
 
 fn stack_depth(program: &[Instruction]) -> usize {

@@ -1,4 +1,4 @@
-use super::evaluate::COUNT;
+use super::program::COUNT;
 use super::{
     Enclosure, Expression, Formula, Interval, Names, OfCreep, OfMotion, REACH, Resolved, Scalar, Unproven,
     Variable,

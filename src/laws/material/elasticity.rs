@@ -1,7 +1,7 @@
 //! Isotropic elasticity, and the hypothesis of plane problems.
 
 use super::{
-    elasticity_formula::{ElasticityFormula, StrainElasticity},
+    elasticity_formula::{Comparison, ElasticityFormula, StrainElasticity},
     isotropic::Isotropic,
 };
 use crate::laws::law::LawFault;
@@ -51,9 +51,8 @@ pub struct Elasticity<N = f64> {
     /// Poisson's ratio.
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]
     pub poisson_ratio: f64,
-    /// A formula of the strain by which the shear modulus is multiplied; the bulk modulus stays. Under implicit schemes, in plane strain,
-    /// bodies of revolution and 3D; without viscoplasticity, damage, damping by the stiffness, initial stress and thermal strain. Absent: elasticity is
-    /// linear.
+    /// A formula of the strain by which the shear modulus is multiplied; the bulk modulus stays. Without viscoplasticity, damage, damping by
+    /// the stiffness, initial stress and thermal strain. Absent: elasticity is linear.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expression: Option<ElasticityFormula>,
 }
@@ -71,9 +70,19 @@ impl<N> Elasticity<N> {
 }
 
 impl Elasticity {
-    /// The law of the stress, if it is a formula of the strain. For three normal strains, as in plane strain and 3D.
-    pub fn strain_elasticity(&self) -> Option<StrainElasticity> {
-        Some(self.expression.as_ref()?.law(self.tensor(Hypothesis::Space)))
+    /// The law of the stress, if it is a formula in which the strain occurs.
+    pub fn strain_elasticity(&self, comparison: Comparison) -> Option<StrainElasticity> {
+        let formula = self.expression.as_ref().filter(|formula| !formula.is_constant())?;
+        Some(formula.law(self.tensor(Hypothesis::Space), comparison))
+    }
+
+    /// The stress-strain relation under this hypothesis, if it is linear.
+    pub fn linear_tensor(&self, hypothesis: Hypothesis) -> Option<Isotropic> {
+        let Some(formula) = &self.expression else { return Some(self.tensor(hypothesis)) };
+        let in_space = self.tensor(Hypothesis::Space).with_shear_times(formula.at_rest());
+        let tensor =
+            if hypothesis == Hypothesis::PlaneStress { in_space.in_plane_stress() } else { in_space };
+        formula.is_constant().then_some(tensor)
     }
 
     /// The linear stress-strain relation under this hypothesis, with a formula that where it is 1, section 5 of Wang and Cheng (2022) for plane stress.

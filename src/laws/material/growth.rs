@@ -80,6 +80,13 @@ impl<S: Scope> Growth<'_, S> {
         ])
     }
 
+    /// The supremum of `d(x f)/dx` up to this value, from above; infinite where nothing bounds it.
+    pub(super) fn most(&self, most: f64) -> f64 {
+        let ranges = [(self.by, Interval::new(0.0, most))];
+        let found = self.formula.supremum([&ranges[..]], self.by, |known| known.growth);
+        found.map_or(f64::INFINITY, |supremum| supremum.bound)
+    }
+
     /// The fault of the formula that this outcome shows.
     pub(super) fn fault(&self, least: &Result<f64, [String; 2]>) -> Option<LawFault> {
         let [message, help] = least.as_ref().err()?.clone();

@@ -74,6 +74,16 @@ impl Isotropic {
         out
     }
 
+    /// With the shear modulus times this factor and the same bulk modulus, of strains with three normal components.
+    pub fn with_shear_times(self, factor: f64) -> Self {
+        Self { volumetric: self.volumetric + (1.0 - factor) * self.shear / 3.0, shear: factor * self.shear }
+    }
+
+    /// The same map of strains with three normal components, of those in a plane without stress across it.
+    pub fn in_plane_stress(self) -> Self {
+        Self { volumetric: self.volumetric * self.shear / (self.volumetric + self.shear), ..self }
+    }
+
     /// The `e` with `T(e) = t`.
     #[inline(always)]
     pub fn solve<const S: usize>(&self, t: &Mandel<S>) -> Mandel<S> {

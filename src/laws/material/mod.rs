@@ -29,7 +29,7 @@ pub use by_material::ByMaterial;
 pub use damage::Damage;
 pub use damping::Damping;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
-pub use elasticity_formula::{ElasticityFormula, StrainElasticity};
+pub use elasticity_formula::{Comparison, ElasticityFormula, StrainElasticity};
 pub use heat::Heat;
 pub use isotropic::{Isotropic, LinearTensor};
 pub use local::Numbers;
@@ -135,11 +135,6 @@ impl Material<f64> {
             volumetric: own.volumetric + factor * elastic.volumetric,
             shear: own.shear + factor * elastic.shear,
         })
-    }
-
-    /// The elasticity, if its stress is linear.
-    pub fn linear_elasticity(&self) -> Option<&Elasticity> {
-        self.elasticity.as_ref().filter(|law| law.expression.is_none())
     }
 
     /// What the viscous stress adds to that of [`viscosity_tensor`](Self::viscosity_tensor), if it is not linear.

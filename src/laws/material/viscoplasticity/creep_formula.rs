@@ -177,9 +177,13 @@ impl CreepFormula {
 
     /// The rate, and its derivatives by the von Mises norm and the accumulated strain.
     fn at(&self, norm: f64, others: [f64; 2]) -> Rate {
-        let (rate, [by_norm, by_strain]) =
-            self.rate.slopes(&self.arguments(norm, others), [Variable::Q, Variable::E]);
-        Rate { rate, by_norm, by_strain }
+        let arguments = self.arguments(norm, others);
+        if self.rate.uses(Variable::E) {
+            let (rate, [by_norm, by_strain]) = self.rate.slopes(&arguments, [Variable::Q, Variable::E]);
+            return Rate { rate, by_norm, by_strain };
+        }
+        let [rate, by_norm] = self.rate.differentiate(&arguments, Variable::Q);
+        Rate { rate, by_norm, by_strain: 0.0 }
     }
 
     /// The derivative of the rate by the mean stress.
