@@ -10,16 +10,20 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
-        pairs::{Pair, is_exchanged, pair_of, shares},
+        coupling::{Coupling, HELD_TOGETHER, ghosts_of_surfaces, held_share, is_held, needed_ghosts},
+        pairs::{Pair, PairedNode, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
     job::{self, Job, Scalar, Side, Sliding},
-    linear_algebra::tensor::{Vector, norm},
+    laws::digits::Digits,
+    linear_algebra::tensor::{Vector, dot, larger, norm},
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
+
+/// The part of a pressure that may act along the wrong direction without a warning.
+const INCLINED: f64 = 0.04;
 
 /// The contacts of a job between bodies, with the side of each that carries the law; the mesh gets the ghosts that their equations need.
 /// `earlier` has the contacts of the run from whose state this one starts, each with whether its sides were exchanged. Collective.
@@ -204,6 +208,55 @@ pub(super) fn coupling<const D: usize>(
     Coupling::new(session, mesh, &shares(mesh, pairs), held).map(Some)
 }
 
+/// The shares of the masters that a node of a pair faces on the other side, each with the length of the free part of a direction there.
+fn faced_along<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    (node, masters): (&PairedNode<D>, &[(u32, f64)]),
+    direction: &Vector<D>,
+) -> Vec<(f64, f64)> {
+    let free = |master: u32| norm(&body.held.free_part(master as usize, direction));
+    let faced = masters.iter().filter(|(master, _)| !node.is_beside(body.mesh.global_node(*master)));
+    faced.map(|(master, share)| (*share, free(*master))).collect()
+}
+
+/// Warns of nodes that supports hold, as some of the nodes that they face, along a direction that is inclined to the boundary: the
+/// forces on those that are free there lack the part along it. Collective.
+pub(super) fn warnings_of_inclined_supports<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+) -> Vec<String> {
+    let Body { coupling: Some(coupling), held, pairs, .. } = body else { return Vec::new() };
+    let masters_of: BTreeMap<u32, &[(u32, f64)]> = coupling.slaves().collect();
+    let lack = |node: &PairedNode<D>| {
+        let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);
+        let (frame, free) = held.frame(node.node as usize);
+        let of_direction = |direction: &Vector<D>| {
+            let faced = faced_along(body, (node, masters), direction);
+            let free: f64 =
+                faced.iter().filter(|(_, free)| !is_held(*free)).map(|(share, _)| share.abs()).sum();
+            let is_held_together = held_share(faced) >= HELD_TOGETHER;
+            if is_held_together { dot(direction, &node.normal).abs() * free } else { 0.0 }
+        };
+        frame[free..].iter().map(of_direction).fold(0.0, larger)
+    };
+    let of_pair = |pair: &Pair<D>| {
+        let most = session.largest([pair.nodes.iter().map(lack).fold(0.0, larger)])[0];
+        (most > INCLINED).then(|| {
+            format!(
+                "contact.{}: supports hold nodes of {} along a direction that is inclined to it, and not all that they face of {} there: \
+                 stresses beside these nodes may be wrong by up to {} % of the contact pressure; use meshes of both sides that fit \
+                 along this edge, supports at right angles to the boundary, or hold neither side there",
+                pair.contact,
+                names_of_sides(job, pair)[0],
+                names_of_sides(job, pair)[1],
+                Digits(100.0 * most)
+            )
+        })
+    };
+    pairs.iter().filter_map(of_pair).collect()
+}
+
 /// Refuses nodes on the side `on` of a pair that supports hold along the normal, or tangentially where friction acts, and not what they
 /// face; and nodes that belong to another contact. Collective.
 pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
@@ -221,12 +274,8 @@ pub(super) fn refuse_conflicts<const D: usize, const S: usize>(
             if let Some(other) = paired.insert(node.node as usize, pair.contact) {
                 found.get_or_insert((node.node as usize, pair.contact, format!("{ALSO}{other}")));
             }
-            let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
-                let free = |master: u32| norm(&held.free_part(master as usize, direction));
-                let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);
-                let faced = masters.iter().filter(|(master, _)| !node.is_beside(mesh.global_node(*master)));
-                faced.map(|(master, share)| (*share, free(*master))).collect()
-            };
+            let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);
+            let facing = |direction: &Vector<D>| faced_along(body, (node, masters), direction);
             if let Some(why) = conflict(node, held, rubs, facing) {
                 found.get_or_insert((node.node as usize, pair.contact, why.into()));
             }

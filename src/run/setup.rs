@@ -67,6 +67,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     warnings.extend(side_words::warnings_of_changes(&earlier, &body.pairs));
     warnings.extend(side_words::warnings_of_edges(session, job, &body.mesh, &body.pairs)?);
     warnings.extend(side_words::warnings_of_carriers(session, job, &body.pairs));
+    warnings.extend(pairs::warnings_of_inclined_supports(session, job, &body));
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };

@@ -247,7 +247,11 @@ impl FrictionBound for CoefficientFormula {
             let [bound, slope] = [self.bound(speed, pressure, at), self.slope(speed, pressure, at)];
             [c * speed + bound - s, c + slope]
         };
-        let speed = if s == 0.0 { 0.0 } else { increasing_root(0.0, s / c, s / c, open) };
+        let speed = match [Variable::V, Variable::L].iter().any(|variable| self.coefficient.uses(*variable)) {
+            true if s > 0.0 => increasing_root(0.0, s / c, s / c, open),
+            true => 0.0,
+            false => (s - at_rest) / c,
+        };
         let (traction, slope) = (self.bound(speed, pressure, at), self.slope(speed, pressure, at));
         let derivative = 1.0 / (c + slope);
         if c * derivative < STICKS {

@@ -242,8 +242,9 @@ const SMALL: f64 = 1e-6;
 const LAST: f64 = 1e-11;
 /// The same where the rate has no pieces: the next correction is about its square.
 const LAST_IF_SMOOTH: f64 = 1e-7;
-/// Largest size of a logarithm.
+/// Largest size of a logarithm, and less than its number.
 const LARGEST: f64 = 690.0;
+const MOST: f64 = 1e299;
 
 /// Where a step from a stress of this von Mises norm, and this mean and accumulated strain, ends in flow.
 struct End {
@@ -280,13 +281,13 @@ impl Elastic<CreepFormula> {
         last_step: f64,
     ) -> End {
         let mut last = start;
-        let mut equation = |logarithm: f64| {
-            let x = logarithm.exp();
+        // The size of q(x) / (k f), and the derivative of the logarithm of x times it by that of x.
+        let mut evaluate = |x: f64| {
             let (norm, fall) = release.at(x);
             last = self.parameters.at(norm, [mean, accumulated + x * norm]);
             let Rate { rate, by_norm, by_strain } = last;
             // Where nothing is left of the stress, all of it has flowed.
-            let open = if norm > 0.0 { logarithm + (norm / (length * rate)).ln() } else { f64::INFINITY };
+            let open = if norm > 0.0 { norm / (length * rate) } else { f64::INFINITY };
             let relaxed = (by_norm * norm * fall - by_strain * x * norm * (1.0 - fall)) / rate;
             [open, 1.0 - fall + if relaxed.is_finite() { relaxed } else { 0.0 }]
         };
@@ -295,20 +296,33 @@ impl Elastic<CreepFormula> {
         let stiffness = release.stiffness_at_start();
         let growth = length * rate / (1.0 + length * (by_norm * stiffness - by_strain));
         let left = norm - stiffness * growth;
-        let tangent = growth / if left > 0.0 { left } else { norm };
-        let x = root_from(tangent.ln().clamp(-LARGEST, LARGEST), last_step, &mut equation).exp();
+        let tangent = (growth / if left > 0.0 { left } else { norm }).clamp(1.0 / MOST, MOST);
+        let [open, slope] = evaluate(tangent);
+        let excess = tangent * open - 1.0;
+        let x = if excess.abs() <= last_step {
+            tangent * (1.0 - excess / slope)
+        } else {
+            let first = tangent.ln();
+            root_from([first, first + open.ln(), slope], last_step, |logarithm: f64| {
+                let [open, slope] = evaluate(logarithm.exp());
+                [logarithm + open.ln(), slope]
+            })
+            .exp()
+        };
         End::new(x, release.at(x).into(), length, last)
     }
 }
 
-/// The root of an increasing function between two [`LARGEST`], which `function` returns with its derivative: Newton's method from `start`,
-/// up to a step of `last_step`, with
-/// bisection once its steps leave a bracket or do not become half as long.
-fn root_from(start: f64, last_step: f64, function: &mut impl FnMut(f64) -> [f64; 2]) -> f64 {
+/// The root of an increasing function between two [`LARGEST`], which `function` returns with its derivative, given a start with both:
+/// Newton's method up to a step of `last_step`, with bisection once its steps leave a bracket or do not become half as long.
+fn root_from(
+    [start, mut value, mut slope]: [f64; 3],
+    last_step: f64,
+    mut function: impl FnMut(f64) -> [f64; 2],
+) -> f64 {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let (mut at, mut last, mut stride) = (start, f64::INFINITY, 1.0);
     for _ in 0..200 {
-        let [value, slope] = function(at);
         let newton = at - value / slope;
         if (newton - at).abs() <= last_step {
             return newton;
@@ -333,6 +347,7 @@ fn root_from(start: f64, last_step: f64, function: &mut impl FnMut(f64) -> [f64;
         if last <= 2.0 * f64::EPSILON * (1.0 + at.abs()) {
             break;
         }
+        [value, slope] = function(at);
     }
     at
 }
