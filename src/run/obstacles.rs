@@ -20,6 +20,8 @@ use crate::{
 use serde::Serialize;
 use std::collections::BTreeSet;
 
+/// A length of the free part of a normal below this is a rounding error.
+const FREE: f64 = 1e-9;
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
 
@@ -38,6 +40,33 @@ const TURNING: f64 = 1e-3;
 const SHARE_OF_CORNERS: usize = 8;
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// A warning about nodes that slide along a curved obstacle, and that a support moves: where the obstacle is inclined there, the law cannot
+/// act on the prescribed part of the motion. Collective.
+fn warning_of_moved_nodes<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    (number, contact): (usize, &Contact<D>),
+    on: &str,
+) -> Option<String> {
+    if !contact.follows_surface || matches!(contact.obstacle.gap, Gap::Plane(_)) {
+        return None;
+    }
+    let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
+    let is_moved = |node: &usize| {
+        let motion = body.support_motion.as_ref();
+        let moves = motion.is_some_and(|motion| (0..D).any(|i| motion.moves(*node, &axis(i))));
+        moves && (0..D).any(|i| norm(&body.held.free_part(*node, &axis(i))) > FREE)
+    };
+    let count = session.total(contact.normal.nodes().filter(is_moved).count());
+    (count > 0).then(|| {
+        format!(
+            "contact.{number}: a support moves {count} node{} of the boundary {on}, which slides along a curved obstacle: steps fail once the \
+             obstacle is inclined there to the direction of the support; exclude them by the `where` of the contact",
+            if count == 1 { "" } else { "s" }
+        )
+    })
+}
 
 /// Warnings about contacts that can never close because the body lies behind the obstacle, and about bodies that start inside of
 /// one. Collective, with the same warnings on all ranks.
@@ -74,6 +103,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         if !contact.follows_surface {
             out.extend(warning_of_tilt(session, (number, contact), &on, job.time.end));
         }
+        out.extend(warning_of_moved_nodes(session, body, (number, contact), &on));
         out.extend(warning_of_straight_edges(session, &body.mesh, (number, contact), &on)?);
         if deepest > TOO_DEEP * size {
             out.push(format!(
