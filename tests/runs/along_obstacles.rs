@@ -1,6 +1,6 @@
 //! Bodies that slide along rigid obstacles, any distance: `sliding = "finite"`.
 
-use crate::{case::Case, results::relative_difference};
+use crate::{case::Case, launch, results::relative_difference};
 
 /// A block of 20 mm before this obstacle, with its lower side, whose middle is at this place, and this velocity along x.
 fn block(obstacle: &str, [x, y]: [f64; 2], speed: f64) -> Case {
@@ -201,6 +201,23 @@ fn an_obstacle_that_a_block_pushes_aside_gains_the_energy_that_the_block_loses()
     let moving = history.last("kinetic_energy") + history.last("obstacle_kinetic_energy");
     let expected = -0.4 * 9.81 * fallen;
     assert!(fallen < -5e-3 && (moving / expected - 1.0).abs() < 0.02, "{moving} J of {expected} J");
+}
+
+#[test]
+fn nodes_that_a_support_moves_along_a_curved_obstacle_are_warned_of() {
+    let pushed = |obstacle: &str| {
+        let case = block(obstacle, [0.0, 5e-5], 0.0);
+        let case = case.set("support", "[{ on = ['left'], fix = ['x'], velocity = [0.1] }]");
+        let job = case.without("initial").written();
+        launch::unwrapped(&launch::run(2, &["check", job.to_str().expect("a path")]).expect(0).stdout)
+    };
+    let bowl = pushed("sphere = { centre = [0.0, 1.0], radius = 1.0, hollow = true }");
+    assert!(
+        bowl.contains("a support moves 1 node of the boundary bottom, which slides along a curved"),
+        "{bowl}"
+    );
+    let plane = pushed("plane = { point = [0.0, 0.0], normal = [0.0, 1.0] }");
+    assert!(!plane.contains("a support moves"), "{plane}");
 }
 
 #[test]

@@ -547,6 +547,29 @@ fn uniform_stress_passes_through_tilted_meshes_with_opposite_forces_and_moments(
     }
 }
 
+#[test]
+fn supports_inclined_to_a_contact_whose_meshes_do_not_fit_are_warned_of() {
+    let words = |slope: f64, ranks: usize| {
+        let case = cubes().without("mesh.box").set("mesh.file", "'blocks.msh'").without("region").set(
+            "support",
+            "[{ on = ['lower.bottom'], fix = 'all' }, { on = ['lower.left', 'upper.left'], fix = ['x'] }]",
+        );
+        write_tilted_blocks(&case.folder().join("blocks.msh"), [slope, 0.0]);
+        let job = case.written();
+        launch::unwrapped(&launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0).stdout)
+    };
+    for ranks in [1, 2, 3] {
+        let found = words(0.4, ranks);
+        assert!(
+            found.contains("supports hold nodes of upper.bottom along a direction that is inclined to it"),
+            "{found}"
+        );
+    }
+    // At right angles to the boundary they are exact.
+    let flat = words(0.0, 2);
+    assert!(!flat.contains("that is inclined to it"), "{flat}");
+}
+
 /// The integral over x of a column of the last profile along a boundary, by the rule that contact has there: of linear cells the trapezoidal
 /// rule, of quadratic ones Simpson's.
 fn integral(results: &Results, (boundary, column): (&str, &str), order: &str) -> f64 {
