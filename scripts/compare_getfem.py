@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Contact between two deformable bodies, beside GetFEM on the same meshes: the tables of docs/verification/two-bodies-getfem.md.
 
-    /usr/bin/python3 scripts/compare_getfem.py [--write] [patch] [cylinders] [friction] [spheres]
+    /usr/bin/python3 scripts/compare_getfem.py [--write] [patch] [cylinders] [friction]
 
 Each case writes a mesh file, which both programs read, runs the solver (SOLVER, target/release/solver by default) on one rank and GetFEM's
 Python interface on one thread, and prints a table; `--write` puts it into the page. On Debian and Ubuntu, GetFEM and what reads the
@@ -41,32 +41,23 @@ BODIES = ("lower", "upper")
 # Meshes
 
 
-# The pairs of corners between which Gmsh has the middle nodes of quadratic cells and facets, by the number of corners.
-MIDDLES = {3: ((0, 1), (1, 2), (2, 0)), 4: ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3))}
-
-
-def grid(name, shares, place, order=1):
+def grid(name, shares, place):
     """Triangles or tetrahedra of the image of the unit square or cube under `place`, with cells between these shares of its sides, and
-    the facets of its sides by name. Cells and facets of order 2, in space alone, have middle nodes on the image."""
+    the facets of its sides by name."""
     dimension = len(shares)
-    if order == 2:
-        shares = [sorted([*one, *((a + b) / 2 for a, b in zip(one, one[1:]))]) for one in shares]
     counts = [len(one) for one in shares]
     index = lambda at: sum(i * int(np.prod(counts[:axis])) for axis, i in enumerate(at))
     nodes = [place(*(one[i] for one, i in zip(shares, reversed(at)))) for at in np.ndindex(*reversed(counts))]
     sides = (("left", "right"), ("front", "back"), ("bottom", "top"))
     sides = sides if dimension == 3 else (sides[0], sides[2])
 
-    def numbers(corners):
-        middles = [tuple((a + b) // 2 for a, b in zip(corners[i], corners[j])) for i, j in MIDDLES[len(corners)]] if order == 2 else []
-        return [index(at) for at in (*corners, *middles)]
-
+    numbers = lambda corners: [index(at) for at in corners]
     cells, facets = [], {f"{name}_{side}": [] for pair in sides for side in pair}
-    for first in np.ndindex(*((count - 1) // order for count in counts)):
+    for first in np.ndindex(*(count - 1 for count in counts)):
         for axes in permutations(range(dimension)):
-            corners = [tuple(order * i for i in first)]
+            corners = [first]
             for axis in axes:
-                corners.append(tuple(i + order * (a == axis) for a, i in enumerate(corners[-1])))
+                corners.append(tuple(i + (a == axis) for a, i in enumerate(corners[-1])))
             for axis in range(dimension):
                 for end, side in zip((0, counts[axis] - 1), sides[axis]):
                     on = [at for at in corners if at[axis] == end]
@@ -85,7 +76,7 @@ def write_mesh(path, grids):
     for name, one in grids.items():
         for group, parts in [*one["facets"].items(), (name, one["cells"])]:
             groups[group] = len(groups) + 1
-            kind = {2: 1, 3: 2, 4: 4, 6: 9, 10: 11}[len(parts[0])]
+            kind = {2: 1, 3: 2, 4: 4}[len(parts[0])]
             tag = groups[group]
             elements += [f"{kind} 2 {tag} {tag} " + " ".join(str(len(nodes) + 1 + node) for node in part) for part in parts]
         nodes += [" ".join(f"{axis:.15g}" for axis in (*place, 0.0)[:3]) for place in one["nodes"]]
@@ -203,7 +194,7 @@ class Peer:
 
     def multiplier(self, components=1, start=0.0):
         """The multiplier: the contact pressure, or the traction of the lower body on the upper one. It has the order of the displacement
-        in the plane and is linear in space, where quadratic ones oscillate (largest pressures of spheres 100 to 250 % off)."""
+        in the plane and is linear in space."""
         self.pressures = gf.MeshFem(self.meshes["upper"], components)
         self.pressures.set_classical_fem(self.order if self.dimension == 2 else 1)
         self.model.add_filtered_fem_variable("p", self.pressures, self.groups["upper_bottom"])
@@ -229,8 +220,7 @@ class Peer:
 
     def across(self):
         """The point of the lower body below a point of the upper one: the interface of the undeformed lower body is flat, at 0."""
-        below = "[X(1);0]" if self.dimension == 2 else "[X(1);X(2);0]"
-        self.model.add_interpolate_transformation_from_expression("across", self.meshes["upper"], self.meshes["lower"], below)
+        self.model.add_interpolate_transformation_from_expression("across", self.meshes["upper"], self.meshes["lower"], "[X(1);0]")
 
     def contact(self, r, gap, start, parts=1):
         """The same formulation with a given gap, in the language of weak forms."""
@@ -425,7 +415,7 @@ def patches():
 
 
 class Hertz:
-    """Blocks with the gap of cylinders or spheres between them, and what both programs are measured by."""
+    """Blocks with the gap of cylinders between them, and what both programs are measured by."""
 
     RADIUS, NU, HALF_WIDTH = 1.2, 0.3, 0.05
 
@@ -589,64 +579,6 @@ def friction():
     return table
 
 
-def spheres():
-    """A quarter of two spheres of different moduli under a given force; the curvature of both is in quadratic cells of the upper block."""
-    hertz = Hertz({"lower": 3e9, "upper": 1e9})
-    a, side = hertz.HALF_WIDTH, 0.5
-    largest, force = 2 * hertz.modulus * a / (pi * hertz.RADIUS), 4 * hertz.modulus * a**3 / (3 * hertz.RADIUS)
-    table = [["cells", "program", "largest pressure", "pressure, mean square", "force", "Newton", "seconds", "displacements"]]
-
-    def line(name, program, profile, reached, counts, apart=None):
-        places, pressures = profile
-        near = np.hypot(*places.T) < 1.5 * a
-        exact = largest * np.sqrt(np.maximum(1 - (np.hypot(*places[near].T) / a) ** 2, 0))
-        errors = [pressures.max() / largest - 1, sqrt(np.mean((pressures[near] - exact) ** 2)) / largest, abs(reached / (force / 4) - 1)]
-        shown = [f"{errors[0]:+.1e}", f"{errors[1]:.1e}", f"{errors[2]:.1e}", str(counts[0]), f"{counts[1]:.1f}"]
-        table.append([name, program, *shown, "" if apart is None else f"{apart:.1e}"])
-
-    def curved(u, v, w):
-        # Beyond 6 a, where nothing touches, the gap is constant.
-        u, v = side * u, side * v
-        gap = min(u**2 + v**2, 36 * a**2) / (2 * hertz.RADIUS)
-        return (u, v, gap + (side - gap) * w)
-
-    for cells in (6, 8):
-        flat = [graded(cells, 2.5)] * 2
-        fine = [graded(cells + 1, 2.5)] * 3
-        grids = {
-            "lower": grid("lower", [*flat, toward_end(flat[0])], lambda u, v, w: (side * u, side * v, side * (w - 1)), 2),
-            "upper": grid("upper", fine, curved, 2),
-        }
-        with tempfile.TemporaryDirectory() as folder:
-            mesh = Path(folder) / "bodies.msh"
-            groups = write_mesh(mesh, grids)
-            held = [(f"{body}_{side}", axis) for body in BODIES for axis, side in enumerate(("left", "front"))]
-            held.append(("lower_bottom", 2))
-            load = ("upper_top", [0.0, 0.0, -force / (2 * side) ** 2])
-            job = head(2, hertz.moduli, hertz.NU, dimension=3) + time_of(1.0, 1.0)
-            job += "".join(support(*one) for one in held) + traction(*load) + PROFILE
-            out, summary, seconds = fastest(lambda: run_solver(Path(folder), job))
-            x, y, pressures = numbers(out, "x", "y", "contact_pressure")
-            reached = resultant(out, "contact upper_bottom", "force_z")
-            counts = (summary["newton_iterations"], seconds)
-            line(f"{cells}³ and {cells + 1}³", "Clarke", (np.array([x, y]).T, pressures), reached, counts)
-
-            def solved():
-                peer = Peer(mesh, groups, 2, hertz.moduli, hertz.NU)
-                for one in held:
-                    peer.fix(*one)
-                peer.load(*load)
-                peer.contact(hertz.augmentation, "X(3)", largest)
-                peer.solve()
-                return peer, peer.seconds
-
-            peer, _ = fastest(solved)
-            places, pressures = peer.profile()
-            apart = difference(Fields(out, 3), peer)
-            line("", "GetFEM", (places[:, :2], pressures[:, 0]), peer.force(), (peer.iterations, peer.seconds), apart)
-    return table
-
-
 # Tables
 
 
@@ -676,7 +608,7 @@ def write_table(name, text):
 
 
 def main(arguments):
-    cases = {"patch": patches, "cylinders": cylinders, "friction": friction, "spheres": spheres}
+    cases = {"patch": patches, "cylinders": cylinders, "friction": friction}
     chosen = [one for one in arguments if one != "--write"] or list(cases)
     if not set(chosen) <= set(cases):
         sys.exit(__doc__)
