@@ -93,6 +93,32 @@ fn a_pair_of_quadratic_cells_that_full_steps_turn_round_takes_few_iterations() {
     assert!(found <= 30.0, "{found} iterations");
 }
 
+/// Loads carry a stiff body on soft springs far along a sphere: full steps let its nodes touch and part in turn, and a descent ends at kinks.
+#[test]
+fn a_body_on_soft_springs_that_is_carried_along_a_sphere_takes_few_iterations() {
+    let case = Case::written_as(
+        "
+        mesh.rectangle = {size = [0.2, 0.1], cells = [12, 6]}
+        time = {scheme = 'implicit_euler', end = 0.06, step = 0.02}
+        traction = [{on = ['top'], value = [2e5, '-2e5*sin(9*t)']}]
+        [material]
+        hypothesis = 'plane_stress'
+        density = 1000.0
+        elasticity = {youngs_modulus = 1e8, poisson_ratio = 0.3}
+        viscosity = {volumetric = 2e4, shear = 4e4}
+        [[support]]
+        on = ['left', 'right']
+        where = 'y > 0.03'
+        stiffness = {normal = 5e6, tangential = 1e6}
+        [[contact]]
+        on = ['bottom']
+        normal.unilateral = {}
+        obstacle.sphere = {centre = ['0.09 + 0.01*t', -0.5], radius = 0.5}",
+    );
+    let found = case.run(1).number("newton_iterations");
+    assert!(found <= 60.0, "{found} iterations");
+}
+
 /// A force moves an obstacle at about the cost of its motion if it is prescribed.
 #[test]
 fn an_obstacle_moved_by_a_force_takes_as_many_iterations_as_one_whose_motion_is_given() {
