@@ -71,11 +71,11 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     pub(super) fn open(
         session: &Session,
         contents: Contents<D>,
-        body: &Body<D, S>,
-        state: &State,
+        simulation: &Simulation<D, S>,
         log: &mut Log,
     ) -> Result<Self> {
         let start = Instant::now();
+        let Simulation { body, state, totals, .. } = simulation;
         let Contents { job, identity, mut probes, is_restart } = contents;
         let folder = job.output_folder().to_owned();
         let before = if is_restart && session.is_first() { length_of_all(&folder) } else { 0 };
@@ -87,9 +87,9 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let (every, profiles_every) = (job.output.fields.clone(), job.output.profiles.clone());
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);
         let rewrites = if profiles_every.is_some() {
-            due(&profiles_every, state)
+            due(&profiles_every, state, totals)
         } else {
-            due(&every, state) && !is_there
+            due(&every, state, totals) && !is_there
         };
         let before_rewritten = |time: f64| if rewrites { time.next_down() } else { time };
         let profiled = time.map(before_rewritten);
@@ -156,16 +156,22 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         } else if !self.probes.is_empty() {
             self.probes.write::<S>(session, state, None)?;
         }
-        self.write_state(session, body, state, [due(&self.every, state), due(&self.profiles_every, state)])?;
+        self.write_state(
+            session,
+            body,
+            state,
+            [due(&self.every, state, totals), due(&self.profiles_every, state, totals)],
+        )?;
         self.fields.write_out_if_due()?;
         self.spent += start.elapsed();
         Ok(())
     }
 
     /// Writes the fields and profiles of the initial state, if they are due and not in their files yet. Collective.
-    pub(super) fn at_start(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
-        let fields = self.lacks_fields(state) && due(&self.every, state);
-        let profiles = self.lacks_profiles(state) && due(&self.profiles_every, state);
+    pub(super) fn at_start(&mut self, session: &Session, simulation: &Simulation<D, S>) -> Result<()> {
+        let Simulation { body, state, totals, .. } = simulation;
+        let fields = self.lacks_fields(state) && due(&self.every, state, totals);
+        let profiles = self.lacks_profiles(state) && due(&self.profiles_every, state, totals);
         self.write_state(session, body, state, [fields, profiles])
     }
 
@@ -308,9 +314,9 @@ fn length(path: &Path) -> u64 {
 }
 
 /// Whether output of this state is due; that of the initial state always is, unless the job lists the times.
-fn due(every: &Option<Every>, state: &State) -> bool {
+fn due(every: &Option<Every>, state: &State, totals: &Totals) -> bool {
     let times = [state.time - state.step_length, state.time];
-    every.as_ref().is_some_and(|every| is_due(every, state.step, times))
+    every.as_ref().is_some_and(|every| is_due(every, totals.whole_steps(state.step), times))
 }
 
 /// Whether the step just taken reached one of these times.
@@ -324,13 +330,14 @@ fn is_among(listed: &[f64], [before, after]: [f64; 2]) -> bool {
     listed.iter().any(|time| *time > before + close && *time <= after + close)
 }
 
-/// Whether output is due after this step, which went from the time `before` to `after` in s.
-fn is_due(every: &Every, step: u64, [before, after]: [f64; 2]) -> bool {
+/// Whether output is due after this number of whole steps, if one has ended, the last of which or a part of it went from the time `before`
+/// to `after` in s.
+fn is_due(every: &Every, step: Option<u64>, [before, after]: [f64; 2]) -> bool {
     match every {
-        Every::At(listed) if step == 0 => listed.first() == Some(&0.0),
+        Every::At(listed) if step == Some(0) => listed.first() == Some(&0.0),
         Every::At(listed) => is_among(listed, [before, after]),
-        _ if step == 0 => true,
-        Every::Every(steps) => step.is_multiple_of(*steps),
+        _ if step == Some(0) => true,
+        Every::Every(steps) => step.is_some_and(|step| step.is_multiple_of(*steps)),
         Every::Interval(interval) => {
             let count = |time: f64| (time / interval * (1.0 + 1e-12)).floor();
             count(after) > count(before)
@@ -360,17 +367,18 @@ mod tests {
 
     #[test]
     fn multiples_of_an_interval_that_rounding_misses_are_due() {
-        let tenths = |times| is_due(&Every::Interval(0.1), 5, times);
+        let tenths = |times| is_due(&Every::Interval(0.1), Some(5), times);
         assert!(0.3 / 0.1 < 3.0 && tenths([0.2, 0.3]), "0.3 is a multiple of 0.1");
         assert!(!tenths([0.3, 0.35]) && tenths([0.35, 0.45]) && tenths([0.2, 0.75]));
-        assert!(is_due(&Every::Interval(0.1), 0, [0.0; 2]) && is_due(&Every::Every(3), 0, [0.0; 2]));
-        assert!(is_due(&Every::Every(3), 6, [0.0; 2]) && !is_due(&Every::Every(3), 7, [0.0; 2]));
+        let third = |step| is_due(&Every::Every(3), step, [0.0; 2]);
+        assert!(is_due(&Every::Interval(0.1), Some(0), [0.0; 2]) && third(Some(0)));
+        assert!(third(Some(6)) && !third(Some(7)) && !third(None));
     }
     #[test]
     fn listed_times_are_due_once_in_the_step_that_ends_there() {
         let at = Every::At(vec![0.3, 0.5]);
         let steps = [[0.2, 0.1 + 0.2], [0.1 + 0.2, 0.45], [0.45, 0.5], [0.5, 0.6]];
-        assert_eq!(steps.map(|times| is_due(&at, 3, times)), [true, false, true, false]);
-        assert!(!is_due(&at, 0, [0.0; 2]) && is_due(&Every::At(vec![0.0]), 0, [0.0; 2]));
+        assert_eq!(steps.map(|times| is_due(&at, Some(3), times)), [true, false, true, false]);
+        assert!(!is_due(&at, Some(0), [0.0; 2]) && is_due(&Every::At(vec![0.0]), Some(0), [0.0; 2]));
     }
 }

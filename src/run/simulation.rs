@@ -18,11 +18,13 @@ use crate::{
     linear_algebra::{petsc::DistributedVector, sparse::Precision, tensor::larger},
     mesh::{GlobalMesh, Mesh},
     parallel::{agreement::Agreed, session::Session},
-    solver::stepping::{Adaptive, Landings, StepOutcome, Stepper},
+    solver::stepping::{Adaptive, Landing, Landings, StepOutcome, Stepper, TIME_TOLERANCE},
 };
 
 /// Imbalances of energy below this share of the energy turned over are not looked into.
 const BALANCED: f64 = 1e-9;
+/// The shortest part of a fixed step that is divided, as a share of it.
+const SHORTEST_PART: f64 = 1.0 / 256.0;
 /// Rounding errors of energies as a share of those that cancel.
 const ROUNDING: f64 = 1e-14;
 
@@ -93,16 +95,17 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             return Ok(None);
         }
         let target = landings.next([state.time, state.step_length]);
+        scheme.turnover = totals.turnover;
         let was_single = scheme.solver.factor_precision() == Some(Precision::Single);
         let outcome = if let Some(adaptive) = adaptive {
             let outcome = adaptive.advance(session, scheme, body, state, target);
             totals.step_level = Some(adaptive.step_level);
             outcome
         } else {
-            let step = landings.fixed_step([state.time, state.step_length], target);
-            let landed_on = target.name.filter(|_| step.time == target.time);
-            let outcome = session.agree(scheme.advance(session, body, state, step));
-            outcome.map(|outcome| StepOutcome { landed_on, ..outcome })
+            let parts = Parts { landings, target, divided_until: &mut totals.divided_until };
+            let outcome = parts.advance(session, scheme, body, state);
+            totals.parts += u64::from(totals.divided_until.is_some());
+            outcome
         };
         let mut outcome = outcome.inspect_err(|_| totals.add_work(scheme.take_work()))?;
         let before = *totals;
@@ -134,6 +137,56 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             totals.max_rate_share = Some(totals.max_rate_share.map_or(most, |max| larger(max, most)));
         }
         Ok(Some(outcome))
+    }
+}
+
+/// A fixed step, or what is left of one that was divided.
+struct Parts<'a> {
+    landings: &'a Landings,
+    /// Where the whole step ends at the latest.
+    target: Landing,
+    /// The end of a divided step in s, from its first part to its last one.
+    divided_until: &'a mut Option<f64>,
+}
+
+impl Parts<'_> {
+    /// Takes the step, or its next part, and commits it. A step that generates the energy of failing bonds or damage is halved, as are its
+    /// parts that have no solution; after a part that was taken the next one is at most twice as long. Collective.
+    fn advance<const D: usize, const S: usize>(
+        self,
+        session: &Session,
+        scheme: &mut Stepper,
+        body: &mut Body<D, S>,
+        state: &mut State,
+    ) -> Result<StepOutcome, Agreed> {
+        let Self { landings, mut target, divided_until } = self;
+        let shortest = SHORTEST_PART * landings.length;
+        let times = [state.time, state.step_length];
+        if let Some(end) = *divided_until {
+            let part = (state.time + 2.0 * state.step_length).min(end);
+            if part < target.time - shortest * TIME_TOLERANCE {
+                target = Landing { time: part, name: None, ..target };
+            }
+        }
+        loop {
+            let step = landings.fixed_step(times, target);
+            let attempt = session.agree(scheme.attempt(session, body, state, step));
+            let may_halve = 0.5 * step.length >= shortest;
+            let is_halved = match &attempt {
+                Ok(_) => may_halve && session.agree(scheme.generates_failure(session, body, state, step))?,
+                Err(error) => may_halve && divided_until.is_some() && error.is_failure(),
+            };
+            if is_halved {
+                divided_until.get_or_insert(step.time);
+                target = Landing { time: state.time + 0.5 * step.length, name: None, ..target };
+                continue;
+            }
+            let mut outcome = attempt?;
+            session.agree(scheme.accept(session, body, state, step, &mut outcome))?;
+            *divided_until = divided_until.filter(|end| state.time < *end);
+            outcome.landed_on = target.name.filter(|_| step.time == target.time);
+            return Ok(outcome);
+        }
     }
 }
 

@@ -92,10 +92,9 @@ pub(super) fn run<const D: usize, const S: usize>(
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = restored.as_ref().map(|restored| restored.totals);
     let simulation = Simulation::start(session, job, Prepared { body, state, scheme }, totals)?;
-    let (body, state) = (&simulation.body, &simulation.state);
     let contents = Contents { job, identity, probes, is_restart };
-    let mut outputs = session.agree(Outputs::open(session, contents, body, state, &mut log))?;
-    session.agree(outputs.at_start(session, body, state))?;
+    let mut outputs = session.agree(Outputs::open(session, contents, &simulation, &mut log))?;
+    session.agree(outputs.at_start(session, &simulation))?;
     let setup = clock.began.elapsed() - clock.launched;
     let columns = ShownColumns {
         contact: !simulation.body.contacts.is_empty(),
@@ -103,7 +102,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         newton: simulation.scheme.solver.is_nonlinear(),
         iterative: simulation.scheme.solver.preconditioner().0 != Preconditioner::Cholesky,
     };
-    let stepping = (Instant::now(), state.step);
+    let stepping = (Instant::now(), simulation.state.step);
     let deadline = Deadline::new(session, job, clock);
     deadline.log_limit(&mut log);
     let mut run = Run {
@@ -172,7 +171,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// Steps to the end, to a request to stop, or to a failure. Collective.
     fn advance(&mut self) -> Result<Ended> {
         let Simulation { state, landings, .. } = &self.simulation;
-        let last = state.step + landings.steps_after(state.time, self.job.time.step);
+        let mut last = state.step + landings.steps_after(state.time, self.job.time.step);
         if !self.clock.logs_every_step {
             self.log.start_progress(last, state.step);
         }
@@ -193,11 +192,13 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.cover_steps()?;
             self.cover_strains()?;
             refuse_uncertified(&self.certificates, &outcome, self.simulation.state.time)?;
-            let Simulation { state, landings, adaptive, .. } = &self.simulation;
+            let Simulation { state, landings, adaptive, totals, .. } = &self.simulation;
             self.outputs.after_step(self.session, &self.simulation, &outcome)?;
             let has_steps_left = state.time < landings.end;
-            let steps_left = landings.steps_after(state.time, state.step_length);
-            let last = if adaptive.is_some() { state.step + steps_left } else { last };
+            if adaptive.is_some() || totals.divided_until.is_some() {
+                let length = if adaptive.is_some() { state.step_length } else { self.job.time.step };
+                last = state.step + landings.steps_after(state.time, length);
+            }
             self.report(&outcome, last);
             self.refuse_growth()?;
             let request = self.pending_request(saved_at);

@@ -954,6 +954,58 @@ fn bonds_hold_a_strip_whose_cells_yield() {
     assert!((whole / quarters - 1.0).abs() < 1e-7 && (whole - 472.6).abs() < 0.1, "{whole} {quarters} N");
 }
 
+/// A block that is pulled off its bonds all at once.
+const PULLED_OFF: &str = "
+    mesh.rectangle = {size = [0.2, 0.05], cells = [4, 1]}
+    time = {end = 1.0, step = 0.5, scheme = 'implicit_euler'}
+    [material]
+    hypothesis = 'plane_stress'
+    elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.0}
+    [[support]]
+    on = ['top']
+    fix = ['y']
+    displacement = ['1e-3*t']
+    [[support]]
+    on = ['left']
+    fix = ['x']
+    [[contact]]
+    on = ['bottom']
+    normal.unilateral = {}
+    adhesion = {stiffness = 1e11, energy = 10.0, strength = 2e5}";
+
+#[test]
+fn a_step_that_would_generate_the_energy_of_breaking_bonds_is_divided() {
+    for (ranks, adaptive) in [(1, false), (2, false), (1, true)] {
+        let case = Case::written_as(PULLED_OFF);
+        let case = match adaptive {
+            true => case.set("time.adaptive", "{smallest_step = 1e-4, largest_step = 0.5, tolerance = 0.5}"),
+            false => case,
+        };
+        let kept = case
+            .set("checkpoint", "{every = 1, keep = 100}")
+            .set("output.fields", "{every = 1}")
+            .run_and_keep(ranks);
+        let results = kept.results();
+        let history = results.table("history.csv");
+        // 0.2 m^2 of bonds, all of which break in the first step, which does no work as a whole.
+        let [work, dissipated] = ["external_work", "adhesion_dissipation"].map(|column| history.last(column));
+        assert!(
+            (dissipated - 2.0).abs() < 1e-9 && (work / dissipated - 1.0).abs() < 0.2,
+            "{work} of {dissipated} J/m"
+        );
+        if adaptive {
+            continue;
+        }
+        let fields = NumberFile::open(&results.path("fields.vtkhdf"));
+        assert_eq!(fields.times(), [0.0, 0.5, 1.0], "the whole steps end where they would");
+        // Within the step that is divided.
+        let from = results.path("checkpoint-2.h5");
+        let straight = results.text("history.csv");
+        kept.run_with(ranks, &["--restart", from.to_str().expect("a path")]).expect(0);
+        assert_eq!(straight, kept.results().text("history.csv"), "restarted on {ranks} ranks");
+    }
+}
+
 /// A massless layer on a law that jumps and falls.
 const FALLING: &str = "
     mesh.rectangle = {size = [1.0, 0.5], cells = [1, 1]}

@@ -91,6 +91,10 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+fn is_none(count: &u64) -> bool {
+    *count == 0
+}
+
 /// Sums and maxima over the steps of a run; saved in checkpoints.
 ///
 /// Energies are in J (J/m in the plane).
@@ -161,6 +165,12 @@ pub struct Totals {
     pub steps_with_several: u64,
     /// Largest number of different solutions of a step.
     pub most_solutions: u64,
+    /// The end in s of a fixed step of which a part was taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub divided_until: Option<f64>,
+    /// Number of steps that were parts of fixed ones, without the last part of each.
+    #[serde(skip_serializing_if = "is_none")]
+    pub parts: u64,
     /// The level of adaptive steps.
     #[serde(default)]
     #[serde(rename = "pace")]
@@ -192,6 +202,11 @@ impl Totals {
             turnover += energy[kind];
         }
         Self { energy: stored, supplied: turnover, turnover, ..Self::default() }
+    }
+
+    /// The number of fixed steps that this many steps make, with their parts; `None` within a fixed step.
+    pub fn whole_steps(&self, steps: u64) -> Option<u64> {
+        self.divided_until.is_none().then(|| steps - self.parts)
     }
 
     /// Takes rounding errors in J of energies that cancel out of the imbalance of the step just added; these are the totals `before` it.

@@ -27,7 +27,10 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Blend, CONTACT, ENERGIES, Energy, Evaluation, Form, NUMERICAL, Peaks, Role, Step, VISCOUS},
+        effect::{
+            Blend, CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, Evaluation, Form, NUMERICAL, Peaks, Role,
+            Step, VISCOUS,
+        },
         resultants::BalancedMotion,
         space::Nodal,
         state::State,
@@ -194,6 +197,11 @@ impl Integrator {
         };
         body.add_implicit_energy(nodal, self.blend.balanced(step), &mut self.solved);
         Ok(())
+    }
+
+    /// The energies in J that damage and bonds on this rank dissipate in the step just finished, and that the effects count as generated.
+    pub(super) fn failed_and_generated(&self) -> [f64; 2] {
+        [self.solved[DAMAGE] + self.solved[DEBONDING], self.solved[NUMERICAL]]
     }
 
     /// Commits the solved velocity to the state. Collective.

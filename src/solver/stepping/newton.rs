@@ -208,7 +208,6 @@ impl Newton {
         }
         let multiply = |x: &DistributedVector, y: &mut DistributedVector| system.matrix.multiply(x, y);
         self.obstacles.start(session, contacts, equations.velocity, system.tolerance, multiply)?;
-        self.set_linear_tolerances(equations, 1.0)?;
         write_steepest_decreases(session, contacts, &mut self.steepest_decreases);
         Ok(())
     }
@@ -351,8 +350,9 @@ impl Newton {
         sharpness: f64,
     ) -> Result<Option<String>> {
         self.has_descended = search.minimises();
-        if self.has_descended {
-            self.prepare_descent(problem, equations)?;
+        match self.has_descended {
+            true => self.prepare_descent(problem, equations)?,
+            false => self.set_linear_tolerances(equations, sharpness)?,
         }
         write_unknowns(&problem.body.contacts, equations.velocity)?;
         let solved = self.search(problem, equations, search, sharpness);

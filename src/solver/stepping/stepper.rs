@@ -36,6 +36,11 @@ use std::time::Instant;
 /// Residuals of the start of a step beyond this multiple of its forces are those of supports that have moved ahead of the body.
 const FAR: f64 = 1e3;
 
+/// Share of what damage and bonds dissipate up to which a step may generate the energy for it.
+const LARGEST_SHARE_GENERATED: f64 = 0.2;
+/// Share of the energy turned over below which what they dissipate does not matter.
+const NEGLIGIBLE_SHARE: f64 = 0.01;
+
 /// The choices of a job that determine a [`Stepper`].
 #[derive(Debug, Clone, Copy)]
 pub struct StepperSettings<'a> {
@@ -60,6 +65,10 @@ pub struct Stepper {
     load_is_current: bool,
     /// Powers in W at the end of the last step, over all ranks.
     pub powers: Energy,
+    /// The largest energy in J before the next step.
+    pub turnover: f64,
+    /// Work space for a product with the elastic part of the matrix, of bodies without mass that soften.
+    product: Option<DistributedVector>,
     right_hand_side: DistributedVector,
     moving_supports: Option<MovingSupports>,
     force_scale: ForceScale,
@@ -130,6 +139,11 @@ impl Stepper {
             load: if body.is_loaded() { Some(state.velocity.like()?) } else { None },
             load_is_current: false,
             powers: Energy::default(),
+            turnover: 0.0,
+            product: match body.softens() && !body.has_form(Form::Mass) {
+                true => Some(state.velocity.like()?),
+                false => None,
+            },
             right_hand_side: state.velocity.like()?,
             moving_supports: MovingSupports::new(body, state)?,
             force_scale: ForceScale::new(body, &state.velocity)?,
@@ -202,6 +216,38 @@ impl Stepper {
             self.clock.first_assembly = self.clock.assembly;
         }
         Ok(())
+    }
+
+    /// Whether the last attempted step generates much of the energy that damage and bonds of a body without mass dissipate in it, as one in
+    /// which bonds break as a whole. Where they fail as fast as energy is supplied or released, as in jumps, a step dissipates energy.
+    /// Collective.
+    ///
+    /// A step of implicit Euler generates what the effects count, less the `k^2/2 v . E v` that elastic stresses at its end dissipate.
+    pub fn generates_failure<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<bool> {
+        if self.product.is_none() {
+            return Ok(false);
+        }
+        self.finish(body, state, step)?;
+        let [failed, counted] = session.sum(self.integrator.failed_and_generated());
+        if failed <= NEGLIGIBLE_SHARE * self.turnover || counted <= LARGEST_SHARE_GENERATED * failed {
+            return Ok(false);
+        }
+        let Some(product) = &mut self.product else { return Ok(false) };
+        self.trial.update_ghosts()?;
+        {
+            let (velocity, mut product) = (self.trial.local()?, product.local_mut()?);
+            product.fill(0.0);
+            body.add_form_of_matrix(Form::Elasticity, &velocity, &mut product);
+        }
+        product.add_ghosts_to_owners()?;
+        let dissipated = 0.5 * step.length * step.length * product.dot(&self.trial)?;
+        Ok(counted - dissipated > LARGEST_SHARE_GENERATED * failed)
     }
 
     /// Takes a step and commits it; on failure the state is unchanged. Collective.

@@ -30,7 +30,6 @@ impl Newton {
                 break;
             }
             let sharpness = SHARPER.powi(times);
-            self.set_linear_tolerances(equations, sharpness)?;
             self.scratch.restart();
             // Where rounding errors end it, its last iterate is a solution with the residual of a search that is not sharper; otherwise it
             // is none, even if it is on the graphs.
