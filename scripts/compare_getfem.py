@@ -584,8 +584,9 @@ def friction():
 
 def markdown(table):
     first, *others = table
-    lines = [first, [":--"] + [":--" if cell == "program" else "--:" for cell in first[1:]], *others]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    rule = "|---|" + "".join("---|" if cell == "program" else "--:|" for cell in first[1:])
+    rows = ["| " + " | ".join(line) + " |" for line in [first, *others]]
+    return "\n".join([rows[0], rule, *rows[1:]])
 
 
 def machine():
