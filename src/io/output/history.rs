@@ -91,7 +91,7 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-fn is_none(count: &u64) -> bool {
+fn is_no_part(count: &u64) -> bool {
     *count == 0
 }
 
@@ -169,7 +169,7 @@ pub struct Totals {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub divided_until: Option<f64>,
     /// Number of steps that were parts of fixed ones, without the last part of each.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "is_no_part")]
     pub parts: u64,
     /// The level of adaptive steps.
     #[serde(default)]

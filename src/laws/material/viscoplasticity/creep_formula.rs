@@ -353,8 +353,8 @@ fn root_from(
 }
 
 /// Bounds of derivatives are found for stresses up to `2^(k / PARTS)` times the reference stress, for `k` in this range.
-const PARTS: f64 = 16.0;
-const LEVELS: std::ops::Range<i32> = -160..480;
+const PARTS: f64 = 64.0;
+const LEVELS: std::ops::Range<i32> = -640..1920;
 
 impl Flow for Elastic<CreepFormula> {
     #[inline(always)]
