@@ -207,8 +207,9 @@ fn an_obstacle_that_a_block_pushes_aside_gains_the_energy_that_the_block_loses()
 fn nodes_that_a_support_moves_along_a_curved_obstacle_are_warned_of() {
     let pushed = |obstacle: &str| {
         let case = block(obstacle, [0.0, 5e-5], 0.0);
-        let case = case.set("support", "[{ on = ['left'], fix = ['x'], velocity = [0.1] }]");
-        let job = case.without("initial").written();
+        let case =
+            case.set("support", "[{ on = ['left'], fix = ['x'], velocity = [0.1] }]").without("initial");
+        let job = case.written();
         launch::unwrapped(&launch::run(2, &["check", job.to_str().expect("a path")]).expect(0).stdout)
     };
     let bowl = pushed("sphere = { centre = [0.0, 1.0], radius = 1.0, hollow = true }");

@@ -515,6 +515,14 @@ mod tests {
         let (stress, wanted) = (law.stress(&strain), law.tangent(&strain));
         assert!((0..6).all(|c| (mean[c] - stress[c]).abs() < 1e-11), "{mean:?}");
         assert!((0..6).all(|c| (tangent[0][c] - wanted[0][c]).abs() < 1e-9), "{tangent:?}");
+        let strain = [0.1, -0.3, 0.2];
+        let stress = law.stress(&strain);
+        for small in [1e-13, 1e-10, 1e-7] {
+            let moved = strain.map(|component| component + small);
+            let mean = law.mean_stress([&strain, &add_scaled(&strain, 0.5, &[small; 3]), &moved]);
+            let off = (0..3).map(|c| (mean[c] - stress[c]).abs()).fold(0.0, f64::max);
+            assert!(off < 100.0 * small + 1e-12, "{small}: {off}");
+        }
         let rest = [0.0; 6];
         assert_eq!((law.mean_stress([&rest; 3]), law.stress(&rest), law.energy(&rest)), (rest, rest, 0.0));
         assert!(law.mean_tangent([&rest; 3]).as_flattened().iter().all(|entry| entry.is_finite()));

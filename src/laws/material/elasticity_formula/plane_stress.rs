@@ -12,8 +12,9 @@ use crate::{
 
 /// The component across the plane among those with three normal strains.
 const ACROSS: usize = 2;
-/// Of the mean stress, what its work may differ from the change of energy by rounding, as a share of both factors.
-const ROUNDING: f64 = 1e-13;
+/// What the work of the mean stress may differ from the change of energy by rounding: as a share of the stress times the way, and times the
+/// strain, whose rounding the change of energy has.
+const ROUNDING: [f64; 2] = [1e-13, 1e-14];
 
 /// The mean of the stress on the straight way between two strains.
 struct Mean<const S: usize> {
@@ -120,9 +121,10 @@ impl StrainElasticity {
             unit_rule().map(|[share, weight]| (weight, self.stress(&add_scaled(before, share, &way))));
         let stress = on_way.fold([0.0; S], |sum, (weight, stress)| add_scaled(&sum, weight, &stress));
         let missing = self.energy_change([before, end]) - dot(&stress, &way);
-        let linear = self.linear::<S>().apply(&add_scaled(before, 0.5, &way));
-        let size = norm(&add_scaled(&stress, 1.0, &linear)) * norm(&way);
-        let is_rounding = missing.abs() <= ROUNDING * size;
+        let middle = add_scaled(before, 0.5, &way);
+        let whole = norm(&self.linear::<S>().apply(&middle)) + norm(&stress);
+        let size = whole * (ROUNDING[0] * norm(&way) + ROUNDING[1] * norm(&middle));
+        let is_rounding = missing.abs() <= size;
         Mean { stress, way, missing: if is_rounding { 0.0 } else { missing / dot(&way, &way) } }
     }
 
