@@ -550,10 +550,7 @@ fn uniform_stress_passes_through_tilted_meshes_with_opposite_forces_and_moments(
 #[test]
 fn supports_inclined_to_a_contact_whose_meshes_do_not_fit_are_warned_of() {
     let words = |slope: f64, ranks: usize| {
-        let case = cubes().without("mesh.box").set("mesh.file", "'blocks.msh'").without("region").set(
-            "support",
-            "[{ on = ['lower.bottom'], fix = 'all' }, { on = ['lower.left', 'upper.left'], fix = ['x'] }]",
-        );
+        let case = cubes().without("mesh.box").set("mesh.file", "'blocks.msh'").without("region");
         write_tilted_blocks(&case.folder().join("blocks.msh"), [slope, 0.0]);
         let job = case.written();
         launch::unwrapped(&launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0).stdout)
