@@ -296,7 +296,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let words = renewed.verdict(range.steps[1], None, &self.job.solver.accept);
         words.brief.iter().for_each(|words| self.log.line(format!("certified  {words}")));
         let was_unique = self.certificates.steps_are_unique();
-        let was_stable = self.certificates.explicit_step_bound.is_none_or(|bound| range.steps[1] < bound);
+        let is_stable = |bound: Option<f64>| bound.is_none_or(|bound| range.steps[1] < bound);
+        let was_stable = is_stable(self.certificates.explicit_step_bound);
         self.certificates = renewed;
         if was_unique && !self.certificates.steps_are_unique() && !words.refusals.is_empty() {
             return Err(Error::Failed(format!(
@@ -306,15 +307,15 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
                 Digits(self.certificates.theta_step.unwrap_or(f64::NAN))
             )));
         }
-        let is_unstable = self.certificates.explicit_step_bound.is_some_and(|bound| range.steps[1] >= bound);
-        if was_stable && is_unstable && !self.job.solver.accept.contains(&Accept::ExplicitStability) {
+        let bound = self.certificates.explicit_step_bound;
+        if was_stable && !is_stable(bound) && !self.job.solver.accept.contains(&Accept::ExplicitStability) {
             return Err(Error::Failed(format!(
                 "at t = {:.6e} s the elastic stress of the strains that the run has reached is too steep for its steps of {} s: explicit \
                  steps are stable up to {} s; use a smaller [time] step or an implicit scheme, or accept it with [solver] accept = \
                  [\"explicit_stability\"]",
                 state.time,
                 Digits(range.steps[1]),
-                Digits(self.certificates.explicit_step_bound.unwrap_or(f64::NAN))
+                Digits(bound.unwrap_or(f64::NAN))
             )));
         }
         Ok(())

@@ -45,13 +45,16 @@ pub struct ElasticityFormula {
     #[serde(skip)]
     least: Arc<Derived<Result<f64, [String; 2]>>>,
     #[serde(skip)]
+    most: Arc<Derived<f64>>,
+    #[serde(skip)]
     stored: Arc<Derived<Arc<Stored>>>,
 }
 
 impl ElasticityFormula {
     /// With this formula.
     pub fn new(shear_factor: Formula<OfStrain>, reference_strain: f64) -> Self {
-        Self { shear_factor, reference_strain, least: Arc::default(), stored: Arc::default() }
+        let (least, most, stored) = Default::default();
+        Self { shear_factor, reference_strain, least, most, stored }
     }
 
     /// The fault of the formula: its stress must be strongly monotone up to the reference strain, and monotone for all strains.
@@ -74,14 +77,14 @@ impl ElasticityFormula {
         let stored = self.stored.get(|| Arc::new(Stored::new(&self.shear_factor, self.reference_strain)));
         let compared = match comparison {
             Comparison::Softer => *self.least().as_ref().unwrap_or(&0.0),
-            Comparison::Stiffer => self.growth().most(self.reference_strain),
+            Comparison::Stiffer => self.most(),
         };
         StrainElasticity { formula: self.clone(), elasticity, comparison, compared, stored: stored.clone() }
     }
 
     /// The fault of the formula where stresses are those at the start of a step: the stress must not rise too steeply for any step.
     pub fn fault_of_explicit_steps(&self) -> Option<LawFault> {
-        (self.growth().most(self.reference_strain) == f64::INFINITY).then(|| {
+        (self.most() == f64::INFINITY).then(|| {
             LawFault::at_value(
                 "shear_factor",
                 "the elastic stress has no bound of its slope up to reference_strain, so that no explicit step is stable",
@@ -92,6 +95,10 @@ impl ElasticityFormula {
 
     fn least(&self) -> &Result<f64, [String; 2]> {
         self.least.get(|| self.growth().least(self.reference_strain))
+    }
+
+    fn most(&self) -> f64 {
+        *self.most.get(|| self.growth().most(self.reference_strain))
     }
 
     fn growth(&self) -> Growth<'_, OfStrain> {

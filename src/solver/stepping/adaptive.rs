@@ -235,15 +235,12 @@ impl<const D: usize> Adaptive<D> {
         step: Step,
     ) -> Result<(StepOutcome, f64, StepError), Agreed> {
         let outcome = session.agree(stepper.attempt(session, body, state, step))?;
-        let fails = !self.is_shortest(step)
-            && session.agree(stepper.generates_failure(session, body, state, step))?;
-        let words = || {
-            Error::Failed(format!(
-                "at t = {:.6e} s the energy of failing bonds or damage comes from nowhere",
-                step.time
-            ))
-        };
-        session.agree(if fails { Err(words()) } else { Ok(()) })?;
+        if !self.is_shortest(step) && session.agree(stepper.generates_failure(session, body, state, step))? {
+            let time = step.time;
+            let words =
+                format!("at t = {time:.6e} s the energy of failing bonds or damage comes from nowhere");
+            return session.agree(Err(Error::Failed(words)));
+        }
         let mut step_error = session.agree(stepper.error(session, body, state, step))?;
         let of_motion = self.relative(step_error);
         if self.is_acceptable(step, of_motion) || self.is_at_rest() && !of_motion.is_nan() {

@@ -54,27 +54,19 @@ impl StrainElasticity {
 
     /// See [`StrainElasticity::stress`].
     pub(super) fn plane_stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S> {
-        add_scaled(&self.whole_plane_stress(strain), -1.0, &self.linear::<S>().apply(strain))
-    }
-
-    fn whole_plane_stress<const S: usize>(&self, strain: &Mandel<S>) -> Mandel<S> {
-        in_plane(&self.whole_stress(&self.with_thickness(strain)))
+        let whole: Mandel<S> = in_plane(&self.whole_stress(&self.with_thickness(strain)));
+        add_scaled(&whole, -1.0, &self.linear::<S>().apply(strain))
     }
 
     /// See [`StrainElasticity::tangent`].
     pub(super) fn plane_tangent<const S: usize>(&self, strain: &Mandel<S>) -> [Mandel<S>; S] {
-        self.beyond_linear(self.whole_plane_tangent(strain))
-    }
-
-    fn whole_plane_tangent<const S: usize>(&self, strain: &Mandel<S>) -> [Mandel<S>; S] {
-        let whole = self.with_thickness(strain);
-        let (linear, mut tangent) = (self.linear::<4>(), self.tangent(&whole));
-        for (i, row) in tangent.iter_mut().enumerate() {
-            *row = add_scaled(row, 1.0, &linear.apply(&unit(i)));
-        }
+        let mut tangent = self.tangent(&self.with_thickness(strain));
+        add_linear(1.0, &self.linear::<4>(), &mut tangent);
         let across = tangent[ACROSS];
         let rows = tangent.map(|row| in_plane(&add_scaled(&row, -row[ACROSS] / across[ACROSS], &across)));
-        in_plane(&rows)
+        let mut plane = in_plane(&rows);
+        add_linear(-1.0, &self.linear::<S>(), &mut plane);
+        plane
     }
 
     /// See [`StrainElasticity::energy_change`].
@@ -127,11 +119,6 @@ impl StrainElasticity {
         let is_rounding = missing.abs() <= size;
         Mean { stress, way, missing: if is_rounding { 0.0 } else { missing / dot(&way, &way) } }
     }
-
-    fn beyond_linear<const S: usize>(&self, whole: [Mandel<S>; S]) -> [Mandel<S>; S] {
-        let linear = self.linear::<S>();
-        std::array::from_fn(|i| add_scaled(&whole[i], -1.0, &linear.apply(&unit(i))))
-    }
 }
 
 /// The entries in the plane.
@@ -139,8 +126,12 @@ fn in_plane<T: Copy, const S: usize>(all: &[T; 4]) -> [T; S] {
     std::array::from_fn(|c| all[if c < ACROSS { c } else { c + 1 }])
 }
 
-fn unit<const S: usize>(component: usize) -> Mandel<S> {
-    std::array::from_fn(|c| f64::from(u8::from(c == component)))
+/// Adds a multiple of linear elasticity to a derivative of the stress.
+fn add_linear<const S: usize>(factor: f64, linear: &Isotropic, tangent: &mut [Mandel<S>; S]) {
+    for (i, row) in tangent.iter_mut().enumerate() {
+        let unit = std::array::from_fn(|c| f64::from(u8::from(c == i)));
+        *row = add_scaled(row, factor, &linear.apply(&unit));
+    }
 }
 
 /// How much more energy in J/m^3 linear elasticity stores at the second strain than at the first.
