@@ -423,7 +423,7 @@ impl Binary {
         self.operator.map_or_else(|| (self.value)(left, right), |operator| operator.value(left, right))
     }
 
-    /// Its derivatives by both arguments, given its value; that by the right one is 0 where that is a number.
+    /// Its derivatives by both arguments, given its value; that by the right one counts only where that is no number.
     #[inline(always)]
     pub(super) fn slopes(&self, [left, right]: [f64; 2], value: f64, has_number: bool) -> [f64; 2] {
         match (self.operator, self.by_left) {
