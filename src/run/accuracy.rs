@@ -9,7 +9,8 @@
 //!
 //! with the safety factor `F = 1.25` of the grid convergence index (P. J. Roache, Journal of Fluids Engineering 116 (1994) 405-413). Adaptive
 //! steps do not become exactly twice as long: the ratios of the numbers of steps stand for 2. The distance is that of energy: of stresses in
-//! the compliance norm and of velocities in the mass norm.
+//! the compliance norm and of velocities in the mass norm. Where the states do not approach each other, `F` is 3, that of the index for
+//! solutions without an observed order, `p` is 0.7, and the error may still be larger.
 //!
 //! Where longer steps are refused or are not fewer, the run is repeated once with steps half as long instead, and `p` is 1:
 //! `e = F 2 |S_1 - S_1/2|`.
@@ -28,8 +29,8 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-/// Safety factor.
-const SAFETY: f64 = 1.25;
+/// Safety factors: where the states approach each other, and where they do not.
+const SAFETY: [f64; 2] = [1.25, 3.0];
 /// That of the error indicator.
 const SAFETY_OF_INDICATOR: f64 = 1.5;
 /// A body vibrates whose kinetic energy is more than this share of its elastic energy.
@@ -38,7 +39,7 @@ const VIBRATING: f64 = 1e-2;
 const LONGER: [f64; 2] = [2.0, 4.0];
 /// The same where longer steps say nothing.
 const SHORTER: f64 = 0.5;
-/// The least order that is assumed: of states that do not approach each other.
+/// The least order that is assumed: states that show less do not approach each other.
 const LEAST_ORDER: f64 = 0.7;
 /// Numbers of steps with a smaller ratio say nothing about the steps.
 const LEAST_RATIO: f64 = 1.25;
@@ -53,10 +54,11 @@ const LEAST_SHARE: f64 = 0.05;
 /// The estimated error of the steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorOfSteps {
-    /// The error of stress and velocity at the end over `norm`.
+    /// The error of stress and velocity at the end over `norm`; where there is no order, it may be larger.
     pub relative: f64,
-    /// The order that the repetitions show, at most that of the job; 1 where they show none.
-    pub order: f64,
+    /// The order that the repetitions show, at most that of the job, and 1 where they can show none; `None` where their states do not approach
+    /// each other.
+    pub order: Option<f64>,
     /// The norm of stress and velocity at the end in J^(1/2), in two dimensions (J/m)^(1/2); at least a twentieth of the largest in the run.
     pub norm: f64,
 }
@@ -173,19 +175,20 @@ pub fn error_of_steps<const D: usize, const S: usize>(
     let distance = end.distance(session, body, Some(&near))?;
     let first = ratio(&end, &near);
     let (order, share) = if first < 1.0 {
-        (1.0, 1.0 / (1.0 - first))
+        (Some(1.0), SAFETY[0] / (1.0 - first))
     } else {
-        let order = match &far {
+        let shown = match &far {
             Ok(far) => observed_order(
                 [distance, near.distance(session, body, Some(far))?],
                 [first, ratio(&near, far)],
             ),
             Err(_) => 1.0,
         };
-        let order = order.clamp(LEAST_ORDER, f64::from(loaded.job.order_in_time()));
-        (order, 1.0 / (first.powf(order) - 1.0))
+        let order = (shown >= LEAST_ORDER).then(|| shown.min(f64::from(loaded.job.order_in_time())));
+        let safety = SAFETY[usize::from(order.is_none())];
+        (order, safety / (first.powf(order.unwrap_or(LEAST_ORDER)) - 1.0))
     };
-    let error = if distance > 0.0 { SAFETY * share * distance / norm } else { 0.0 };
+    let error = if distance > 0.0 { share * distance / norm } else { 0.0 };
     Ok(Ok(ErrorOfSteps { relative: larger(error, loaded.job.solver.tolerance), order, norm }))
 }
 

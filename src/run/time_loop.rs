@@ -506,7 +506,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             error_of_mesh: of_mesh,
             vibrates: vibrates(&simulation.totals),
             error_of_steps: of_steps.as_ref().ok().map(|error| error.relative),
-            order_of_steps: of_steps.ok().map(|error| error.order),
+            order_of_steps: of_steps.ok().and_then(|error| error.order),
         })
     }
 

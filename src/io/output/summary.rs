@@ -180,11 +180,11 @@ pub struct Errors {
     /// Whether the body vibrates.
     #[serde(skip)]
     pub vibrates: bool,
-    /// Estimated error of stress and velocity at the end by the time steps, likewise.
+    /// Estimated error of stress and velocity at the end by the time steps, likewise; the error may be larger where `order_of_steps` is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of stress and velocity at the end by the steps, relative")]
     pub error_of_steps: Option<f64>,
-    /// The order at which `error_of_steps` falls with the steps.
+    /// The order at which `error_of_steps` falls with the steps; missing where states of longer steps do not approach that of the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub order_of_steps: Option<f64>,
 }
