@@ -10,7 +10,7 @@
 //! with the safety factor `F = 1.25` of the grid convergence index (P. J. Roache, Journal of Fluids Engineering 116 (1994) 405-413). Adaptive
 //! steps do not become exactly twice as long: the ratios of the numbers of steps stand for 2. The distance is that of energy: of stresses in
 //! the compliance norm and of velocities in the mass norm. Where the states do not approach each other, `F` is 3, that of the index for
-//! solutions without an observed order, `p` is 0.7, and the error may still be larger.
+//! solutions without an observed order, `p` is 0.7, and the error is uncertain.
 //!
 //! Where longer steps are refused or are not fewer, the run is repeated once with steps half as long instead, and `p` is 1:
 //! `e = F 2 |S_1 - S_1/2|`.
@@ -54,7 +54,7 @@ const LEAST_SHARE: f64 = 0.05;
 /// The estimated error of the steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorOfSteps {
-    /// The error of stress and velocity at the end over `norm`; where there is no order, it may be larger.
+    /// The error of stress and velocity at the end over `norm`; uncertain where there is no order.
     pub relative: f64,
     /// The order that the repetitions show, at most that of the job, and 1 where they can show none; `None` where their states do not approach
     /// each other.

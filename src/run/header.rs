@@ -161,18 +161,13 @@ fn errors(log: &mut Log, summary: &Summary) {
         log.line(format!("errors     by the mesh {least}{} of the stress at the end{waves}", percent(error)));
     }
     if let Some(error) = error_of_steps {
-        let (least, advice) = match order_of_steps {
+        let more = match order_of_steps {
             Some(order) => {
-                ("", format!("; half of it takes {} times as many steps", two_digits(2f64.powf(1.0 / order))))
+                format!("; half of it takes {} times as many steps", two_digits(2f64.powf(1.0 / order)))
             }
-            None => (
-                "at least ",
-                ": states of longer steps do not approach that of the run; only shorter steps show it".to_owned(),
-            ),
+            None => ", uncertain: states of longer steps do not approach that of the run".to_owned(),
         };
         let error = percent(error);
-        log.line(format!(
-            "errors     by the steps {least}{error} of stress and velocity at the end{advice}"
-        ));
+        log.line(format!("errors     by the steps {error} of stress and velocity at the end{more}"));
     }
 }

@@ -6,7 +6,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Closeness, Contact, Gaps, OVERRUN},
+        effect::{ASTRAY, Closeness, Contact, Gaps, OVERRUN},
         pairs::pair_of,
         space::{longest_side, surface_means},
         state::State,
@@ -27,10 +27,10 @@ const TOO_DEEP: f64 = 0.01;
 
 /// The slip between bodies, as a share of the size of a facet, beyond which they no longer act on the surface that they face.
 const LARGEST_SLIP: f64 = 0.5;
-/// The change of gaps by motions along an obstacle, as a share of the body's size and of the spread of the normal displacements of the
-/// boundary, above which a warning is given.
-const ASTRAY: f64 = 1e-4;
+/// The change of gaps by motions along an obstacle, as a share of the spread of the normal displacements of the boundary, and the inclination
+/// in rad of the resultant of the pressures that comes with it, above which a warning is given.
 const LARGEST_SHIFT: f64 = 0.1;
+const LARGEST_INCLINATION: f64 = 0.01;
 /// The angle in rad between a boundary and a plane above which a warning is given: the tangential force of a frictionless plane is then
 /// missing, more than 3 % of the pressure.
 const TILTED: f64 = 2.0 * std::f64::consts::PI / 180.0;
@@ -284,8 +284,17 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
-        let Closeness { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread } =
-            contact.closeness.of_all(session);
+        let Closeness {
+            penetration,
+            held,
+            slip,
+            sharpness,
+            leap,
+            moved,
+            shift,
+            shift_to_spread,
+            inclination,
+        } = contact.closeness.of_all(session);
         let on = table.on.join(", ");
         if slip > LARGEST_SLIP && table.sliding == Sliding::Small {
             out.push(format!(
@@ -307,7 +316,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                  have to carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
             ));
         }
-        if shift > ASTRAY * size && shift_to_spread > LARGEST_SHIFT {
+        if shift > ASTRAY * size && (shift_to_spread > LARGEST_SHIFT || inclination > LARGEST_INCLINATION) {
             let remedy = if table.adhesion.is_none() && table.memory.is_none() {
                 "use sliding = \"finite\""
             } else {
@@ -315,7 +324,12 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             };
             out.push(format!(
                 "contact.{number}: the boundary {on} moved up to {moved:.3e} m along its obstacle while it pressed on it, which changes \
-                 distances between them by up to {shift:.3e} m: gaps and normals are those of the undeformed body, without these changes; {remedy}"
+                 distances between them by up to {shift:.3e} m: gaps and normals are those of the undeformed body, without these changes{}; {remedy}",
+                if inclination > LARGEST_INCLINATION {
+                    format!(", and the resultant of the pressures is inclined by up to {inclination:.2e} rad")
+                } else {
+                    String::new()
+                }
             ));
         }
         if leap > size {

@@ -1038,3 +1038,42 @@ fn a_layer_whose_only_equilibrium_is_on_a_jump_of_a_falling_law_finds_it() {
         assert!(pressures.iter().all(|p| (p - known).abs() < 1e-8), "{pressures:?} Pa");
     }
 }
+
+/// On a bar of 1e5 Pa/m the falling part of the graph, -2e5 Pa/m, has equilibria that are maxima of the energy.
+#[test]
+fn steps_do_not_end_at_unstable_equilibria_of_a_graph_that_falls() {
+    for scheme in ["implicit_euler", "bdf2"] {
+        let case = Case::written_as(
+            "
+            mesh.rectangle = {size = [1.0, 1.0], cells = [1, 1]}
+            support = [{on = ['top'], fix = 'all', displacement = [0.0, '-0.012*sin(2*pi*t)']}]
+            time = {end = 1.0, step = 0.005}
+            output.probe = [{name = 'foot', point = [0.5, 0.0]}]
+            solver.accept = ['uniqueness']
+            [material]
+            hypothesis = 'plane_strain'
+            elasticity = {youngs_modulus = 1e5, poisson_ratio = 0.0}
+            [[contact]]
+            on = ['bottom']
+            [contact.normal.displacement_graph]
+            points = [[-0.003, 0], [-0.001, -500], [0, 0], [0.001, 100], [0.001, 300], [0.002, 300], [0.003, 100], [0.004, 400]]
+            slope_after = 1e5",
+        )
+        .set("time.scheme", &format!("'{scheme}'"));
+        let results = case.run(1);
+        let foot = results.table("probes.csv").numbers("displacement_y");
+        let times = results.table("probes.csv").numbers("time");
+        // The pressure of 300 Pa where the graph is flat, until it falls.
+        for (time, displacement) in times.iter().zip(&foot).filter(|(time, _)| (0.058..0.068).contains(*time))
+        {
+            let expected = 3e-3 - 0.012 * (std::f64::consts::TAU * time).sin();
+            assert!(
+                (displacement - expected).abs() < 1e-9,
+                "{scheme}, {time} s: {displacement} for {expected}"
+            );
+        }
+        let history = results.table("history.csv").numbers("numerical_dissipation");
+        let gained = history.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::min);
+        assert!(scheme == "bdf2" || gained > -1e-9, "a step of Euler's scheme generated {gained} J");
+    }
+}

@@ -47,3 +47,15 @@ fn a_run_of_one_step_is_repeated_with_shorter_ones() {
     let plain = relaxing("implicit_euler", 1.0).set("output.error_estimate", "false").run_and_keep(1);
     assert!(plain.results().summary()["error_of_steps"].is_null());
 }
+
+/// A pulse runs through an absorbing end within a few steps.
+#[test]
+fn an_error_of_states_that_do_not_approach_each_other_is_uncertain() {
+    let case =
+        Case::of("absorbed_pulse").set("output.error_estimate", "true").without("check").run_and_keep(1);
+    let results = case.results();
+    assert!(results.number("error_of_steps") > 0.1, "with the larger safety factor");
+    assert!(results.summary()["order_of_steps"].is_null());
+    let log = results.text("run.log");
+    assert!(log.contains("uncertain: states of longer steps"), "{log}");
+}

@@ -177,13 +177,19 @@ impl<'a, const D: usize> Search<'a, D> {
         Self { masters, tree, reach }
     }
 
-    /// The parts of a slave facet that master facets cover.
-    fn covered(&self, slave: &Slave<D>) -> Vec<Part<'a, D>> {
+    /// The numbers of the master facets that may form a pair with a slave facet, ascending.
+    fn near(&self, slave: &Slave<D>) -> Vec<usize> {
         let prism = Prism::new(slave, self.reach);
         let mut near: Vec<_> =
             self.tree.locate_with_selection_function(&prism).map(|facet| facet.data).collect();
         near.sort_unstable();
-        let mut parts: Vec<_> = near.into_iter().filter_map(|i| self.part(slave, self.masters[i])).collect();
+        near
+    }
+
+    /// The parts of a slave facet that master facets cover.
+    fn covered(&self, slave: &Slave<D>) -> Vec<Part<'a, D>> {
+        let mut parts: Vec<_> =
+            self.near(slave).into_iter().filter_map(|i| self.part(slave, self.masters[i])).collect();
         parts.sort_by(|a, b| a.gap.0.abs().total_cmp(&b.gap.0.abs()));
         let mut taken: Vec<Part<D>> = Vec::with_capacity(parts.len());
         for part in parts {

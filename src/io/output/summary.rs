@@ -180,7 +180,7 @@ pub struct Errors {
     /// Whether the body vibrates.
     #[serde(skip)]
     pub vibrates: bool,
-    /// Estimated error of stress and velocity at the end by the time steps, likewise; the error may be larger where `order_of_steps` is missing.
+    /// Estimated error of stress and velocity at the end by the time steps, likewise; uncertain where `order_of_steps` is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of stress and velocity at the end by the steps, relative")]
     pub error_of_steps: Option<f64>,

@@ -248,7 +248,7 @@ impl ProjectedKsp {
         let [stale, refreshed] = self.update_subspace(operator, right_hand_side)?;
         let outcome = self.attached(operator, |solver| match kind {
             ProjectedKind::Symmetric => solver.solve_attached(right_hand_side, solution, stale),
-            ProjectedKind::Definite => solver.solve_by_cg(right_hand_side, solution, stale),
+            ProjectedKind::Definite => solver.solve_definite(right_hand_side, solution, stale),
             ProjectedKind::Unsymmetric => solver.solve_by_gmres(right_hand_side, solution, stale),
         })?;
         Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
@@ -356,6 +356,22 @@ impl ProjectedKsp {
             outcome.linear = outcome.linear.followed_by(rest);
         }
         Ok(ProjectedOutcome { indefinite: INDEFINITE.contains(&outcome.linear.reason), ..outcome })
+    }
+
+    /// PETSc's CG compares the signs of the curvature in its iterations with each other: where it is negative in all of them, it solves the
+    /// equations, but at a maximum.
+    fn solve_definite(
+        &mut self,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+        stale: bool,
+    ) -> Result<ProjectedOutcome> {
+        let mut outcome = self.solve_by_cg(right_hand_side, solution, stale)?;
+        if outcome.linear.converged() && solution.dot(right_hand_side)? < 0.0 {
+            outcome.linear.reason = INDEFINITE[1];
+            outcome.indefinite = true;
+        }
+        Ok(outcome)
     }
 
     fn solve_by_gmres(

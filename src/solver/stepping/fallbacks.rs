@@ -68,8 +68,8 @@ pub(super) struct Properties {
     pub friction_moves_obstacles: bool,
     /// Whether forces of laws may fall with the motion.
     pub softens: bool,
-    /// Whether these include those of bonds.
-    pub has_bonds: bool,
+    /// Whether these include those of bonds or of normal laws that depend on the gap.
+    pub may_come_loose: bool,
 }
 
 impl Properties {
@@ -82,8 +82,9 @@ impl Properties {
     /// ones beyond the yield stress overshoot. Without friction, monotone laws have a convex energy, to whose minimum a descent leads where
     /// full steps go round in circles: along stairs rounding errors would decide whether shorter steps lower the residual. Steps of half the
     /// length come before, because descents end at kinks where nodes far from the solution touch one after the other. Where laws soften
-    /// there may be no solution near the start of the step; then only the descent to another one ends. With bonds it is tried first: on
-    /// double cantilever beams it takes fewer iterations than full steps even where these converge.
+    /// there may be no solution near the start of the step; then only the descent to another one ends. With bonds and normal laws that fall with
+    /// the gap it is tried first: full steps may end at an unstable equilibrium, and on double cantilever beams they take more iterations even
+    /// where they converge.
     ///
     /// With larger parameters other branches recur: full steps then fail or succeed soon, where line searches may take many steps.
     ///
@@ -102,7 +103,7 @@ impl Properties {
         let rubs = self.rubs();
         let turns = rubs && !self.softens;
         [
-            (self.has_bonds && follows_bounds, Descent, 1.0, Newton),
+            (self.may_come_loose && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
             (follows_bounds && rubs, HalfSteps, 1.0, Newton),
             (rubs && follows_bounds, FewFullSteps, 10.0, Newton),
@@ -182,7 +183,7 @@ mod tests {
         may_rest: false,
         friction_moves_obstacles: false,
         softens: false,
-        has_bonds: false,
+        may_come_loose: false,
     };
 
     fn searches(properties: Properties) -> Vec<Search> {
@@ -194,7 +195,8 @@ mod tests {
         let found = searches(FRICTIONLESS);
         assert_eq!(found[..4], [Search::FullSteps, Search::FullSteps, Search::HalfSteps, Search::Descent]);
         assert_eq!(found.iter().filter(|search| **search == Search::Descent).count(), 1);
-        let bonds = Properties { softens: true, has_bonds: true, interior_is_linear: false, ..FRICTIONLESS };
+        let bonds =
+            Properties { softens: true, may_come_loose: true, interior_is_linear: false, ..FRICTIONLESS };
         let found = searches(bonds);
         assert_eq!(found[..2], [Search::Descent, Search::FullSteps]);
         assert_eq!(found.last(), Some(&Search::Descent), "from the start value again");
@@ -226,7 +228,7 @@ mod tests {
         let resting = |properties: Properties| properties.may_be_solved_at_rest();
         assert!(resting(Properties { may_rest: true, ..tresca }) && !resting(tresca));
         assert!(!resting(Properties { may_rest: true, ..FRICTIONLESS }));
-        assert!(!resting(Properties { may_rest: true, has_bonds: true, softens: true, ..tresca }));
+        assert!(!resting(Properties { may_rest: true, may_come_loose: true, softens: true, ..tresca }));
         let weakening = searches(Properties { softens: true, ..tresca });
         assert_eq!(weakening[1], Search::HalfSteps);
         assert_eq!(weakening.last(), Some(&Search::Falling));

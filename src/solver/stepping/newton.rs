@@ -319,7 +319,7 @@ impl Newton {
             friction_moves_obstacles: has_friction
                 && contacts.iter().any(|contact| contact.obstacle.is_driven()),
             softens: (flows && body.softens()) || contacts.iter().any(decreases),
-            has_bonds: flows && body.softens_at_surface(),
+            may_come_loose: (flows && body.softens_at_surface()) || contacts.iter().any(falls_with_gap),
         }
     }
 
@@ -543,6 +543,11 @@ fn write_velocities<const D: usize>(
 /// Whether pressure or friction of a contact decrease with the motion.
 fn decreases<const D: usize>(contact: &Contact<D>) -> bool {
     contact.monotonicity_constant() > 0.0 || contact.friction.as_ref().is_some_and(Friction::decreases)
+}
+
+/// Whether the pressure of a contact may fall as the body approaches, so that equilibria may be unstable.
+fn falls_with_gap<const D: usize>(contact: &Contact<D>) -> bool {
+    contact.normal.law.depends_on_displacement() && contact.monotonicity_constant() > 0.0
 }
 
 /// The friction of all contacts that have any.

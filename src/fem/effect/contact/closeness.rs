@@ -21,10 +21,12 @@ pub struct Closeness {
     pub shift: f64,
     /// The same as a share of the spread of the normal displacements of the boundary.
     pub shift_to_spread: f64,
+    /// Largest inclination in rad of the resultant of the pressures to the obstacle where such changes are not negligible.
+    pub inclination: f64,
 }
 
 /// How many numbers these are.
-const COUNT: usize = 8;
+const COUNT: usize = 9;
 
 impl Default for Closeness {
     fn default() -> Self {
@@ -40,8 +42,9 @@ impl Closeness {
 
     /// All of them.
     fn numbers(self) -> [f64; COUNT] {
-        let Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread } = self;
-        [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread]
+        let Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination } =
+            self;
+        [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination]
     }
 
     /// The one over all ranks. Collective.
@@ -50,8 +53,10 @@ impl Closeness {
     }
 
     /// The one with these numbers.
-    fn of([penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread]: [f64; COUNT]) -> Self {
-        Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread }
+    fn of(
+        [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination]: [f64; COUNT],
+    ) -> Self {
+        Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination }
     }
 
     /// From the numbers of a checkpoint.

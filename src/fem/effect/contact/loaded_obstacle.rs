@@ -236,7 +236,7 @@ impl<const D: usize> Obstacle<D> {
     }
 
     /// By how much the gap of a point grows, relative to a short `distance` in m by which the obstacle moves to and fro along a direction.
-    fn growth_along(&self, point: &Point<D>, direction: &Vector<D>, distance: f64) -> Result<f64> {
+    pub(super) fn growth_along(&self, point: &Point<D>, direction: &Vector<D>, distance: f64) -> Result<f64> {
         let seen = self.seen_after(&point.place);
         let reach = |way: f64| self.reach_from(point, &add_scaled(&seen, -way, direction));
         Ok((reach(distance)? - reach(-distance)?) / (2.0 * distance))

@@ -77,7 +77,7 @@ pub use friction::Friction;
 pub use loaded_obstacle::{Freedom, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK};
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
-pub use sweep::{OVERRUN, SLIP_BETWEEN_PAIRINGS, Touch};
+pub use sweep::{ASTRAY, OVERRUN, SLIP_BETWEEN_PAIRINGS, Touch};
 pub(super) use tangential_point::tangents;
 pub use unknowns::{choose_unknowns, set_walls};
 

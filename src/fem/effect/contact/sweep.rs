@@ -17,6 +17,10 @@ use crate::{
 
 /// A displacement of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
+/// Changes of gaps by motions along an obstacle are negligible up to this share of the body's size.
+pub const ASTRAY: f64 = 1e-4;
+/// The part of such a motion along which the slope of the obstacle is taken.
+const NEARBY: f64 = 1e-3;
 
 /// Penetration at nodes that supports hold, as a share of the body's size, from which on an obstacle counts as beyond them.
 pub const OVERRUN: f64 = 1e-6;
@@ -190,20 +194,33 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Keeps how far points with pressure have moved along an obstacle until the step just solved, and what that changes at their gaps, which
-    /// are those of the undeformed body (`sliding = "small"`); at displacements and velocities at its end. Collective.
+    /// are those of the undeformed body (`sliding = "small"`), and how the pressure is then inclined to the obstacle; at displacements and
+    /// velocities at its end. Collective.
     pub fn keep_shift(&mut self, session: &Session, [displacement, velocity]: [&[f64]; 2]) -> Result<()> {
         let is_given = matches!(self.obstacle.gap, Gap::Distance(_));
         if self.is_paired || is_given || !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
         let mut most = [f64::NEG_INFINITY; 4];
+        // The tangential part of the pressures, and their sum.
+        let mut force = [0.0; 4];
         for point in self.normal.points.iter().filter(|point| point.undeformed().is_none()) {
             let along = point.normal_component(Body, displacement);
             let (mut moved, mut shift) = (0.0, 0.0);
-            if point.pressure_at(&self.normal.law, Body, velocity) != 0.0 {
+            let pressure = point.pressure_at(&self.normal.law, Body, velocity);
+            if pressure != 0.0 {
                 let tangential = point.along_surface(&point.value(displacement));
                 let seen = self.obstacle.seen_after(&add_scaled(&point.place, 1.0, &tangential));
                 moved = norm(&tangential);
+                if moved > 0.0 {
+                    let direction = tangential.map(|u| u / moved);
+                    let slope = self.obstacle.growth_along(point, &direction, NEARBY * moved);
+                    if let Some(slope) = slope.ok().filter(|slope| slope.is_finite()) {
+                        let normal = point.weight * pressure;
+                        force.iter_mut().zip(&direction).for_each(|(sum, x)| *sum += normal * slope * x);
+                        force[3] += normal.abs();
+                    }
+                }
                 shift = (self.obstacle.reach_from(point, &seen).unwrap_or(f64::INFINITY) - point.reach).abs();
                 shift = if shift.is_finite() { shift } else { moved };
             }
@@ -213,7 +230,11 @@ impl<const D: usize> Contact<D> {
         }
         let [moved, shift, lowest, highest] = session.largest(most);
         let spread = (lowest + highest).max(ROUNDING * self.normal.body_size);
+        let [x, y, z, normal] = session.sum(force);
         let kept = &mut self.closeness;
+        if shift > ASTRAY * self.normal.body_size && normal > 0.0 {
+            kept.inclination = larger(kept.inclination, norm(&[x, y, z]) / normal);
+        }
         kept.moved = larger(kept.moved, moved);
         kept.shift = larger(kept.shift, shift);
         kept.shift_to_spread = larger(kept.shift_to_spread, shift / spread);
