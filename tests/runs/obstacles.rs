@@ -560,6 +560,22 @@ fn bodies_that_move_along_inclined_obstacles_or_turn_are_warned_of() {
     let along = "along its obstacle while it pressed on it";
     assert!([1, 2].iter().all(|ranks| warns(block("0.1*t", "0.5"), *ranks, along)), "the block moves");
     assert!(!warns(block("0", "0.5-0.1*t"), 1, along), "the plane moves");
+    // The middle of the outer arc, of 2 m, is pressed on a plane and moved along it by this distance.
+    let round = |way: f64| {
+        let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/ring_medium.msh");
+        let [x, y] = [way, -way].map(|way| (0.02 - way) / 2f64.sqrt());
+        Case::written_as(&format!(
+            "
+            mesh.file = '{mesh}'
+            material = {{hypothesis = 'plane_strain', elasticity = {{youngs_modulus = 1e8, poisson_ratio = 0.3}}}}
+            support = [{{on = ['inner'], fix = 'all', displacement = ['{x}*t', '{y}*t']}}]
+            contact = [{{on = ['outer'], obstacle.plane = {{point = [1.4142135623730951, 1.4142135623730951], normal = [-1, -1]}}, normal.unilateral = {{}}}}]
+            time = {{scheme = 'implicit_euler', end = 1.0, step = 0.5}}"
+        ))
+    };
+    let inclined = "the resultant of the pressures is inclined by up to";
+    assert!([1, 2].iter().all(|ranks| warns(round(0.06), *ranks, inclined)), "by 0.03 rad");
+    assert!(!warns(round(0.0), 1, inclined), "only pressed");
     let turning = |speed: f64| {
         Case::written_as(&format!(
             "
