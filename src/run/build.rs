@@ -352,8 +352,12 @@ fn refuse_moving_contact<const D: usize>(
             } else {
                 "use quadrature = \"nodal\""
             };
+            let surface = match contact.sliding {
+                Sliding::Small => "the boundary",
+                Sliding::Finite => "the obstacle that it faces",
+            };
             return Err(Error::Refused(format!(
-                "contact at {place:?} m: a support moves this point in a direction that is not tangential to the boundary; {remedy}"
+                "contact at {place:?} m: a support moves this point in a direction that is not tangential to {surface}; {remedy}"
             )));
         }
     }

@@ -92,8 +92,8 @@ impl Balance {
             format!(
                 "initial.from: the start state is out of balance: internal forces, loads and reactions leave over nodal forces of \
                  {open:.3e} N in total{of_forces}, so that the body does not remain as it was: {happens}; if that is not intended, start with \
-                 the loads, supports and materials of the job that wrote the state and change loads gradually (`t` in their expressions), or \
-                 let that job come to rest"
+                 the loads, supports, materials and `redistribute_mass` of the job that wrote the state and change loads gradually (`t` in \
+                 their expressions), or let that job come to rest"
             )
         })
     }

@@ -351,7 +351,10 @@ impl Summary {
             )
         });
         let generated = generated.filter(|_| unresolved.is_none()).map(|generated| {
-            let cause = if self.effects.contains(&"inertia") {
+            let has = |effect: &&str| self.effects.contains(effect);
+            let cause = if ["damage", "adhesion"].iter().any(has) {
+                "damage or bonds that fail within a few steps can cause, and impacts: use a smaller [time] step, or [time.adaptive]"
+            } else if has(&"inertia") {
                 "vibrations and impacts without damping can cause: implicit_euler and [material.damping] stiffness damp them, and midpoint \
                  conserves energy"
             } else {
