@@ -9,6 +9,9 @@ use crate::{
 
 /// Rotation in rad above which a warning is given: lengths are then wrong by half a per cent, directions of forces by ten.
 const LARGEST_ROTATION: f64 = 0.1;
+/// The same where boundaries slide any distance along obstacles: contact forces act where the body has turned to, and their moments are those
+/// at its undeformed places.
+const LARGEST_ROTATION_ALONG_OBSTACLES: f64 = 0.02;
 
 /// A warning where a cell has turned too far since the start. Collective.
 pub(super) fn warning<const D: usize, const S: usize>(
@@ -27,10 +30,18 @@ pub(super) fn warning<const D: usize, const S: usize>(
         Ok((0..body.mesh.cell_count()).map(of_cell).fold(0.0, larger))
     };
     let [most] = session.largest([session.agree(turned())?]);
-    Ok((most > LARGEST_ROTATION).then(|| {
+    let follows = body.contacts.iter().any(|contact| contact.follows_surface);
+    let (limit, wrong) = match follows {
+        false => (LARGEST_ROTATION, "lengths and the directions of contact forces"),
+        true => (
+            LARGEST_ROTATION_ALONG_OBSTACLES,
+            "lengths and the moments of contact forces (sliding = \"finite\")",
+        ),
+    };
+    Ok((most > limit).then(|| {
         format!(
-            "parts of the body have turned by up to {most:.3} rad, more than {LARGEST_ROTATION}: the equations assume small rotations, so \
-             that lengths and the directions of contact forces are wrong; let the body turn less, or take a shorter run"
+            "parts of the body have turned by up to {most:.3} rad, more than {limit}: the equations assume small rotations, so \
+             that {wrong} are wrong; let the body turn less, or take a shorter run"
         )
     }))
 }

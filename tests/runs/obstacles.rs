@@ -588,4 +588,7 @@ fn bodies_that_move_along_inclined_obstacles_or_turn_are_warned_of() {
     let turned = "parts of the body have turned";
     assert!([1, 2].iter().all(|ranks| warns(turning(1.5), *ranks, turned)), "by 0.15 rad");
     assert!(!warns(turning(0.5), 1, turned), "by 0.05 rad");
+    let plane = "[{on = ['bottom'], sliding = 'finite', normal.unilateral = {}, obstacle.plane = {point = [0, 0, -1], normal = [0, 0, 1]}}]";
+    let above = || turning(0.5).set("contact", plane);
+    assert!(warns(above(), 1, "moments of contact forces"), "by 0.05 rad above a plane");
 }
