@@ -85,6 +85,19 @@ fn rejected_steps_leave_no_trace_but_their_iterations() {
 }
 
 #[test]
+fn a_first_step_that_is_far_too_long_costs_nothing() {
+    for ranks in [1, 2] {
+        let [careful, hasty] = [FIRST, 0.0625].map(|first| {
+            let case = adaptive(8, "bdf2", 0.02).set("time.step", &format!("{first}"));
+            let results = case.run(ranks);
+            let counts = ["newton_iterations", "rejected_steps"].map(|key| results.number(key));
+            (counts, results.text("history.csv"))
+        });
+        assert!(careful == hasty, "{ranks} ranks: {:?} and {:?}", careful.0, hasty.0);
+    }
+}
+
+#[test]
 fn an_adaptive_run_that_continues_is_the_straight_run_to_the_last_bit() {
     for ranks in [1, 3] {
         let case = adaptive(6, "bdf2", 0.05).set("checkpoint.every", "10").set("checkpoint.keep", "20");

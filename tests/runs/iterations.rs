@@ -45,7 +45,7 @@ fn small_jobs_take_as_many_iterations_as_they_did() {
         ("lagged_euler, 64 steps", &many, 1, [153.0, 353.0]),
         ("implicit_euler", &euler, 1, [210.0, 455.0]),
         ("bdf2", &bdf2, 1, [199.0, 433.0]),
-        (jobs[0], &adaptive, 1, [332.0, 673.0]),
+        (jobs[0], &adaptive, 1, [330.0, 670.0]),
         (jobs[1], &jump, 1, [397.0, 396.0]),
         (jobs[2], &oblique, 1, [100.0, 105.0]),
         (jobs[3], &cantilever, 1, [257.0, 1850.0]),

@@ -14,7 +14,8 @@ pub struct Time {
     /// The time at which the run ends. Every run starts at time 0.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1.0)]
     pub end: f64,
-    /// Length of a step. With [time.adaptive]: length of the first step that is tried.
+    /// Length of a step. With [time.adaptive]: the longest first step; the first step is shorter if a trial step shows that its error
+    /// would be too large.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.015625)]
     pub step: f64,
     /// The time scheme.

@@ -209,7 +209,8 @@ impl<const D: usize> Adaptive<D> {
             if self.is_acceptable(step, deviation) {
                 return (step, landing);
             }
-            self.shorten(step, self.level_within_tolerance(step, deviation));
+            let share = (self.settings.tolerance / deviation).sqrt();
+            self.shorten(step, self.level_of_share(step, share));
         }
     }
 
@@ -259,8 +260,8 @@ impl<const D: usize> Adaptive<D> {
         Ok((outcome, error, step_error))
     }
 
-    /// Finds reference norms of velocity and stress for a body at rest from a trial step of the largest length, or to the end of
-    /// the current piece of a load. The trial step is not committed.
+    /// Finds reference norms of velocity and stress for a body at rest, and the length of its first step, from a trial step of the largest
+    /// length, or to the end of the current piece of a load. The trial step is not committed.
     fn estimate_reference_norms<const S: usize>(
         &mut self,
         session: &Session,
@@ -272,8 +273,11 @@ impl<const D: usize> Adaptive<D> {
         let landing = self.landing(session, state, target, self.longest());
         let step = next_step(times_before(state, target), self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
-            Ok((_, _, found)) => {
+            Ok((_, error, found)) => {
                 self.step_level.keep_largest(&found);
+                if !self.is_acceptable(step, error) {
+                    self.shorten(step, self.level_within_tolerance(step, error).min(0));
+                }
                 Ok(())
             }
             Err(error) if error.is_failure() => Ok(()),
@@ -324,11 +328,18 @@ impl<const D: usize> Adaptive<D> {
         square.sqrt()
     }
 
-    /// The level whose error is expected to be within the tolerance: the error is proportional to the square of the length.
+    /// The level whose error is expected to be within the tolerance: the error is proportional to the square of the length, in a step that
+    /// follows none to the length, because loads come at once.
     fn level_within_tolerance(&self, step: Step, error: f64) -> i32 {
-        let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
-        let level = (length / self.first).log2().floor();
-        if level.is_finite() { (level as i32).min(self.level_of(step) - 1) } else { self.level_of(step) - 1 }
+        let ratio = self.settings.tolerance / error;
+        self.level_of_share(step, if step.previous_length > 0.0 { ratio.sqrt() } else { ratio })
+    }
+
+    /// The level of steps of this share of the length of a step, below that of the step.
+    fn level_of_share(&self, step: Step, share: f64) -> i32 {
+        let level = (SAFETY * step.length * share / self.first).log2().floor();
+        let below = self.level_of(step) - 1;
+        if level.is_finite() { (level as i32).min(below) } else { below }
     }
 
     fn reject(&mut self, step: Step, level: i32) {
@@ -511,6 +522,15 @@ mod tests {
         assert_eq!(adaptive.next_length(0.16, 0.08), 0.08, "two steps are left");
         adaptive.step_level.level = -9;
         assert_eq!(adaptive.next_length(100.0, 0.08), 0.00125);
+    }
+
+    #[test]
+    fn errors_grow_with_the_square_of_the_length_and_in_a_step_that_follows_none_with_the_length() {
+        let adaptive = adaptive();
+        assert_eq!(adaptive.level_within_tolerance(step(0.08), 0.1), 1, "0.9 * 0.08 / sqrt(10) = 0.023");
+        let first = Step { previous_length: 0.0, ..step(0.08) };
+        assert_eq!(adaptive.level_within_tolerance(first, 0.1), -1, "0.9 * 0.08 / 10 = 0.0072");
+        assert_eq!(adaptive.level_within_tolerance(first, 0.01), 2, "always a shorter one");
     }
 
     #[test]

@@ -20,7 +20,7 @@ use crate::{
 /// Largest number of directions for each Newton iteration that a solve may take, on the way to another equilibrium.
 pub(super) const DIRECTIONS_PER_ITERATION: usize = 20;
 /// Largest number of directions where another start is better than more of them.
-pub(super) const SHORT_DESCENT: usize = 50;
+pub(super) const SHORT_DESCENT: usize = 25;
 /// The ratio by which the share of softening decreases where the derivative is not positive definite, and by which it grows again.
 const DECREASE: f64 = 0.25;
 const INCREASE: f64 = 2.0;

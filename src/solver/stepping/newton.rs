@@ -409,6 +409,7 @@ impl Newton {
         let most = DIRECTIONS_PER_ITERATION * limit;
         let directions = match search {
             Search::ShortDescent => SHORT_DESCENT,
+            Search::Yielding => 2 * SHORT_DESCENT,
             _ if self.flow.is_some() || problem.body.contacts.iter().any(may_fall) => most,
             _ => limit,
         };
