@@ -18,7 +18,7 @@ use crate::{
             PeakSquares, Peaks, Phases, Quantity, RedistributedMass, STORED_IN_CONTACT, Step, StressError,
             SupportMotion, SurfaceEffect, SurfaceForce, Tangents, Term, Touch, VISCOUS,
         },
-        pairs::{Pair, exchanged, pair_of, shares},
+        pairs::{Pair, exchanged, inclined, pair_of, shares},
         space::{
             Batch, Cell, CellMatrix, Geometry, Held, Inputs, Needs, Nodal, assemble, cell_rule, facet_points,
         },
@@ -335,7 +335,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         for pair in pairs.iter_mut().filter(|pair| pair.slides) {
             pair.form(session, &self.mesh, &places)?;
         }
-        self.coupling = Some(Coupling::new(session, &self.mesh, &shares(&self.mesh, &pairs), &self.held)?);
+        let shares = (&shares(&self.mesh, &pairs)[..], inclined(&pairs, &self.held));
+        self.coupling = Some(Coupling::new(session, &self.mesh, shares, &self.held)?);
         let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, &displacement);
         for pair in pairs.iter().filter(|pair| pair.slides) {
             let touches = touches.as_ref().map(|touches| (&touches[pair.contact][..], has_mass));

@@ -10,13 +10,18 @@
 //! hold along the same direction, if these are most of what it faces, with shares that are scaled to a sum of 1; otherwise to nothing.
 //! Held components of master nodes move as the supports do. No slave node is a master node. Source: Wohlmuth and Krause (2003), Hueeber and
 //! Wohlmuth (2005).
+//!
+//! Where what supports hold is inclined to a flat boundary with the normal `n`, a free motion that opens it by 1 is `m = n_f / |n_f|^2`, with
+//! the free part `n_f` of `n` and the held part `n_h`. The velocity of the masters, `w = sum_b P_ab v_b`, then adds `w_f + m n_h . (w - g)` to
+//! the free part of that of the slave node, where `g` is that of its masters along what supports hold there: `n . z = n . (v - w)` is the
+//! relative normal velocity as without supports, and the pressure acts on all masters along `n`.
 
 use super::space::Held;
 use crate::{
     error::Result,
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
-        tensor::{Vector, dot, norm},
+        tensor::{Vector, add_scaled, dot, norm},
     },
     mesh::Mesh,
     parallel::{
@@ -132,6 +137,17 @@ pub struct MasterShare {
     pub is_faced: bool,
 }
 
+/// A slave node of a flat boundary that is inclined to what supports hold there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inclined<const D: usize> {
+    /// The slave node, by its local number.
+    pub slave: u32,
+    /// The free motion at right angles to the common tangents that opens the boundary by 1 along its normal.
+    pub opening: Vector<D>,
+    /// The part of the normal that supports hold.
+    pub held: Vector<D>,
+}
+
 /// The change of basis `T` of this rank.
 #[derive(Debug, Default)]
 pub struct Coupling<const D: usize> {
@@ -143,6 +159,8 @@ pub struct Coupling<const D: usize> {
     masters: Vec<(u32, f64)>,
     /// The directions along which supports hold slave nodes and masters of theirs, by slave node.
     held_together: Vec<HeldTogether<D>>,
+    /// The slave nodes that are inclined to supports, ascending.
+    inclined: Vec<Inclined<D>>,
     /// The blocks of `T` of all ranks: for each slave node, by global numbers, its masters and how they move its free components.
     blocks: BTreeMap<u32, Vec<(u32, Vec<f64>)>>,
     pool: Pool,
@@ -171,14 +189,22 @@ impl<const D: usize> HeldTogether<D> {
         };
         frame[free..].iter().filter_map(along).collect()
     }
+
+    /// The component along the direction of the velocity of these masters.
+    fn mean(&self, values: &[f64]) -> f64 {
+        let value =
+            |master: u32| dot(&self.direction, &std::array::from_fn(|i| values[master as usize * D + i]));
+        self.masters.iter().map(|(master, share)| share * value(*master)).sum()
+    }
 }
 
 impl<const D: usize> Coupling<D> {
-    /// For the pairs whose slave nodes this rank owns, in their order, on a mesh with the ghosts that [`needed_ghosts`] lists. Collective.
+    /// For the pairs whose slave nodes this rank owns, in their order, with those that are inclined to supports, on a mesh with the ghosts
+    /// that [`needed_ghosts`] lists. Collective.
     pub fn new(
         session: &Session,
         mesh: &Mesh<D>,
-        pairs: &[MasterShare],
+        (pairs, inclined): (&[MasterShare], Vec<Inclined<D>>),
         held: &Held<D>,
     ) -> Result<Self, Agreed> {
         let local = |global: u32| match mesh.ghosts.binary_search(&global) {
@@ -189,6 +215,7 @@ impl<const D: usize> Coupling<D> {
         let (mut numbers, mut values) = (Vec::new(), Vec::new());
         for of_slave in pairs.chunk_by(|a, b| a.slave == b.slave) {
             let slave = local(of_slave[0].slave);
+            let inclined = find(&inclined, slave as u32);
             let first = masters.len();
             for pair in of_slave {
                 let master = local(pair.master);
@@ -196,7 +223,9 @@ impl<const D: usize> Coupling<D> {
                 numbers.extend([pair.slave, pair.master]);
                 let columns = (0..D).map(|j| {
                     let unit = std::array::from_fn(|i| if i == j { pair.share } else { 0.0 });
-                    held.free_part(slave, &held.free_part(master, &unit))
+                    let free = held.free_part(master, &unit);
+                    let moved = held.free_part(slave, &free);
+                    inclined.map_or(moved, |at| add_scaled(&moved, dot(&at.held, &free), &at.opening))
                 });
                 let columns: Vec<Vector<D>> = columns.collect();
                 values.extend((0..D * D).map(|k| columns[k % D][k / D]));
@@ -211,7 +240,8 @@ impl<const D: usize> Coupling<D> {
         for (pair, block) in numbers.chunks_exact(2).zip(values.chunks_exact(D * D)) {
             blocks.entry(pair[0]).or_default().push((pair[1], block.to_vec()));
         }
-        Ok(Self { owned: mesh.owned, slaves, masters, held_together, blocks, pool: Pool::default() })
+        let (owned, pool) = (mesh.owned, Pool::default());
+        Ok(Self { owned, slaves, masters, held_together, inclined, blocks, pool })
     }
 
     /// The slave nodes owned here with their masters and the shares of these, by local numbers.
@@ -231,21 +261,30 @@ impl<const D: usize> Coupling<D> {
             for (master, share) in masters {
                 (0..D).for_each(|i| sum[i] += share * values[*master as usize * D + i]);
             }
-            let sum = held.free_part(slave as usize, &sum);
-            (0..D).for_each(|i| values[slave as usize * D + i] += factor * sum[i]);
+            let mut moved = held.free_part(slave as usize, &sum);
+            if let Some(Inclined { opening, held, .. }) = find(&self.inclined, slave) {
+                let of_held =
+                    self.held_together(slave).map(|along| dot(held, &along.direction) * along.mean(values));
+                moved = add_scaled(&moved, dot(held, &sum) - of_held.sum::<f64>(), opening);
+            }
+            (0..D).for_each(|i| values[slave as usize * D + i] += factor * moved[i]);
         }
         self.add_held_masters(factor, values);
     }
 
+    /// The directions along which supports hold a slave node and masters of it.
+    fn held_together(&self, slave: u32) -> impl Iterator<Item = &HeldTogether<D>> {
+        let first = self.held_together.partition_point(|held| held.slave < slave);
+        self.held_together[first..].iter().take_while(move |held| held.slave == slave)
+    }
+
     /// The same along directions in which supports hold both, alone.
     fn add_held_masters(&self, factor: f64, values: &mut [f64]) {
-        for HeldTogether { slave, direction, masters } in &self.held_together {
-            let value =
-                |master: u32| dot(direction, &std::array::from_fn(|i| values[master as usize * D + i]));
-            let sum: f64 = masters.iter().map(|(master, share)| share * value(*master)).sum();
-            let slave = &mut values[*slave as usize * D..][..D];
+        for along in &self.held_together {
+            let (mean, direction) = (along.mean(values), &along.direction);
+            let slave = &mut values[along.slave as usize * D..][..D];
             let before = dot(direction, &std::array::from_fn(|i| slave[i]));
-            (0..D).for_each(|i| slave[i] += factor * sum * direction[i]);
+            (0..D).for_each(|i| slave[i] += factor * mean * direction[i]);
             // Bodies that move together do not slide by a rounding error.
             if slave.iter().all(|x| x.abs() <= ROUNDED * before.abs()) {
                 slave.fill(0.0);
@@ -289,17 +328,23 @@ impl<const D: usize> Coupling<D> {
         mut visit: impl FnMut(u32, Vector<D>),
     ) {
         let Ok(at) = self.slaves.binary_search_by_key(&slave, |(slave, _)| *slave) else { return };
-        let free = held.free_part(slave as usize, force);
+        let inclined = find(&self.inclined, slave);
+        let carried = self.carried(held, (slave, force));
         for (master, share) in &self.masters[self.slaves[at].1.clone()] {
-            visit(*master, free.map(|force| -share * force));
+            visit(*master, carried.map(|force| -share * force));
         }
-        let first = self.held_together.partition_point(|held| held.slave < slave);
-        for HeldTogether { direction, masters, .. } in
-            self.held_together[first..].iter().take_while(|held| held.slave == slave)
-        {
-            let along = dot(direction, force);
+        for HeldTogether { direction, masters, .. } in self.held_together(slave) {
+            let of_free = inclined.map_or(0.0, |at| dot(direction, &at.held) * dot(&at.opening, force));
+            let along = dot(direction, force) - of_free;
             masters.iter().for_each(|(master, share)| visit(*master, direction.map(|x| -share * along * x)));
         }
+    }
+
+    /// What the free part of a force on a slave node is on what it faces.
+    fn carried(&self, held: &Held<D>, (slave, force): (u32, &Vector<D>)) -> Vector<D> {
+        let free = held.free_part(slave as usize, force);
+        let inclined = find(&self.inclined, slave);
+        inclined.map_or(free, |at| add_scaled(&free, dot(&at.opening, force), &at.held))
     }
 
     /// `z = T^-1 v`. Collective.
@@ -334,7 +379,7 @@ impl<const D: usize> Coupling<D> {
         forces[self.owned * D..].fill(0.0);
         for (slave, masters) in self.slaves() {
             let force = std::array::from_fn(|i| forces[slave as usize * D + i]);
-            let force = held.free_part(slave as usize, &force);
+            let force = self.carried(held, (slave, &force));
             for (master, share) in masters {
                 let part = held.free_part(*master as usize, &force);
                 (0..D).for_each(|i| forces[*master as usize * D + i] += share * part[i]);
@@ -405,6 +450,11 @@ impl<const D: usize> Coupling<D> {
         }
         sums
     }
+}
+
+/// The inclination at a slave node, if there is one, of these, ascending.
+fn find<const D: usize>(inclined: &[Inclined<D>], slave: u32) -> Option<&Inclined<D>> {
+    inclined.binary_search_by_key(&slave, |at| at.slave).ok().map(|at| &inclined[at])
 }
 
 /// The entries of a row.

@@ -1,14 +1,14 @@
 //! The pairs of nodes and facing surfaces of contact between bodies.
 
-use super::coupling::MasterShare;
+use super::coupling::{Inclined, MasterShare};
 use crate::{
     fem::space::{
-        SurfacePoint, longest_side,
+        Held, SurfacePoint, longest_side,
         mortar::{Contribution, Facet, Normals, contributions, direction},
         surface_points,
     },
     linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, larger, norm, outside},
-    mesh::Mesh,
+    mesh::{Mesh, shape::facet_normal},
     parallel::{
         agreement::Agreed,
         exchange::{exchange_lists, gather},
@@ -42,13 +42,38 @@ pub struct PairedNode<const D: usize> {
     /// The angle in rad of the edges of the other side over the part of the surface for which it stands: by how much the undeformed other
     /// side turns there, on either side of its mean, or is inclined to the own side where it ends.
     pub sharpness: f64,
+    /// How curved the own side is there: by how much its normal at a corner of a facet around it differs from that of the facet at most, as the
+    /// length of the difference of these unit vectors.
+    pub curvature: f64,
 }
 
 impl<const D: usize> PairedNode<D> {
-    /// The node as a point of the boundary.
-    pub fn point(&self) -> SurfacePoint<D> {
+    /// The node as a point of the boundary with these supports, which cut curved ones along planes of symmetry.
+    pub fn point(&self, held: &Held<D>) -> SurfacePoint<D> {
         let Self { node, normal, weight, .. } = *self;
-        SurfacePoint { node, normal, weight }
+        let point = SurfacePoint { node, normal, weight };
+        if self.inclination(held).is_some() { point } else { held.whole(point) }
+    }
+
+    /// A contact traction in Pa with what of its pressure supports take up, which nodal tractions do not have.
+    pub fn whole_traction(&self, held: &Held<D>, traction: &Vector<D>) -> Vector<D> {
+        let normal = self.point(held).normal;
+        let free = held.free_part(self.node as usize, &normal);
+        let length = norm(&free);
+        if length < ROUNDING {
+            return *traction;
+        }
+        let direction = free.map(|x| x / length);
+        add_scaled(traction, dot(&direction, traction), &add_scaled(&normal, -1.0, &direction))
+    }
+
+    /// How the boundary is inclined to what supports hold at the node, if it is, by more than a curved one is on a plane of symmetry.
+    pub fn inclination(&self, held: &Held<D>) -> Option<Inclined<D>> {
+        let free = held.free_part(self.node as usize, &self.normal);
+        let length = norm(&free);
+        let held = add_scaled(&self.normal, -1.0, &free);
+        let is_inclined = norm(&held) > larger(ROUNDING, CURVED * self.curvature) && length > LEAST_OPENING;
+        is_inclined.then(|| Inclined { slave: self.node, opening: free.map(|x| x / (length * length)), held })
     }
 
     /// The masters on the other side, with their shares.
@@ -235,6 +260,7 @@ impl<const D: usize> Pair<D> {
                 neighbours: Vec::new(),
                 stretch,
                 sharpness: 0.0,
+                curvature: f64::INFINITY,
             })
         });
         self.nodes = paired.collect();
@@ -299,8 +325,18 @@ impl<const D: usize> Pair<D> {
         let node_at = |SurfacePoint { node, normal, weight }: SurfacePoint<D>| {
             facing.remove(&node).unwrap_or_else(|| {
                 let (distance, masters, neighbours, stretch) = (f64::INFINITY, Vec::new(), Vec::new(), 1.0);
-                let sharpness = 0.0;
-                PairedNode { node, normal, weight, distance, masters, neighbours, stretch, sharpness }
+                let (sharpness, curvature) = (0.0, f64::INFINITY);
+                PairedNode {
+                    node,
+                    normal,
+                    weight,
+                    distance,
+                    masters,
+                    neighbours,
+                    stretch,
+                    sharpness,
+                    curvature,
+                }
             })
         };
         (self.nodes, self.is_bare) = (all.into_values().map(node_at).collect(), is_bare);
@@ -334,6 +370,7 @@ impl<const D: usize> Pair<D> {
         if mesh.order() == 2 {
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
+        let curvatures = curvatures(&gather_facets(session, mesh, places, &self.on)?);
         let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
         let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
         let mut lawless = self.lawless.clone();
@@ -350,7 +387,7 @@ impl<const D: usize> Pair<D> {
                         && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
                 };
                 let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
-                return Ok((paired(mesh, sums, &at, self.slides), is_bare));
+                return Ok((paired(mesh, sums, (&at, &curvatures), self.slides), is_bare));
             }
             lawless.extend(further);
         }
@@ -422,6 +459,20 @@ pub fn shares<const D: usize>(mesh: &Mesh<D>, pairs: &[Pair<D>]) -> Vec<MasterSh
     all
 }
 
+/// The nodes of these pairs that are inclined to what supports hold, ascending.
+pub fn inclined<const D: usize>(pairs: &[Pair<D>], held: &Held<D>) -> Vec<Inclined<D>> {
+    let nodes = pairs.iter().flat_map(|pair| &pair.nodes);
+    let mut all: Vec<Inclined<D>> = nodes.filter_map(|node| node.inclination(held)).collect();
+    all.sort_by_key(|at| at.slave);
+    all
+}
+
+/// How many times as far as a curved boundary turns within the facets around a node it is inclined at most to a plane of symmetry.
+const CURVED: f64 = 4.0;
+/// The held part of a normal is a rounding error below this.
+const ROUNDING: f64 = 1e-6;
+/// The least free part of a normal along which a node may open the boundary.
+const LEAST_OPENING: f64 = 0.1;
 /// The least part of the surface around a node that must face the other side; nodes with less carry no law.
 const LEAST_SHARE: f64 = 1e-3;
 /// The same as a share of the integral of its shape function.
@@ -649,11 +700,37 @@ fn sum_of_contributions<const D: usize>(
     Ok(sums)
 }
 
-/// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m, and whether they slide.
+/// How curved the surface of these facets is at their nodes, by global numbers, as [`PairedNode::curvature`].
+fn curvatures<const D: usize>(facets: &[Facet<D>]) -> BTreeMap<u32, f64> {
+    let mut normals: BTreeMap<u32, Vector<D>> = BTreeMap::new();
+    for facet in facets {
+        let area = norm(&facet_normal(&facet.corners));
+        for node in &facet.nodes[..D] {
+            let sum = normals.entry(*node).or_insert([0.0; D]);
+            *sum = add_scaled(sum, area, &facet.normal);
+        }
+    }
+    let mut largest: BTreeMap<u32, f64> = BTreeMap::new();
+    for facet in facets {
+        let turned = |node: &u32| {
+            let normal = &normals[node];
+            norm(&add_scaled(&facet.normal, -1.0 / norm(normal), normal))
+        };
+        let most = facet.nodes[..D].iter().map(turned).fold(0.0, larger);
+        for node in &facet.nodes {
+            let of_node = largest.entry(*node).or_default();
+            *of_node = larger(*of_node, most);
+        }
+    }
+    largest
+}
+
+/// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m on a surface as curved as this there, and
+/// whether they slide.
 fn paired<const D: usize>(
     mesh: &Mesh<D>,
     sums: BTreeMap<u32, Sum<D>>,
-    places: &BTreeMap<u32, Vector<D>>,
+    (places, curvatures): (&BTreeMap<u32, Vector<D>>, &BTreeMap<u32, f64>),
     slides: bool,
 ) -> Vec<PairedNode<D>> {
     sums.into_iter()
@@ -682,6 +759,7 @@ fn paired<const D: usize>(
                 neighbours: sum.neighbours.into_iter().collect(),
                 stretch: 1.0 + sum.passed / sum.weight,
                 sharpness,
+                curvature: curvatures[&node],
             }
         })
         .collect()

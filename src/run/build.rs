@@ -14,7 +14,7 @@ use crate::{
             Resistances, STRESS_OF_FLOW, SupportMotion, Supports, Traction, choose_unknowns, effects,
             surface_effects,
         },
-        pairs::{Pair, PairedNode, nodes_of},
+        pairs::{Pair, nodes_of},
         space::{Geometry, Held, SurfacePoint, cell_rule, place_in_cell, surface_means, surface_points},
         state::State,
     },
@@ -49,11 +49,10 @@ pub(super) fn body<const D: usize, const S: usize>(
     let (mut contacts, parts) = contacts(session, job, &mesh, &pairs, &supports)?;
     let Supports { held, motion } = supports;
     let points = |at: usize| -> Result<Vec<SurfacePoint<D>>> {
-        let points = match nodes_of(&pairs, at) {
-            Some(paired) => paired.iter().map(PairedNode::point).collect(),
-            None => surface_points(session, &mesh, &parts[at])?,
-        };
-        Ok(points.into_iter().map(|point| held.whole(point)).collect())
+        Ok(match nodes_of(&pairs, at) {
+            Some(paired) => paired.iter().map(|node| node.point(&held)).collect(),
+            None => surface_points(session, &mesh, &parts[at])?.into_iter().map(|p| held.whole(p)).collect(),
+        })
     };
     let surface_effects = surface_effects(session, &job.contact, &mesh, points)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;

@@ -4,28 +4,22 @@ use super::{
     materials::Materials,
     parts::part_of,
     side_words::names_of_sides,
-    sides::{Sides, conflict, rubs},
+    sides::{Sides, conflict, rubs, slides_with_masters},
 };
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        coupling::{Coupling, HELD_TOGETHER, ghosts_of_surfaces, held_share, is_held, needed_ghosts},
-        pairs::{Pair, PairedNode, is_exchanged, pair_of, shares},
+        coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
+        pairs::{Pair, PairedNode, inclined, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
-    job::{self, Job, Scalar, Side, Sliding},
-    laws::digits::Digits,
-    linear_algebra::tensor::{Vector, dot, larger, norm},
+    job::{self, Job, Side, Sliding},
+    linear_algebra::tensor::{Vector, norm},
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
-
-/// The largest wrong stress as a share of the part of a pressure that lacks, about as found on inclined faces of blocks.
-const SHARE_THAT_SPOILS: f64 = 0.5;
-/// Wrong stresses below this share of the contact pressure have no warning.
-const INCLINED: f64 = 0.04;
 
 /// The contacts of a job between bodies, with the side of each that carries the law; the mesh gets the ghosts that their equations need.
 /// `earlier` has the contacts of the run from whose state this one starts, each with whether its sides were exchanged. Collective.
@@ -52,15 +46,6 @@ pub(super) fn find<const D: usize>(
         if contact.against.is_empty() {
             continue;
         }
-        let varies = contact.normal.gap().is_some_and(Scalar::depends_on_position);
-        session.agree(if D == 3 && mesh.order() == 2 && varies {
-            Err(Error::Refused(format!(
-                "contact.{number}: a `gap` that depends on the place is not available between bodies of quadratic cells in space; use \
-                 [mesh] order = 1, or give the meshes this distance"
-            )))
-        } else {
-            Ok(())
-        })?;
         let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
         let against = facets(mesh, &contact.against);
         refuse_joined(session, mesh, (number, contact), [&on, &against])?;
@@ -207,7 +192,7 @@ pub(super) fn coupling<const D: usize>(
     if pairs.is_empty() {
         return Ok(None);
     }
-    Coupling::new(session, mesh, &shares(mesh, pairs), held).map(Some)
+    Coupling::new(session, mesh, (&shares(mesh, pairs), inclined(pairs, held)), held).map(Some)
 }
 
 /// The shares of the masters that a node of a pair faces on the other side, each with the length of the free part of a direction there.
@@ -221,8 +206,8 @@ fn faced_along<const D: usize, const S: usize>(
     faced.map(|(master, share)| (*share, free(*master))).collect()
 }
 
-/// Warns of nodes that supports hold, as some of the nodes that they face, along a direction that is inclined to the boundary: the
-/// forces on those that are free there lack the part along it. Collective.
+/// Warns of nodes with friction or adhesion that supports hold along a direction which is inclined to the boundary, and not all that they face:
+/// a sliding of the other body there is none of their motions, and meets no resistance. Collective.
 pub(super) fn warnings_of_inclined_supports<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
@@ -230,29 +215,20 @@ pub(super) fn warnings_of_inclined_supports<const D: usize, const S: usize>(
 ) -> Vec<String> {
     let Body { coupling: Some(coupling), held, pairs, .. } = body else { return Vec::new() };
     let masters_of: BTreeMap<u32, &[(u32, f64)]> = coupling.slaves().collect();
-    let lack = |node: &PairedNode<D>| {
+    let slides = |node: &&PairedNode<D>| {
         let masters = masters_of.get(&node.node).copied().unwrap_or(&[]);
-        let (frame, free) = held.frame(node.node as usize);
-        let of_direction = |direction: &Vector<D>| {
-            let faced = faced_along(body, (node, masters), direction);
-            let free: f64 =
-                faced.iter().filter(|(_, free)| !is_held(*free)).map(|(share, _)| share.abs()).sum();
-            let is_held_together = held_share(faced) >= HELD_TOGETHER;
-            if is_held_together { SHARE_THAT_SPOILS * dot(direction, &node.normal).abs() * free } else { 0.0 }
-        };
-        frame[free..].iter().map(of_direction).fold(0.0, larger)
+        slides_with_masters(node, held, |direction| faced_along(body, (node, masters), direction))
     };
     let of_pair = |pair: &Pair<D>| {
-        let most = session.largest([pair.nodes.iter().map(lack).fold(0.0, larger)])[0];
-        (most > INCLINED).then(|| {
+        let count = session.total(pair.nodes.iter().filter(slides).count());
+        (count > 0 && rubs(&job.contact[pair.contact])).then(|| {
             format!(
-                "contact.{}: supports hold nodes of {} along a direction that is inclined to it, and not all that they face of {} there: \
-                 stresses beside these nodes may be wrong by about {} % of the contact pressure; use meshes of both sides that fit \
-                 along this edge, supports at right angles to the boundary, or hold neither side there",
+                "contact.{}: supports hold {count} nodes of {} along a direction that is inclined to it, and not all that they face of {} there: \
+                 friction and adhesion do not act at these nodes on what slides along this direction; use meshes of both sides that fit along \
+                 this edge, supports at right angles to the boundary, or hold neither side there",
                 pair.contact,
                 names_of_sides(job, pair)[0],
                 names_of_sides(job, pair)[1],
-                Digits(100.0 * most)
             )
         })
     };

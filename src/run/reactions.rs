@@ -6,7 +6,6 @@ use crate::{
     fem::{
         body::Body,
         effect::{ELASTIC, Form, Step, Supports},
-        pairs::PairedNode,
         space::{Held, SurfacePoint, facets, surface_points},
         state::State,
     },
@@ -276,9 +275,10 @@ fn residual<const D: usize, const S: usize>(
         body.add_forces_at_rest(state, &mut values)?;
         if let Some(traction) = &state.contact_traction {
             let traction = traction.owned()?;
-            for point in body.pairs.iter().flat_map(|pair| &pair.nodes).map(PairedNode::point) {
-                let force = point.value(&traction).map(|value| -point.weight * value);
-                body.add_contact_force((point.node, &force), &mut values);
+            for node in body.pairs.iter().flat_map(|pair| &pair.nodes) {
+                let of_node = std::array::from_fn(|i| traction[node.node as usize * D + i]);
+                let force = node.whole_traction(&body.held, &of_node).map(|value| -node.weight * value);
+                body.add_contact_force((node.node, &force), &mut values);
             }
         }
         let rest = vec![0.0; values.len()];

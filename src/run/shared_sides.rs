@@ -3,7 +3,7 @@
 use super::{
     parts::part_of,
     side_words::names_of_sides,
-    sides::{Sides, meet},
+    sides::{Sides, meet, rubs},
 };
 use crate::{
     error::{Error, Result},
@@ -184,6 +184,38 @@ impl<const D: usize> Sides<'_, D> {
                     names_of_sides(job, pair)[0]
                 )))
             })?;
+        }
+        Ok(())
+    }
+
+    /// Lets nodes with friction that supports hold along directions which are inclined to the boundary, as some of the nodes that they face,
+    /// leave their part of the surface to neighbours, where the law allows it and each facet keeps a node with the law: a sliding of the
+    /// bodies along the boundary need not be a motion of such a node.
+    pub(super) fn leave_inclined_nodes(&self, pairs: &mut [Pair<D>]) -> Result<(), Agreed> {
+        let Self { session, job, mesh, .. } = *self;
+        for pair in pairs.iter_mut().filter(|pair| pair.sharing.is_empty()) {
+            let contact = &job.contact[pair.contact];
+            if contact.against.is_empty() || !rubs(contact) || !contact.is_without_scale() {
+                continue;
+            }
+            let mut inclined: BTreeSet<u32> =
+                gather(session.world(), &self.inclined(pair))?.into_iter().collect();
+            let [own, _] = pair.nodes_of_all(session, mesh)?;
+            let mut kept = Vec::new();
+            for facet in &pair.on {
+                let nodes = mesh.facet_nodes(*facet).map(|node| mesh.global_node(node));
+                let nodes: Vec<u32> = nodes.filter(|node| own.contains(node)).collect();
+                if nodes.iter().all(|node| inclined.contains(node)) {
+                    kept.extend(nodes);
+                }
+            }
+            gather(session.world(), &kept)?.iter().for_each(|node| {
+                inclined.remove(node);
+            });
+            if !inclined.is_empty() {
+                pair.lawless.extend(inclined);
+                pair.form(session, mesh, &mesh.nodes)?;
+            }
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use super::materials::Materials;
 use crate::{
     error::Result,
     fem::{
-        coupling::{HELD_TOGETHER, held_share},
+        coupling::{HELD_TOGETHER, Inclined, held_share, is_held},
         effect::Supports,
         pairs::{Exchange, Pair, PairedNode},
         space::{Held, facets},
@@ -56,7 +56,8 @@ impl<'a, const D: usize> Sides<'a, D> {
     ) -> Result<Self, Agreed> {
         let (held, directions) = (Held::default(), BTreeMap::new());
         let mut sides = Self { session, job, mesh, materials, earlier, held, directions };
-        if job.contact.iter().all(|contact| contact.against.is_empty() || contact.side != Side::Auto) {
+        let ignores_supports = |contact: &job::Contact| contact.side != Side::Auto && !rubs(contact);
+        if job.contact.iter().all(|contact| contact.against.is_empty() || ignores_supports(contact)) {
             return Ok(sides);
         }
         let layout = session.agree(DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts))?;
@@ -86,12 +87,13 @@ impl<'a, const D: usize> Sides<'a, D> {
     /// Settles the sides of pairs that were formed each for itself, where several meet. Each step keeps what the steps before it have chosen
     /// where it can: no node carries the law of one contact and is faced in another one; those that face the nodes of another pair let
     /// these carry both laws; facets that carry the laws of several contacts face the bodies of all; and what is left of nodes that belong
-    /// to several contacts is left to their neighbours.
+    /// to several contacts, or that supports hold such that friction cannot act, is left to their neighbours.
     pub(super) fn settle(&self, pairs: &mut [Pair<D>]) -> Result<(), Agreed> {
         self.untangle(pairs)?;
         self.follow(pairs)?;
         self.share(pairs)?;
-        self.leave_shared_nodes(pairs)
+        self.leave_shared_nodes(pairs)?;
+        self.leave_inclined_nodes(pairs)
     }
 
     /// Finds what the nodes of a pair face, on the side of the job's choice.
@@ -235,18 +237,28 @@ impl<'a, const D: usize> Sides<'a, D> {
 
     /// The nodes owned here whose law supports prevent, by global numbers.
     fn conflicts(&self, pair: &Pair<D>) -> Vec<u32> {
-        let contact = &self.job.contact[pair.contact];
-        let free = |master: &u32, direction: &Vector<D>| -> f64 {
+        let rubs = rubs(&self.job.contact[pair.contact]);
+        let held = |node: &&PairedNode<D>| {
+            conflict(node, &self.held, rubs, |direction| self.facing(node, direction)).is_some()
+        };
+        pair.nodes.iter().filter(held).map(|node| self.mesh.global_node(node.node)).collect()
+    }
+
+    /// The nodes owned here of which [`slides_with_masters`] holds, by global numbers.
+    pub(super) fn inclined(&self, pair: &Pair<D>) -> Vec<u32> {
+        let slides = |node: &&PairedNode<D>| {
+            slides_with_masters(node, &self.held, |direction| self.facing(node, direction))
+        };
+        pair.nodes.iter().filter(slides).map(|node| self.mesh.global_node(node.node)).collect()
+    }
+
+    /// The shares of what a node faces, each with the length of the free part of a direction there.
+    fn facing(&self, node: &PairedNode<D>, direction: &Vector<D>) -> Vec<(f64, f64)> {
+        let free = |master: &u32| {
             let held = self.directions.get(master).into_iter().flatten();
             norm(&held.fold(*direction, |left, held| add_scaled(&left, -dot(held, direction), held)))
         };
-        let nodes = pair.nodes.iter().filter(|node| {
-            let facing = |direction: &Vector<D>| -> Vec<(f64, f64)> {
-                node.faced().map(|(master, share)| (*share, free(master, direction))).collect()
-            };
-            conflict(node, &self.held, rubs(contact), facing).is_some()
-        });
-        nodes.map(|node| self.mesh.global_node(node.node)).collect()
+        node.faced().map(|(master, share)| (*share, free(master))).collect()
     }
 
     /// The number of nodes that carry the law of one pair and are faced in another one, where the law does not leave them to their neighbours.
@@ -300,6 +312,19 @@ pub(super) fn rubs(contact: &job::Contact) -> bool {
     contact.friction.is_some() || contact.adhesion.is_some()
 }
 
+/// Whether a sliding of the other body moves a node along the boundary or opens it, because supports hold the node along a direction that is
+/// inclined to the boundary, and not all that it faces, given as for [`conflict`].
+pub(super) fn slides_with_masters<const D: usize>(
+    node: &PairedNode<D>,
+    held: &Held<D>,
+    facing: impl Fn(&Vector<D>) -> Vec<(f64, f64)>,
+) -> bool {
+    node.inclination(held).is_some_and(|Inclined { held, .. }| {
+        let size = norm(&held);
+        facing(&held.map(|x| x / size)).iter().any(|(share, free)| share.abs() > ROUNDING && !is_held(*free))
+    })
+}
+
 /// Why supports prevent the law at a node that faces another body, given for a direction the shares of what it faces with the lengths of
 /// the free parts of the direction there. A known velocity must be relative to known ones.
 pub(super) fn conflict<const D: usize>(
@@ -311,7 +336,11 @@ pub(super) fn conflict<const D: usize>(
     if node.masters.is_empty() {
         return None;
     }
-    let normal = held.whole(node.point()).normal;
+    // Where a free motion opens a flat boundary, what supports hold does not matter to the pressure.
+    if !rubs && node.inclination(held).is_some() {
+        return None;
+    }
+    let normal = node.point(held).normal;
     let (frame, free) = held.frame(node.node as usize);
     frame[free..].iter().find_map(|direction| {
         let facing = facing(direction);
@@ -357,7 +386,6 @@ fn is_coarser<const D: usize>(session: &Session, pair: &Pair<D>) -> Result<bool,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::coupling::is_held;
 
     const ANGLES: [f64; 4] = [0.0, 1.0, 5.0, 20.0];
 
@@ -365,8 +393,13 @@ mod tests {
         [degrees.to_radians().cos(), degrees.to_radians().sin()]
     }
 
-    /// A node with this normal that is held at the first angle to x and faces one that is held at the second one.
-    fn found(normal: Vector<2>, [own, other]: [f64; 2], rubs: bool) -> Option<&'static str> {
+    /// A node with this normal of a surface that is curved there, or not, which is held at the first angle to x and faces one that is held at
+    /// the second one.
+    fn found(
+        (normal, is_curved): (Vector<2>, bool),
+        [own, other]: [f64; 2],
+        rubs: bool,
+    ) -> Option<&'static str> {
         let mut held = Held::from(vec![false; 4]);
         held.hold(0, [at(own)].into_iter());
         held.hold(1, [at(other)].into_iter());
@@ -380,6 +413,7 @@ mod tests {
             neighbours: Vec::new(),
             stretch: 1.0,
             sharpness: 0.0,
+            curvature: if is_curved { 1.0 } else { 0.0 },
         };
         conflict(&node, &held, rubs, |direction| vec![(1.0, norm(&held.free_part(1, direction)))])
     }
@@ -390,20 +424,23 @@ mod tests {
         for degrees in ANGLES {
             let expected = if degrees == 0.0 { None } else { differ };
             // With friction it matters whichever of both is oblique.
-            assert_eq!(found([0.0, -1.0], [degrees, 0.0], true), expected, "{degrees}");
-            assert_eq!(found([0.0, -1.0], [0.0, degrees], true), expected, "{degrees}");
-            assert_eq!(found([0.0, -1.0], [degrees; 2], true), None, "{degrees}");
+            assert_eq!(found(([0.0, -1.0], true), [degrees, 0.0], true), expected, "{degrees}");
+            assert_eq!(found(([0.0, -1.0], true), [0.0, degrees], true), expected, "{degrees}");
+            assert_eq!(found(([0.0, -1.0], true), [degrees; 2], true), None, "{degrees}");
             // Without it, what is held along the boundary does not matter, and what has a part along the normal does.
-            assert_eq!(found([0.0, -1.0], [0.0, degrees], false), None, "{degrees}");
-            assert_eq!(found([0.0, -1.0], [degrees, 0.0], false), expected, "{degrees}");
-            assert_eq!(found([-1.0, 0.0], [degrees, 0.0], false), expected, "{degrees}");
+            assert_eq!(found(([0.0, -1.0], true), [0.0, degrees], false), None, "{degrees}");
+            assert_eq!(found(([0.0, -1.0], true), [degrees, 0.0], false), expected, "{degrees}");
+            assert_eq!(found(([-1.0, 0.0], true), [degrees, 0.0], false), expected, "{degrees}");
+            // Unless the boundary is flat: a free motion then opens it.
+            assert_eq!(found(([0.0, -1.0], false), [degrees, 0.0], false), None, "{degrees}");
+            assert_eq!(found(([0.0, -1.0], false), [degrees, 0.0], true), expected, "{degrees}");
         }
         let alone = "a support holds it along the normal, and not what it faces";
-        assert_eq!(found([-1.0, 0.0], [0.0, 90.0], false), Some(alone));
+        assert_eq!(found(([-1.0, 0.0], true), [0.0, 90.0], false), Some(alone));
         let along =
             "a support holds it along the boundary, where friction or adhesion act, and not what it faces";
-        assert_eq!(found([0.0, -1.0], [0.0, 90.0], true), Some(along));
-        assert_eq!(found([0.0, -1.0], [0.0, 90.0], false), None);
+        assert_eq!(found(([0.0, -1.0], true), [0.0, 90.0], true), Some(along));
+        assert_eq!(found(([0.0, -1.0], true), [0.0, 90.0], false), None);
     }
 
     #[test]
@@ -412,7 +449,11 @@ mod tests {
             let mut held = Held::<2>::from(vec![false; 4]);
             held.hold(1, [at(degrees)].into_iter());
             let free = norm(&held.free_part(1, &at(0.0)));
-            assert_eq!(is_held(free), found([0.0, -1.0], [0.0, degrees], true).is_none(), "{degrees}");
+            assert_eq!(
+                is_held(free),
+                found(([0.0, -1.0], true), [0.0, degrees], true).is_none(),
+                "{degrees}"
+            );
         }
     }
 }

@@ -91,6 +91,8 @@ pub(super) struct Point<const D: usize> {
     pub stretch: f64,
     /// The angle in rad of the edges of that body over the point.
     pub sharpness: f64,
+    /// Whether supports hold it along directions that are inclined to the boundary, which faces another body.
+    pub is_inclined: bool,
     /// Whether its normal follows what it faces: no other contact acts at the node.
     pub turns: bool,
     /// On an edge of the body, or where it slides along an obstacle: the directions along which it may touch the obstacle; no other contact
@@ -156,6 +158,7 @@ impl<const D: usize> Point<D> {
             facet_size: f64::INFINITY,
             stretch: 1.0,
             sharpness: 0.0,
+            is_inclined: false,
             faced_at: [0.0; D],
             found_deeper: 0.0,
             turns: false,
@@ -207,9 +210,8 @@ impl<const D: usize> Point<D> {
         if !self.turns {
             return;
         }
-        let node = self.node() as u32;
-        let turned =
-            Self::nodal(held.whole(SurfacePoint { node, normal: *normal, weight: self.weight }), held);
+        let point = SurfacePoint { node: self.node() as u32, normal: *normal, weight: self.weight };
+        let turned = Self::nodal(if self.is_inclined { point } else { held.whole(point) }, held);
         if [self.unknown, turned.unknown] == [Unknown::Parameter; 2] {
             (self.normal, self.direction) = (turned.normal, turned.direction);
             (self.dual, self.wall) = (turned.dual, turned.wall);
@@ -296,7 +298,8 @@ impl<const D: usize> Point<D> {
     /// A point at a node that faces another body, whose values are relative to that body.
     pub(super) fn paired(node: &PairedNode<D>, held: &Held<D>) -> Self {
         let PairedNode { distance, stretch, sharpness, .. } = *node;
-        Self { distance, stretch, sharpness, ..Self::nodal(held.whole(node.point()), held) }
+        let is_inclined = node.inclination(held).is_some();
+        Self { distance, stretch, sharpness, is_inclined, ..Self::nodal(node.point(held), held) }
     }
 
     /// The part of the surface for which it stands in m^(D-1).

@@ -269,6 +269,7 @@ impl<const D: usize> Contact<D> {
         for (at, node) in nodes.iter().enumerate() {
             let point = &mut self.normal.points[at];
             (point.stretch, point.sharpness) = (node.stretch, node.sharpness);
+            point.is_inclined = node.inclination(held).is_some();
             point.faced_at = std::array::from_fn(|i| displacement[point.node() * D + i]);
             point.turn(&node.normal, held);
             // Along a normal that is not that of the plane.
