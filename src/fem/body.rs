@@ -352,9 +352,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mesh = &self.mesh;
         for (number, contact) in self.contacts.iter_mut().enumerate() {
             if let Some(pair) = exchanged(&self.pairs, number) {
-                contact.set_places(|node| {
-                    std::array::from_fn(|i| pair.across(mesh, node, |node| mesh.nodes[node][i]))
-                });
+                contact.set_places(|node| pair.place_across(mesh, node));
             }
         }
     }

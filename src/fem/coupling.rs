@@ -12,9 +12,9 @@
 //! Wohlmuth (2005).
 //!
 //! Where what supports hold is inclined to a flat boundary with the normal `n`, a free motion that opens it by 1 is `m = n_f / |n_f|^2`, with
-//! the free part `n_f` of `n` and the held part `n_h`. The velocity of the masters, `w = sum_b P_ab v_b`, then adds `w_f + m n_h . (w - g)` to
-//! the free part of that of the slave node, where `g` is that of its masters along what supports hold there: `n . z = n . (v - w)` is the
-//! relative normal velocity as without supports, and the pressure acts on all masters along `n`.
+//! the free part `n_f` of `n` and the held part `n_h`. With the velocity `w = sum_b P_ab v_b` of the masters, the free part of that of the
+//! slave node is then `v_f = z_f + w_f + m n_h . (w - v)`, where `n_h . v` is known: `n_f . z = n . (v - w)` is the relative normal velocity as
+//! without supports, and the pressure acts on all masters along `n`.
 
 use super::space::Held;
 use crate::{
@@ -254,8 +254,9 @@ impl<const D: usize> Coupling<D> {
         self.blocks.contains_key(&global)
     }
 
-    /// Adds `factor` times the values of the surface that they face to those of slave nodes, given local values with ghosts.
-    fn add_masters(&self, factor: f64, held: &Held<D>, values: &mut [f64]) {
+    /// Adds `factor` times the free parts of the values of the surface that they face to those of slave nodes, whose held parts are those of
+    /// the bodies, given local values with ghosts.
+    fn add_free_masters(&self, factor: f64, held: &Held<D>, values: &mut [f64]) {
         for (slave, masters) in self.slaves() {
             let mut sum: Vector<D> = [0.0; D];
             for (master, share) in masters {
@@ -263,13 +264,11 @@ impl<const D: usize> Coupling<D> {
             }
             let mut moved = held.free_part(slave as usize, &sum);
             if let Some(Inclined { opening, held, .. }) = find(&self.inclined, slave) {
-                let of_held =
-                    self.held_together(slave).map(|along| dot(held, &along.direction) * along.mean(values));
-                moved = add_scaled(&moved, dot(held, &sum) - of_held.sum::<f64>(), opening);
+                let own = std::array::from_fn(|i| values[slave as usize * D + i]);
+                moved = add_scaled(&moved, dot(held, &sum) - dot(held, &own), opening);
             }
             (0..D).for_each(|i| values[slave as usize * D + i] += factor * moved[i]);
         }
-        self.add_held_masters(factor, values);
     }
 
     /// The directions along which supports hold a slave node and masters of it.
@@ -278,7 +277,7 @@ impl<const D: usize> Coupling<D> {
         self.held_together[first..].iter().take_while(move |held| held.slave == slave)
     }
 
-    /// The same along directions in which supports hold both, alone.
+    /// The same along directions in which supports hold both.
     fn add_held_masters(&self, factor: f64, values: &mut [f64]) {
         for along in &self.held_together {
             let (mean, direction) = (along.mean(values), &along.direction);
@@ -299,7 +298,12 @@ impl<const D: usize> Coupling<D> {
         }
         let mut relative = Buffer::of(&self.pool);
         relative.values.extend_from_slice(values);
-        self.add_masters(-1.0, held, &mut relative.values);
+        self.subtract_masters(held, &mut relative.values);
+        for Inclined { slave, held, .. } in &self.inclined {
+            let value = &mut relative.values[*slave as usize * D..][..D];
+            let share = dot(held, &std::array::from_fn(|i| value[i])) / dot(held, held);
+            (0..D).for_each(|i| value[i] -= share * held[i]);
+        }
         Seen::Relative(relative)
     }
 
@@ -350,21 +354,30 @@ impl<const D: usize> Coupling<D> {
     /// `z = T^-1 v`. Collective.
     pub fn make_relative(&self, held: &Held<D>, velocity: &mut DistributedVector) -> Result<()> {
         velocity.update_ghosts()?;
-        self.add_masters(-1.0, held, &mut velocity.local_mut()?);
+        self.subtract_masters(held, &mut velocity.local_mut()?);
         Ok(())
     }
 
-    /// `v = T z` of the unknowns `z` that are zero but for the velocities of supports, given these. Collective.
-    pub fn carry(&self, held: &Held<D>, velocity: &mut DistributedVector) -> Result<()> {
+    /// Makes the velocities of supports relative, which are zero at free components: those of the unknowns. Collective.
+    pub fn make_supports_relative(&self, velocity: &mut DistributedVector) -> Result<()> {
         velocity.update_ghosts()?;
         self.add_held_masters(-1.0, &mut velocity.local_mut()?);
-        self.make_absolute(held, velocity)
+        Ok(())
+    }
+
+    fn subtract_masters(&self, held: &Held<D>, values: &mut [f64]) {
+        self.add_free_masters(-1.0, held, values);
+        self.add_held_masters(-1.0, values);
     }
 
     /// `v = T z`. Collective.
     pub fn make_absolute(&self, held: &Held<D>, velocity: &mut DistributedVector) -> Result<()> {
         velocity.update_ghosts()?;
-        self.add_masters(1.0, held, &mut velocity.local_mut()?);
+        {
+            let mut values = velocity.local_mut()?;
+            self.add_held_masters(1.0, &mut values);
+            self.add_free_masters(1.0, held, &mut values);
+        }
         velocity.update_ghosts()
     }
 

@@ -357,6 +357,16 @@ impl<const D: usize> Pair<D> {
         if share > 0.5 { sum / share } else { value(local) }
     }
 
+    /// The undeformed place in m of the other side where it faces a node with this local number; the own one where nothing is faced.
+    pub fn place_across(&self, mesh: &Mesh<D>, local: usize) -> Vector<D> {
+        let faced = self.node(local).into_iter().flat_map(PairedNode::faced);
+        let faced = faced.filter_map(|(master, share)| Some((mesh.local_node(*master)?, share)));
+        let (place, sum) = faced.fold(([0.0; D], 0.0), |(place, sum), (node, share)| {
+            (add_scaled(&place, *share, &mesh.nodes[node]), sum + share)
+        });
+        if sum > 0.5 { place.map(|x| x / sum) } else { mesh.nodes[local] }
+    }
+
     /// The nodes owned here of the slave facets that face those of the other side on all ranks, ascending, with the local nodes of the mesh
     /// at `places` in m; and whether nodes without a law leave facets of this rank bare. Collective.
     fn paired_nodes(

@@ -131,10 +131,15 @@ fn contacts<const D: usize>(
         laws.follows_surface = contact.obstacle.is_some() && contact.sliding == Sliding::Finite;
         laws.turn_edges(session, mesh, held)?;
         if let Some(motion) = motion {
-            let points: Vec<SurfacePoint<D>> = if contact.quadrature == Quadrature::Nodal && !laws.is_paired {
-                laws.normal.boundary().surface_points().collect()
-            } else {
-                surface_points(session, mesh, &facets)?.into_iter().map(|point| held.whole(point)).collect()
+            let points: Vec<SurfacePoint<D>> = match nodes_of(pairs, number) {
+                Some(paired) => {
+                    let others = paired.iter().filter(|node| node.inclination(held).is_none());
+                    others.map(|node| node.point(held)).collect()
+                }
+                None if contact.quadrature == Quadrature::Nodal => {
+                    laws.normal.boundary().surface_points().collect()
+                }
+                None => surface_points(session, mesh, &facets)?.into_iter().map(|p| held.whole(p)).collect(),
             };
             session.agree(refuse_moving_contact(contact, mesh, &points, (held, motion)))?;
         }

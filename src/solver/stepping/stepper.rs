@@ -697,7 +697,7 @@ impl Stepper {
         }
         body.held.clear(&mut forces.owned_mut()?);
         if let Some(supports) = &mut self.moving_supports {
-            self.solver.multiply(&supports.velocity, &mut supports.held)?;
+            self.solver.multiply(&supports.relative, &mut supports.held)?;
             forces.add_scaled(1.0, &supports.held)?;
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Moving supports in the equations of a step.
 //!
 //! With the velocity `g` of the supports, zero at free components, and the matrix `K` before components are held, the forces `b` of a
-//! step become `b - K g` at free components and `D g` at held ones, where `D` is the diagonal that assembly leaves there. The solution
+//! step become `b - K g` at free components and `D g` at held ones (in contact between bodies with what the unknowns have of `g`), where `D` is the diagonal that assembly leaves there. The solution
 //! is the whole velocity `v`, which is `g` at held components. The reactions are `K v + F - b`, with the forces `F` of flow, and
 //! their work in a step of length `k` is `k g . (K v + F - b) = k (v . K g + g . (F - b))`.
 
@@ -20,7 +20,9 @@ const LEAST_REDUCTION: f64 = 0.1;
 /// Work vectors.
 pub(super) struct MovingSupports {
     /// `g`.
-    pub velocity: DistributedVector,
+    velocity: DistributedVector,
+    /// The same where unknowns are relative velocities, in contact between bodies.
+    pub relative: DistributedVector,
     /// The same with the velocities of the nodes that move along with held ones in contact between bodies, with ghosts.
     carried: DistributedVector,
     /// `K g`.
@@ -46,6 +48,7 @@ impl MovingSupports {
         let like = || state.velocity.like();
         Ok(Some(Self {
             velocity: like()?,
+            relative: like()?,
             carried: like()?,
             coupling: like()?,
             known: like()?,
@@ -70,9 +73,13 @@ impl MovingSupports {
             motion.write_velocity(step.time, &start, length, &mut velocity)
         };
         session.agree(written)?;
-        self.carried.copy_from(&self.velocity)?;
+        self.relative.copy_from(&self.velocity)?;
+        if let Some(coupling) = &body.coupling {
+            coupling.make_supports_relative(&mut self.relative)?;
+        }
+        self.carried.copy_from(&self.relative)?;
         match &body.coupling {
-            Some(coupling) => coupling.carry(&body.held, &mut self.carried)?,
+            Some(coupling) => coupling.make_absolute(&body.held, &mut self.carried)?,
             None => self.carried.update_ghosts()?,
         }
         {

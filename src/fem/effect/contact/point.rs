@@ -64,6 +64,9 @@ pub(super) struct Point<const D: usize> {
     /// Weight of each node in the mean.
     shares: [f64; D],
     pub normal: Vector<D>,
+    /// The vector whose product with a value is its normal component: the normal, or where the point is inclined to supports its free part, as
+    /// values are relative to what it faces.
+    pub sense: Vector<D>,
     /// Quadrature weight in m^(D-1), and that at the start of the step.
     pub weight: f64,
     pub weight_before: f64,
@@ -144,6 +147,7 @@ impl<const D: usize> Point<D> {
             count: nodes.len().min(D),
             shares: [0.0; D],
             normal,
+            sense: normal,
             weight,
             weight_before: weight,
             force: [[0.0; D]; D],
@@ -216,6 +220,7 @@ impl<const D: usize> Point<D> {
             (self.normal, self.direction) = (turned.normal, turned.direction);
             (self.dual, self.wall) = (turned.dual, turned.wall);
             (self.free_length, self.force) = (turned.free_length, turned.force);
+            self.set_sense();
         }
     }
 
@@ -275,6 +280,7 @@ impl<const D: usize> Point<D> {
         let (free, length) = self.edge.as_ref().map_or((normal, 1.0), |edge| edge.free_part(&normal));
         (self.normal, self.direction, self.dual, self.wall) = (normal, free, free, free);
         self.free_length = length;
+        self.set_sense();
         self.set_weight(weight);
     }
 
@@ -299,7 +305,15 @@ impl<const D: usize> Point<D> {
     pub(super) fn paired(node: &PairedNode<D>, held: &Held<D>) -> Self {
         let PairedNode { distance, stretch, sharpness, .. } = *node;
         let is_inclined = node.inclination(held).is_some();
-        Self { distance, stretch, sharpness, is_inclined, ..Self::nodal(node.point(held), held) }
+        let mut point =
+            Self { distance, stretch, sharpness, is_inclined, ..Self::nodal(node.point(held), held) };
+        point.set_sense();
+        point
+    }
+
+    fn set_sense(&mut self) {
+        self.sense =
+            if self.is_inclined { self.direction.map(|d| self.free_length * d) } else { self.normal };
     }
 
     /// The part of the surface for which it stands in m^(D-1).
@@ -348,13 +362,13 @@ impl<const D: usize> Point<D> {
         for a in 0..self.count {
             let value = &nodal[numbers[a] as usize * D..][..D];
             for i in 0..D {
-                sum += self.shares[a] * self.normal[i] * value[i];
+                sum += self.shares[a] * self.sense[i] * value[i];
             }
         }
         for other in &self.others {
             let value = &nodal[other.numbers[vectors as usize] as usize * D..][..D];
             for i in 0..D {
-                sum += other.share * self.normal[i] * value[i];
+                sum += other.share * self.sense[i] * value[i];
             }
         }
         sum

@@ -274,7 +274,7 @@ impl<const D: usize> Contact<D> {
             point.turn(&node.normal, held);
             // Along a normal that is not that of the plane.
             let open = node.distance / dot(&node.normal, &point.normal);
-            point.distance = open + dot(&point.faced_at, &point.normal);
+            point.distance = open + dot(&point.faced_at, &point.sense);
             point.found_deeper = 0.0;
             if let Some((touches, has_mass)) = touches.filter(|_| open.is_finite()) {
                 let touch = touches[at];
@@ -284,7 +284,7 @@ impl<const D: usize> Contact<D> {
                     let (kept, normal) = touch.plane(found, point);
                     point.turn(&normal, held);
                     let more = kept - found;
-                    point.distance = open + more + dot(&point.faced_at, &point.normal);
+                    point.distance = open + more + dot(&point.faced_at, &point.sense);
                     found = kept;
                 }
                 point.found_deeper = touch.found_deeper(found, point);
