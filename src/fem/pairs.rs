@@ -897,6 +897,39 @@ mod tests {
         assert!(most[0] > 1e-4 && most[1] < 1e-15, "{most:?}");
     }
 
+    #[test]
+    fn a_flat_boundary_may_be_inclined_to_a_support_and_a_curved_one_is_not_to_a_plane_of_symmetry() {
+        let mut held = Held::<2>::from(vec![false; 2]);
+        held.hold(0, std::iter::once([0.0, 1.0]));
+        let at = |normal: Vector<2>, curvature: f64| PairedNode {
+            node: 0,
+            normal,
+            weight: 1.0,
+            distance: 0.0,
+            masters: Vec::new(),
+            neighbours: Vec::new(),
+            stretch: 1.0,
+            sharpness: 0.0,
+            curvature,
+        };
+        for count in [3, 7, 40] {
+            let (facets, _) = arc(count, 0, true);
+            let node = at(facets[0].normal, curvatures(&facets)[&0]);
+            assert_eq!(node.inclination(&held), None, "{count} facets");
+            assert_eq!(node.point(&held).normal, [1.0, 0.0], "{count} facets");
+        }
+        let node = at([0.96, 0.28], 1e-12);
+        let Inclined { opening, held: part, .. } = node.inclination(&held).expect("inclined");
+        assert_eq!(node.point(&held).normal, node.normal);
+        assert!((dot(&opening, &node.normal) - 1.0).abs() < 1e-15 && opening[1] == 0.0, "{opening:?}");
+        assert!(norm(&add_scaled(&part, -1.0, &[0.0, 0.28])) < 1e-15, "{part:?}");
+        let pressed = node.whole_traction(&held, &[3.0, 0.0]);
+        assert!(norm(&add_scaled(&pressed, -3.0, &node.normal)) < 1e-14, "a pressure of 3 Pa: {pressed:?}");
+        // Supports that hold the normal open nothing, and those at right angles to it do not matter.
+        assert_eq!(at([0.0, 1.0], 0.0).inclination(&held), None);
+        assert_eq!(at([1.0, 0.0], 0.0).inclination(&held), None);
+    }
+
     /// Quadratic triangles of a square of 0.6 m on a paraboloid, of uneven cells, with the places of their nodes.
     fn bowl(count: u32, first: u32, (height, bend): (f64, f64)) -> (Vec<Facet<3>>, BTreeMap<u32, Vector<3>>) {
         let at = |[x, y]: [f64; 2]| [x, y, height + bend * (x * x + y * y)];
