@@ -594,16 +594,17 @@ fn uniform_stress_passes_through_interfaces_that_are_inclined_to_supports() {
     for slopes in [[0.4, 0.25], [0.1, 0.0]] {
         for (order, side, ranks) in [("1", "on", 1), ("1", "against", 2), ("2", "on", 3), ("2", "against", 1)]
         {
-            let off = |case: Case| departure(&case.run_and_keep(ranks).results());
             let case = || squeezed(slopes, (order, side));
-            let compliant = "{ compliance = { stiffness = 1000 } }";
-            for (case, what) in [
-                (case(), "a constraint"),
-                (case().set("contact.0.normal", compliant).set("solver.tolerance", "1e-13"), "compliance"),
-                (case().set("support", UPHILL), "supports that move"),
-                (case().set("support", UPHILL).set("contact.0.sliding", "'finite'"), "finite sliding"),
-            ] {
-                let off = off(case);
+            let mut cases = vec![(case(), "a constraint")];
+            if slopes[1] != 0.0 {
+                let sliding = if side == "on" { "'small'" } else { "'finite'" };
+                let moved = case().set("support", UPHILL).set("contact.0.sliding", sliding);
+                cases.push((moved, "supports that move"));
+                let compliant = case().set("contact.0.normal", "{ compliance = { stiffness = 1000 } }");
+                cases.push((compliant.set("solver.tolerance", "1e-13"), "compliance"));
+            }
+            for (case, what) in cases {
+                let off = departure(&case.run_and_keep(ranks).results());
                 assert!(off < 1e-10, "slopes {slopes:?}, order {order}, side {side}, {what}: {off:e} Pa");
             }
         }
@@ -664,12 +665,12 @@ fn friction_beside_supports_that_are_inclined_to_the_interface_holds_any_uniform
 fn bodies_beside_supports_that_are_inclined_to_the_interface_keep_their_energy_in_every_scheme() {
     let case = |scheme: &str| {
         let case = squeezed([0.4, 0.25], ("1", "on"))
-            .set("time", &format!("{{ scheme = '{scheme}', end = 0.3, step = 0.01 }}"))
+            .set("time", &format!("{{ scheme = '{scheme}', end = 0.15, step = 0.01 }}"))
             .set("material.density", "1.0")
             .set("material.viscosity", "{ shear = 5.0, volumetric = 5.0 }")
             .without("region")
             .set("traction.0.value", "['2*sin(9*t)', 0, '-5*sin(4*t)']")
-            .set("checkpoint.every", "17");
+            .set("checkpoint.every", "7");
         match scheme {
             "midpoint" => case.set("contact.0.redistribute_mass", "true"),
             _ => case.set("support", UPHILL),
@@ -678,8 +679,8 @@ fn bodies_beside_supports_that_are_inclined_to_the_interface_keep_their_energy_i
     for scheme in ["lagged_euler", "implicit_euler", "bdf2", "midpoint"] {
         let alone = case(scheme).run_and_keep(1);
         let history = alone.results().text("history.csv");
-        let restarted = case(scheme).set("time.end", "0.2").run_and_keep(1);
-        restarted.run_with(1, &["--restart", "--set", "time.end=0.3"]).expect(0);
+        let restarted = case(scheme).set("time.end", "0.1").run_and_keep(1);
+        restarted.run_with(1, &["--restart", "--set", "time.end=0.15"]).expect(0);
         assert_eq!(restarted.results().text("history.csv"), history, "{scheme}");
         for ranks in [1, 2, 3] {
             let case = case(scheme).run_and_keep(ranks);
