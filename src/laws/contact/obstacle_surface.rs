@@ -2,7 +2,7 @@
 
 use super::{
     stl,
-    triangle::{Part, Ray, Triangle},
+    triangle::{Part, Ray, Triangle, find_nearest},
 };
 use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
 use rstar::RTree;
@@ -82,7 +82,9 @@ impl TriangulatedSurface {
         if place.iter().any(|x| !x.is_finite()) {
             return f64::NAN;
         }
-        let Some(triangle) = self.triangles.nearest_neighbor(*place) else { return f64::NAN };
+        let mut best = None;
+        find_nearest(self.triangles.root(), place, &mut best);
+        let Some((_, triangle)) = best else { return f64::NAN };
         let (outward, part) = triangle.nearest(place);
         let of_parts = &self.normals[triangle.number as usize];
         let normal = match part {

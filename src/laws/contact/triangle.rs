@@ -1,7 +1,7 @@
 //! A triangle of a surface in a tree of bounding boxes: its point nearest to a place, and its crossing with a ray.
 
 use crate::linear_algebra::tensor::{Vector, add_scaled, cross, dot};
-use rstar::{AABB, PointDistance, RTree, RTreeObject, SelectionFunction};
+use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject, SelectionFunction};
 use std::cell::Cell;
 
 /// A triangle, counterclockwise as seen from outside, and its number in its surface.
@@ -41,11 +41,6 @@ impl Triangle {
     pub(super) fn nearest(&self, place: &Vector<3>) -> (Vector<3>, Part) {
         let (sides, area) = (self.sides(), self.area());
         let from = self.corners.map(|corner| add_scaled(place, -1.0, &corner));
-        // False at triangles without area.
-        if (0..3).all(|k| dot(&cross(&sides[k], &from[k]), &area) > 0.0) {
-            let height = dot(&from[0], &area) / dot(&area, &area);
-            return (area.map(|x| height * x), Part::Face);
-        }
         let to_side = |k: usize| {
             let share = dot(&from[k], &sides[k]) / dot(&sides[k], &sides[k]);
             if share <= 0.0 {
@@ -56,10 +51,14 @@ impl Triangle {
                 (add_scaled(&from[k], -share, &sides[k]), Part::Side(k))
             }
         };
-        let shorter = |one: (Vector<3>, Part), other: (Vector<3>, Part)| {
-            if dot(&other.0, &other.0) < dot(&one.0, &one.0) { other } else { one }
-        };
-        shorter(shorter(to_side(0), to_side(1)), to_side(2))
+        // The nearest point lies on a side beyond which the place lies; at triangles without area on any.
+        let beyond = (0..3).filter(|k| dot(&cross(&sides[*k], &from[*k]), &area) <= 0.0);
+        let length = |(vector, _): &(Vector<3>, Part)| dot(vector, vector);
+        let nearest = beyond.map(to_side).min_by(|a, b| length(a).total_cmp(&length(b)));
+        nearest.unwrap_or_else(|| {
+            let height = dot(&from[0], &area) / dot(&area, &area);
+            (area.map(|x| height * x), Part::Face)
+        })
     }
 
     /// The distance along a ray, in lengths of its direction, to the plane of this triangle if the ray crosses the triangle, and whether
@@ -86,11 +85,44 @@ impl RTreeObject for Triangle {
     }
 }
 
-impl PointDistance for Triangle {
-    fn distance_2(&self, place: &Vector<3>) -> f64 {
-        let (vector, _) = self.nearest(place);
-        dot(&vector, &vector)
+/// Children of a node that are put in order together: nodes of trees that are loaded at once have no more of them in space.
+const AT_ONCE: usize = 8;
+
+/// Finds the triangle below a node of a tree that is nearest to a place, with the square of its distance in m2, unless the `best` one is as
+/// near. The nearest boxes come first, so that few are opened.
+pub(super) fn find_nearest<'a>(
+    node: &'a ParentNode<Triangle>,
+    place: &Vector<3>,
+    best: &mut Option<(f64, &'a Triangle)>,
+) {
+    for children in node.children().chunks(AT_ONCE) {
+        let mut order = [(f64::INFINITY, 0); AT_ONCE];
+        for (at, (child, entry)) in children.iter().zip(&mut order).enumerate() {
+            *entry = (to_box(&child.envelope(), place), at);
+        }
+        order.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
+        for (distance, at) in order.into_iter().take(children.len()) {
+            if best.is_some_and(|(least, _)| distance > least) {
+                break;
+            }
+            match &children[at] {
+                RTreeNode::Parent(node) => find_nearest(node, place, best),
+                RTreeNode::Leaf(triangle) => {
+                    let (vector, _) = triangle.nearest(place);
+                    let square = dot(&vector, &vector);
+                    if best.is_none_or(|(least, _)| square < least) {
+                        *best = Some((square, triangle));
+                    }
+                }
+            }
+        }
     }
+}
+
+/// The square of the distance of a place from a box.
+fn to_box(bounds: &AABB<Vector<3>>, place: &Vector<3>) -> f64 {
+    let (low, high) = (bounds.lower(), bounds.upper());
+    (0..3).map(|i| (low[i] - place[i]).max(place[i] - high[i]).max(0.0).powi(2)).sum()
 }
 
 /// A half line.
