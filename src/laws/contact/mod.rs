@@ -23,7 +23,6 @@ mod polyline;
 mod steepness;
 mod stl;
 mod table;
-mod triangle;
 mod wear;
 
 pub use adhesion::{Adhesion, Toughness};

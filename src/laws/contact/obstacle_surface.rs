@@ -1,11 +1,12 @@
 //! A triangulated surface that bounds an obstacle.
 
-use super::{
-    stl,
-    triangle::{Part, Ray, Triangle, find_nearest},
+use super::stl;
+use crate::linear_algebra::tensor::Vector;
+use parry3d_f64::{
+    math::Vector as Point,
+    query::{PointQuery, Ray, RayCullingMode},
+    shape::{TriMesh, TriMeshFlags, Triangle},
 };
-use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
-use rstar::RTree;
 use std::collections::HashMap;
 
 /// The most triangles of a surface.
@@ -18,8 +19,7 @@ const BESIDE: f64 = 1e-6;
 /// A closed surface of triangles, which are counterclockwise as seen from outside of the obstacle.
 #[derive(Debug)]
 pub(super) struct TriangulatedSurface {
-    triangles: RTree<Triangle>,
-    normals: Vec<NormalsOfParts>,
+    triangles: TriMesh,
     digest: u64,
     extent: f64,
 }
@@ -55,14 +55,11 @@ impl TriangulatedSurface {
         check_closed(corners, &triangles)?;
         let digest = digest(corners, &triangles);
         let extent = corners.as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        // There are fewer triangles than 2^32.
-        let with_corners = triangles.iter().enumerate().map(|(number, triangle)| Triangle {
-            corners: triangle.map(|corner| corners[corner]),
-            number: number as u32,
-        });
-        let with_corners: Vec<_> = with_corners.collect();
-        let normals = normals_of_parts(&triangles, &with_corners);
-        let surface = Self { triangles: RTree::bulk_load(with_corners), normals, digest, extent };
+        let points = corners.iter().map(|&[x, y, z]| Point::new(x, y, z)).collect();
+        // There are fewer corners than triangles, and fewer triangles than 2^32.
+        let indices = triangles.iter().map(|corners| corners.map(|corner| corner as u32)).collect();
+        let mesh = TriMesh::with_flags(points, indices, TriMeshFlags::ORIENTED);
+        let surface = Self { triangles: mesh.map_err(|error| error.to_string())?, digest, extent };
         surface.check_intersections()?;
         Ok(surface)
     }
@@ -79,81 +76,44 @@ impl TriangulatedSurface {
 
     /// The distance in m of a place from the surface, negative inside of the obstacle.
     pub(super) fn distance(&self, place: &Vector<3>) -> f64 {
-        if place.iter().any(|x| !x.is_finite()) {
+        let point = Point::new(place[0], place[1], place[2]);
+        if !point.is_finite() {
             return f64::NAN;
         }
-        let mut best = None;
-        find_nearest(self.triangles.root(), place, &mut best);
-        let Some((_, triangle)) = best else { return f64::NAN };
-        let (outward, part) = triangle.nearest(place);
-        let of_parts = &self.normals[triangle.number as usize];
-        let normal = match part {
-            Part::Face => triangle.area(),
-            Part::Side(side) => of_parts.sides[side],
-            Part::Corner(corner) => of_parts.corners[corner],
-        };
-        if dot(&outward, &normal) < 0.0 { -norm(&outward) } else { norm(&outward) }
+        let nearest = self.triangles.project_local_point(point, false);
+        let distance = (point - nearest.point).length();
+        if nearest.is_inside { -distance } else { distance }
     }
 
     /// Refuses parts of the surface that lie inside of others: the distance from such a surface jumps.
     fn check_intersections(&self) -> Result<(), String> {
-        let buried = |triangle: &&Triangle| INSIDE.iter().all(|place| self.is_buried(triangle, place));
-        match self.triangles.iter().filter(buried).min_by_key(|triangle| triangle.number) {
+        match self
+            .triangles
+            .triangles()
+            .find(|triangle| INSIDE.iter().all(|place| self.is_buried(triangle, place)))
+        {
             None => Ok(()),
             Some(buried) => Err(format!(
                 "its triangle at {:?} m lies inside another part of the obstacle; unite parts that overlap, and order the \
                  corners of all triangles counterclockwise as seen from outside",
-                buried.point(&[1.0 / 3.0; 3])
+                buried.center().to_array()
             )),
         }
     }
 
     /// Whether the ray outward from a place of a triangle leaves the obstacle before it enters it.
-    fn is_buried(&self, triangle: &Triangle, place: &[f64; 3]) -> bool {
-        let direction = unit(&triangle.area());
-        let size = triangle.sides().iter().map(norm).fold(0.0, f64::max);
-        let from = add_scaled(&triangle.point(place), BESIDE * size, &direction);
-        direction != [0.0; 3] && Ray { from, direction }.leaves(&self.triangles)
+    fn is_buried(&self, triangle: &Triangle, [a, b, c]: &[f64; 3]) -> bool {
+        let Some(normal) = triangle.normal() else { return false };
+        let size =
+            triangle.edges_scaled_directions().iter().fold(0.0, |most: f64, side| most.max(side.length()));
+        let place = triangle.a * *a + triangle.b * *b + triangle.c * *c;
+        let outward = Ray::new(place + normal * (BESIDE * size), normal);
+        let first = |ignored| {
+            let hit = self.triangles.cast_local_ray_with_culling(&outward, f64::MAX, ignored);
+            hit.map_or(f64::INFINITY, |hit| hit.time_of_impact)
+        };
+        first(RayCullingMode::IgnoreFrontfaces) < first(RayCullingMode::IgnoreBackfaces)
     }
-}
-
-/// The outward normals at the sides and corners of a triangle, of any length: a place whose nearest point lies there is outside where the
-/// vector to it has a positive component along the normal (Baerentzen and Aanaes 2005).
-#[derive(Debug)]
-struct NormalsOfParts {
-    sides: [Vector<3>; 3],
-    corners: [Vector<3>; 3],
-}
-
-/// At sides the sum of the unit normals of both triangles; at corners that of all triangles, weighted by their angles there.
-fn normals_of_parts(triangles: &[[usize; 3]], with_corners: &[Triangle]) -> Vec<NormalsOfParts> {
-    let (mut at_sides, mut at_corners) = (HashMap::new(), HashMap::new());
-    let side = |triangle: &[usize; 3], k: usize| {
-        let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
-        [from.min(to), from.max(to)]
-    };
-    for (triangle, with_corners) in triangles.iter().zip(with_corners) {
-        let normal = unit(&with_corners.area());
-        let sides = with_corners.sides().map(|side| unit(&side));
-        for k in 0..3 {
-            let angle = (-dot(&sides[k], &sides[(k + 2) % 3])).clamp(-1.0, 1.0).acos();
-            let at_side = at_sides.entry(side(triangle, k)).or_insert([0.0; 3]);
-            *at_side = add_scaled(at_side, 1.0, &normal);
-            let at_corner = at_corners.entry(triangle[k]).or_insert([0.0; 3]);
-            *at_corner = add_scaled(at_corner, angle, &normal);
-        }
-    }
-    let of_parts = |triangle: &[usize; 3]| NormalsOfParts {
-        sides: std::array::from_fn(|k| at_sides[&side(triangle, k)]),
-        corners: triangle.map(|corner| at_corners[&corner]),
-    };
-    triangles.iter().map(of_parts).collect()
-}
-
-/// The vector divided by its length; zero if it has none.
-fn unit(vector: &Vector<3>) -> Vector<3> {
-    let length = norm(vector);
-    if length > 0.0 { vector.map(|x| x / length) } else { [0.0; 3] }
 }
 
 /// Refuses a surface with an edge that does not join two triangles of the same orientation.
