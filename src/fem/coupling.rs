@@ -344,7 +344,7 @@ impl<const D: usize> Coupling<D> {
         }
     }
 
-    /// What the free part of a force on a slave node is on what it faces.
+    /// The force that masters share of a force on the free components of a slave node.
     fn carried(&self, held: &Held<D>, (slave, force): (u32, &Vector<D>)) -> Vector<D> {
         let free = held.free_part(slave as usize, force);
         let inclined = find(&self.inclined, slave);

@@ -69,7 +69,7 @@ pub(super) struct Properties {
     /// Whether forces of laws may fall with the motion.
     pub softens: bool,
     /// Whether these include those of bonds or of normal laws that depend on the gap.
-    pub may_come_loose: bool,
+    pub falls_with_gap: bool,
 }
 
 impl Properties {
@@ -103,7 +103,7 @@ impl Properties {
         let rubs = self.rubs();
         let turns = rubs && !self.softens;
         [
-            (self.may_come_loose && follows_bounds, Descent, 1.0, Newton),
+            (self.falls_with_gap && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
             (follows_bounds && rubs, HalfSteps, 1.0, Newton),
             (rubs && follows_bounds, FewFullSteps, 10.0, Newton),
@@ -183,7 +183,7 @@ mod tests {
         may_rest: false,
         friction_moves_obstacles: false,
         softens: false,
-        may_come_loose: false,
+        falls_with_gap: false,
     };
 
     fn searches(properties: Properties) -> Vec<Search> {
@@ -196,7 +196,7 @@ mod tests {
         assert_eq!(found[..4], [Search::FullSteps, Search::FullSteps, Search::HalfSteps, Search::Descent]);
         assert_eq!(found.iter().filter(|search| **search == Search::Descent).count(), 1);
         let bonds =
-            Properties { softens: true, may_come_loose: true, interior_is_linear: false, ..FRICTIONLESS };
+            Properties { softens: true, falls_with_gap: true, interior_is_linear: false, ..FRICTIONLESS };
         let found = searches(bonds);
         assert_eq!(found[..2], [Search::Descent, Search::FullSteps]);
         assert_eq!(found.last(), Some(&Search::Descent), "from the start value again");
@@ -228,7 +228,7 @@ mod tests {
         let resting = |properties: Properties| properties.may_be_solved_at_rest();
         assert!(resting(Properties { may_rest: true, ..tresca }) && !resting(tresca));
         assert!(!resting(Properties { may_rest: true, ..FRICTIONLESS }));
-        assert!(!resting(Properties { may_rest: true, may_come_loose: true, softens: true, ..tresca }));
+        assert!(!resting(Properties { may_rest: true, falls_with_gap: true, softens: true, ..tresca }));
         let weakening = searches(Properties { softens: true, ..tresca });
         assert_eq!(weakening[1], Search::HalfSteps);
         assert_eq!(weakening.last(), Some(&Search::Falling));

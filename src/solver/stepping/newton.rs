@@ -319,7 +319,7 @@ impl Newton {
             friction_moves_obstacles: has_friction
                 && contacts.iter().any(|contact| contact.obstacle.is_driven()),
             softens: (flows && body.softens()) || contacts.iter().any(decreases),
-            may_come_loose: (flows && body.softens_at_surface()) || contacts.iter().any(falls_with_gap),
+            falls_with_gap: (flows && body.softens_at_surface()) || contacts.iter().any(falls_with_gap),
         }
     }
 
