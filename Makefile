@@ -99,7 +99,7 @@ test64: test64-lib
 	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --test all jobs::every_job_gives_its_numbers_on_two_ranks
 
 test64-lib: deps64
-	PETSC_DIR=$(PETSC64_DIR) cargo test --config scripts/unit-tests.toml --release --locked --target-dir $(TARGET64) --lib
+	PETSC_DIR=$(PETSC64_DIR) cargo test --config scripts/unit-tests.toml --release --locked --target-dir $(TARGET64) --lib --package clarke-core
 
 check64: deps64
 	PETSC_DIR=$(PETSC64_DIR) cargo clippy --release --locked -- -D warnings

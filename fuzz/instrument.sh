@@ -6,7 +6,7 @@ rustc=$1
 shift
 flags=()
 case " $* " in
-*" --crate-name clarke "* | *" --crate-name job "* | *" --crate-name mesh "* | *" --crate-name checkpoint "*)
+*" --crate-name clarke_core "* | *" --crate-name job "* | *" --crate-name mesh "* | *" --crate-name checkpoint "*)
     flags=(-Cpasses=sancov-module -Clink-dead-code)
     for argument in level=4 inline-8bit-counters pc-table trace-compares; do
         flags+=("-Cllvm-args=-sanitizer-coverage-$argument")

@@ -27,15 +27,7 @@
 
 #![cfg_attr(not(test), warn(unreachable_pub))]
 
-pub mod error;
-pub mod linear_algebra;
-pub mod parallel;
-pub mod laws;
-pub mod job;
-pub mod mesh;
-pub mod fem;
-pub mod solver;
-pub mod io;
-pub mod run;
+pub use clarke_core::{error, fem, io, job, laws, linear_algebra, mesh, parallel, run, solver};
+
 pub mod postprocessing;
 pub mod cli;

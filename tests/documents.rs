@@ -57,13 +57,13 @@ fn declares(text: &str, word: &str) -> bool {
     })
 }
 
-/// Whether a file or folder exists, as written or below `src`, `tests` or their folders and subfolders; `<name>` stands for any
-/// name.
+/// Whether a file or folder exists, as written or below `src`, `core/src`, `tests` or their folders and subfolders; `<name>` stands
+/// for any name.
 fn is_there(path: &str) -> bool {
     let path = path.split('<').next().expect("a part").trim_end_matches('/');
-    let mut places = vec![root(), root().join("src"), root().join("tests")];
+    let mut places = vec![root(), root().join("src"), root().join("core/src"), root().join("tests")];
     let inside = |folder: &Path| std::fs::read_dir(folder).expect("folder").map(|e| e.expect("entry").path());
-    for folder in ["src", "tests"] {
+    for folder in ["src", "core/src", "tests"] {
         let outer: Vec<_> = inside(&root().join(folder)).filter(|path| path.is_dir()).collect();
         places.extend(outer.iter().flat_map(|folder| inside(folder)).filter(|path| path.is_dir()));
         places.extend(outer);
@@ -102,13 +102,13 @@ fn fault(name: &str, sources: &[(String, String)], others: &str) -> Option<Strin
 
 #[test]
 fn every_name_in_the_architecture_is_one_of_the_source() {
-    let sources: Vec<_> = ["src", "tests"]
+    let sources: Vec<_> = ["src", "core/src", "tests"]
         .into_iter()
         .flat_map(files)
         .filter(|(path, _)| path.ends_with(".rs") && path != "tests/documents.rs")
         .collect();
     let others = files("jobs").into_iter().map(|(_, text)| text).collect::<String>()
-        + &std::fs::read_to_string(root().join("Cargo.toml")).expect("text");
+        + &["Cargo.toml", "core/Cargo.toml"].map(read).concat();
     const PAGES: [&str; 6] = [
         "ARCHITECTURE.md",
         "docs/data-on-ranks.md",

@@ -10,12 +10,12 @@ use std::{
 
 /// Files and folders in which `unsafe` is allowed; folders end with a slash.
 const UNSAFE: [&str; 6] = [
-    "src/linear_algebra/sparse/",
-    "src/linear_algebra/petsc/",
-    "src/io/output/hyperslab.rs",
-    "src/io/output/identifier.rs",
-    "src/io/output/stacked_view.rs",
-    "build.rs",
+    "core/src/linear_algebra/sparse/",
+    "core/src/linear_algebra/petsc/",
+    "core/src/io/output/hyperslab.rs",
+    "core/src/io/output/identifier.rs",
+    "core/src/io/output/stacked_view.rs",
+    "core/build.rs",
 ];
 
 /// Keywords before the name in a definition.
@@ -28,10 +28,10 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The Rust files of the crate, relative to its root.
+/// The Rust files of both packages, relative to the root.
 fn sources() -> Vec<(String, String)> {
-    let mut found = vec![root().join("build.rs")];
-    let mut folders = vec![root().join("src")];
+    let mut found = ["build.rs", "core/build.rs"].map(|file| root().join(file)).to_vec();
+    let mut folders = ["src", "core/src"].map(|folder| root().join(folder)).to_vec();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).expect("folder") {
             let path = entry.expect("entry").path();
@@ -217,7 +217,12 @@ impl Module {
     }
 }
 
-/// The modules of the crate by their paths, without those for tests.
+/// The path of a file below `src` of its package.
+fn in_package(file: &str) -> Option<&str> {
+    file.strip_prefix("core/").unwrap_or(file).strip_prefix("src/")
+}
+
+/// The modules of both packages by their paths, without those for tests: the program has those of the solver as its own.
 struct Modules(BTreeMap<Vec<String>, Module>);
 
 /// For each module, the modules whose names it uses, and these names.
@@ -228,7 +233,7 @@ impl Modules {
         let mut found: BTreeMap<Vec<String>, Module> = BTreeMap::new();
         let mut all: Vec<(Vec<String>, &String, &String)> = Vec::new();
         for (file, text) in sources {
-            let Some(path) = file.strip_prefix("src/").and_then(|path| path.strip_suffix(".rs")) else {
+            let Some(path) = in_package(file).and_then(|path| path.strip_suffix(".rs")) else {
                 continue;
             };
             let mut path: Vec<String> = path.split('/').map(str::to_owned).collect();
@@ -372,14 +377,15 @@ fn reaches(graph: &Graph, from: &Vec<String>, to: &Vec<String>) -> bool {
 }
 
 fn layers() -> Vec<String> {
-    let text = std::fs::read_to_string(root().join("src/lib.rs")).expect("lib.rs");
+    let text = |file: &str| std::fs::read_to_string(root().join(file)).expect("lib.rs");
+    let text = text("core/src/lib.rs") + &text("src/lib.rs");
     let names = text.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';'));
     names.map(str::to_owned).collect()
 }
 
 /// The module of a file, `None` for lib.rs, main.rs and build.rs.
 fn module(path: &str) -> Option<&str> {
-    let name = path.strip_prefix("src/")?.split(['/', '.']).next()?;
+    let name = in_package(path)?.split(['/', '.']).next()?;
     (!["lib", "main"].contains(&name)).then_some(name)
 }
 
@@ -568,7 +574,7 @@ const MOST_FRAMES: usize = 7;
 fn functions_of_steps() -> BTreeMap<(String, String), String> {
     let mut functions = BTreeMap::new();
     for (path, text) in sources() {
-        let Some(inside) = path.strip_prefix("src/solver/stepping/") else { continue };
+        let Some(inside) = path.strip_prefix("core/src/solver/stepping/") else { continue };
         let owner = inside.split(['/', '.']).next().expect("a name").to_owned();
         let text = text.split("#[cfg(test)]").next().expect("a part");
         let mut current = None;
@@ -676,15 +682,17 @@ fn locked(path: &str) -> Vec<toml::Value> {
 #[test]
 fn the_fuzz_targets_are_built_with_the_packages_of_the_solver() {
     let (solver, fuzz) = (locked("Cargo.lock"), locked("fuzz/Cargo.lock"));
-    let manifest = std::fs::read_to_string(root().join("Cargo.toml")).expect("the manifest");
-    let manifest: toml::Table = manifest.parse().expect("tables");
-    for section in ["dependencies", "build-dependencies"] {
-        for (key, value) in manifest[section].as_table().expect("a table") {
-            let name = value.get("package").and_then(toml::Value::as_str).unwrap_or(key);
-            let is_there = fuzz.iter().any(|package| package["name"].as_str() == Some(name));
-            assert!(is_there, "fuzz/Cargo.lock lacks {name}: run `cargo tree` in fuzz");
-        }
-    }
+    let needed = |packages: &[toml::Value]| -> BTreeSet<String> {
+        let core = packages.iter().find(|package| package["name"].as_str() == Some("clarke-core"));
+        let needed = core.expect("the solver")["dependencies"].as_array().expect("a list");
+        needed.iter().map(|name| name.as_str().expect("a name").to_owned()).collect()
+    };
+    let lacking: Vec<String> = needed(&solver).difference(&needed(&fuzz)).cloned().collect();
+    assert_eq!(
+        lacking,
+        ["proptest", "tempfile"],
+        "fuzz/Cargo.lock lacks others than those of tests: run `cargo tree` in fuzz"
+    );
     for package in fuzz {
         let versions: Vec<&toml::Value> = solver
             .iter()

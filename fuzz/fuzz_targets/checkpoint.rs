@@ -2,7 +2,7 @@
 //! checksums they were written with.
 #![no_main]
 
-use clarke::{error::Result, io::output::{
+use clarke_core::{error::Result, io::output::{
         checkpoint::Header,
         checkpoint_file::Checkpoint,
         seal::{self, SEAL_BYTES},

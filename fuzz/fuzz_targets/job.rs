@@ -1,7 +1,7 @@
 //! Any bytes as a job file: refused in words, or a job whose effective form loads as the same job.
 #![no_main]
 
-use clarke::{error::Exit, job::Job};
+use clarke_core::{error::Exit, job::Job};
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
 

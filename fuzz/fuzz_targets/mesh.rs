@@ -1,7 +1,7 @@
 //! Any bytes as a mesh file: refused in words, or a mesh whose numbers fit together.
 #![no_main]
 
-use clarke::{error::Exit, mesh::{
+use clarke_core::{error::Exit, mesh::{
         GlobalMesh,
         file::{AnyMesh, Placement, parse},
     }};

@@ -9,10 +9,10 @@ use crate::{
         field_list,
         summary::{MEMBERS, SUMMARY},
     },
-    job::{Named, escaped, lines},
+    job::{Named, lines},
     laws::nearest::nearest,
 };
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 /// The page, in which the tables of names stand between these marks.
 const PAGE: &str = include_str!("../../docs/reference-outputs.md");
@@ -142,66 +142,6 @@ impl OutputFile {
         let columns = header.split('|').count();
         let rows: String = self.names.iter().map(Declared::markdown).collect();
         format!("| {header} |\n|{}\n{rows}", "---|".repeat(columns))
-    }
-}
-
-impl Declared {
-    fn is_called(&self, name: &str) -> bool {
-        self.names.iter().any(|known| known == name)
-    }
-
-    /// The meaning, and which names files of bodies in the plane do not have.
-    fn whole_meaning(&self) -> String {
-        let only: Vec<String> = self.only_in_space.iter().map(|name| format!("`{name}`")).collect();
-        if only.is_empty() {
-            return self.meaning.clone();
-        }
-        format!("{}; {} in 3D only", self.meaning, only.join(", "))
-    }
-
-    fn text(&self) -> String {
-        let [plane, space] = self.units;
-        let unit = match space {
-            "" => String::new(),
-            space if space == plane => format!("unit {space}"),
-            space => format!("unit {space}, in the plane {plane}"),
-        };
-        let [place, written] = self.field.map_or([String::new(), String::new()], |[place, written]| {
-            [format!("at {place}"), format!("written {written}")]
-        });
-        let facts: Vec<String> = [place, unit, written].into_iter().filter(|fact| !fact.is_empty()).collect();
-        let names = self.names.join(", ");
-        let head = if facts.is_empty() { names } else { format!("{names}: {}", facts.join("; ")) };
-        format!("\n{}{}", lines(&head, 2), lines(&self.whole_meaning(), 6))
-    }
-
-    fn markdown(&self) -> String {
-        let names: Vec<String> = self.names.iter().map(|name| format!("`{name}`")).collect();
-        let (names, unit, meaning) = (names.join(", "), self.units[1], escaped(&self.whole_meaning()));
-        match self.field {
-            Some([place, written]) => format!("| {names} | {place} | {unit} | {written} | {meaning} |\n"),
-            None => format!("| {names} | {unit} | {meaning} |\n"),
-        }
-    }
-
-    fn json(&self) -> Vec<Value> {
-        let entry = |name: &String| {
-            let mut entry = Map::new();
-            let mut add = |key: &str, value: Value| entry.insert(key.to_owned(), value);
-            add("name", json!(name));
-            add("unit", json!(self.units[1]));
-            add("unit_in_plane", json!(self.units[0]));
-            add("meaning", json!(self.meaning));
-            if self.only_in_space.contains(name) {
-                add("only_in_space", json!(true));
-            }
-            if let Some([place, written]) = self.field {
-                add("at", json!(place));
-                add("written", json!(written));
-            }
-            Value::Object(entry)
-        };
-        self.names.iter().map(entry).collect()
     }
 }
 

@@ -29,11 +29,11 @@ pub(crate) fn plain(text: &str) -> Cow<'_, str> {
 }
 
 /// Longest line, in characters.
-pub(crate) const WIDTH: usize = 100;
+pub const WIDTH: usize = 100;
 
 /// The text with lines of at most [`WIDTH`] characters: longer ones continue on the next line, after `indent` blanks. A word longer
 /// than a line stays whole.
-pub(crate) fn wrapped(text: &str, indent: usize) -> Cow<'_, str> {
+pub fn wrapped(text: &str, indent: usize) -> Cow<'_, str> {
     if text.split('\n').all(|line| line.chars().count() <= WIDTH) {
         return Cow::Borrowed(text);
     }

@@ -122,7 +122,7 @@ impl OutputField {
     }
 
     /// Its declaration, for those who read field files.
-    pub(crate) fn declared(&self) -> Declared {
+    pub fn declared(&self) -> Declared {
         let place = match self.place {
             Place::Node => "nodes",
             Place::Cell => "cells",

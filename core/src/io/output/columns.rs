@@ -10,7 +10,7 @@ use crate::fem::effect::{
 
 /// A column of numbers or words, or those of the components of a vector.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Column {
+pub struct Column {
     /// Its name; that of a vector is the part before the axes.
     pub name: &'static str,
     /// Its unit in the plane and in space.
@@ -23,7 +23,7 @@ pub(crate) struct Column {
 
 impl Column {
     /// A number, or a word, which has no unit.
-    pub(crate) const fn plain(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+    pub const fn plain(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self { name, units: [unit; 2], axes: [&[]; 2], meaning }
     }
 
@@ -50,7 +50,7 @@ impl Column {
     }
 
     /// Its declaration, for those who read the files.
-    pub(crate) fn declared(&self) -> Declared {
+    pub fn declared(&self) -> Declared {
         let [plane, space] = [2, 3].map(|dimension| self.names(dimension));
         let only_in_space = space.iter().filter(|name| !plane.contains(name)).cloned().collect();
         Declared { units: self.units, only_in_space, ..Declared::new(space, self.meaning) }
@@ -59,7 +59,7 @@ impl Column {
 
 /// A table that a run writes.
 #[derive(Debug)]
-pub(crate) struct RunTable {
+pub struct RunTable {
     /// Its file.
     pub file: &'static str,
     /// The word for it in the names of quantities: `history` in `history.dt`.
@@ -169,7 +169,7 @@ const OF_HEAT: [Column; ENERGIES.len() - FIRST_OF_HEAT + 2] = {
 };
 
 /// Steps, energies, with heat its balance.
-pub(crate) const HISTORY: RunTable = RunTable {
+pub const HISTORY: RunTable = RunTable {
     file: "history.csv",
     word: "history",
     rows: "A row for each step, none for time 0.",
@@ -200,7 +200,7 @@ pub(crate) const HISTORY: RunTable = RunTable {
 };
 
 /// Forces and moments; of contacts areas and pressures, with friction, of an obstacle that a force moves, of one that a moment turns.
-pub(crate) const RESULTANTS: RunTable = RunTable {
+pub const RESULTANTS: RunTable = RunTable {
     file: "resultants.csv",
     word: "resultant",
     rows: "A row for each step and source. The columns of areas and pressures exist if the job has a contact; they are empty for other \
@@ -274,7 +274,7 @@ pub(crate) const RESULTANTS: RunTable = RunTable {
 };
 
 /// Displacement and velocity, and a group for each [`ProbedQuantity`](crate::job::ProbedQuantity) in their order.
-pub(crate) const PROBES: RunTable = RunTable {
+pub const PROBES: RunTable = RunTable {
     file: "probes.csv",
     word: "probe",
     rows: "A row for each step and probe. The columns after the velocity are those that `[output] probe_also` names.",
@@ -322,7 +322,7 @@ pub(crate) const PROBES: RunTable = RunTable {
 };
 
 /// Displacements, velocities and pressures: with a gap, with friction.
-pub(crate) const PROFILES: RunTable = RunTable {
+pub const PROFILES: RunTable = RunTable {
     file: "profiles.csv",
     word: "profile",
     rows: "A row for each output time, profile and node of its boundary, sorted by coordinates. A node on an edge between facets of \
@@ -373,21 +373,21 @@ pub(crate) const PROFILES: RunTable = RunTable {
 };
 
 /// All tables.
-pub(crate) const TABLES: [&RunTable; 4] = [&HISTORY, &RESULTANTS, &PROBES, &PROFILES];
+pub const TABLES: [&RunTable; 4] = [&HISTORY, &RESULTANTS, &PROBES, &PROFILES];
 
 impl RunTable {
     /// The table with this word.
-    pub(crate) fn of(word: &str) -> Option<&'static Self> {
+    pub fn of(word: &str) -> Option<&'static Self> {
         TABLES.into_iter().find(|table| table.word == word)
     }
 
     /// Whether this column says when or of what a row is.
-    pub(crate) fn is_key(&self, name: &str) -> bool {
+    pub fn is_key(&self, name: &str) -> bool {
         self.keys.iter().any(|key| key.name == name)
     }
 
     /// All columns with their meanings, in the order of the file.
-    pub(crate) fn declared(&self) -> Vec<Declared> {
+    pub fn declared(&self) -> Vec<Declared> {
         let columns = self.keys.iter().chain(self.groups.iter().flat_map(|group| *group));
         columns.map(Column::declared).collect()
     }
@@ -414,7 +414,7 @@ impl RunTable {
     }
 
     /// The unit of a column; empty for one without a unit.
-    pub(crate) fn unit(&self, column: &str, dimension: usize) -> &'static str {
+    pub fn unit(&self, column: &str, dimension: usize) -> &'static str {
         self.columns(dimension).find(|(name, _)| name == column).map_or("", |(_, unit)| unit)
     }
 }

@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn a_mesh_is_described_by_its_groups_and_its_extent() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes/clamped_square.msh");
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("meshes/clamped_square.msh");
         let words = inspect(&path).expect("a mesh");
         for part in
             ["a valid mesh", "triangles", "extent      x from 0 to 1 m", "boundary    bottom", "facets, 1 m"]

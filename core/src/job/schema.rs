@@ -11,7 +11,7 @@ static JOB: LazyLock<Value> = LazyLock::new(schema_of::<Job>);
 
 /// A kind of document.
 #[derive(Clone, Copy)]
-pub(crate) struct Kind {
+pub struct Kind {
     /// Its name in messages.
     pub name: &'static str,
     /// The prefix of table names on the command line.
@@ -24,12 +24,12 @@ pub(crate) struct Kind {
 
 impl Kind {
     /// Jobs.
-    pub(crate) fn job() -> Self {
+    pub fn job() -> Self {
         Self { name: "job", prefix: "", opening: OPENING, schema: &JOB }
     }
 
     /// The schema of the whole document.
-    pub(crate) fn root(&self) -> Schema {
+    pub fn root(&self) -> Schema {
         Schema::of_root(self.schema)
     }
 }
@@ -49,7 +49,7 @@ on), pulse(t, start, end) (1 from start to end), pi, e, inf, if(condition, then,
 ";
 
 /// The schema of a whole document; no key may be null, as in TOML.
-pub(crate) fn schema_of<T: JsonSchema>() -> Value {
+pub fn schema_of<T: JsonSchema>() -> Value {
     let mut schema = schemars::schema_for!(T).to_value();
     remove_null(&mut schema);
     schema
@@ -63,7 +63,7 @@ fn resolve(root: &'static Value, schema: &'static Value) -> Schema {
 
 /// A schema, and the schema that refers to it.
 #[derive(Clone, Copy)]
-pub(crate) struct Schema {
+pub struct Schema {
     root: &'static Value,
     own: &'static Value,
     target: &'static Value,
@@ -156,7 +156,7 @@ impl Schema {
     }
 
     /// The keys of a table.
-    pub(crate) fn properties(&self) -> impl Iterator<Item = (&'static String, Schema)> {
+    pub fn properties(&self) -> impl Iterator<Item = (&'static String, Schema)> {
         let root = self.root;
         self.get("properties")
             .as_object()
@@ -166,17 +166,17 @@ impl Schema {
     }
 
     /// The schema of one key of a table.
-    pub(crate) fn property(&self, key: &str) -> Option<Schema> {
+    pub fn property(&self, key: &str) -> Option<Schema> {
         self.get("properties").get(key).map(|inner| resolve(self.root, inner))
     }
 
     /// The required keys of a table.
-    pub(crate) fn required(&self) -> impl Iterator<Item = &'static str> {
+    pub fn required(&self) -> impl Iterator<Item = &'static str> {
         self.get("required").as_array().into_iter().flatten().filter_map(Value::as_str)
     }
 
     /// The schema of the items of a list, or of the values of a table with free keys.
-    pub(crate) fn items(&self) -> Option<Schema> {
+    pub fn items(&self) -> Option<Schema> {
         [self.get("items"), self.get("additionalProperties")]
             .into_iter()
             .find(|inner| inner.is_object())

@@ -135,7 +135,7 @@ pub(super) fn contact_traction<'a, const D: usize, const S: usize>(
 }
 
 /// The states of the field `contact_status` in words, by their numbers.
-pub(crate) const STATES_OF_CONTACT: [&str; 5] =
+pub const STATES_OF_CONTACT: [&str; 5] =
     ["no contact boundary", "open", "under pressure", "sticking", "slipping"];
 
 /// The number of a state in the field `contact_status`.

@@ -1,7 +1,7 @@
 //! Constitutive laws at a point and time schemes, with their keys in the job file: no mesh, no MPI.
 
 pub(crate) mod digits;
-pub(crate) mod lines;
+pub mod lines;
 pub mod nearest;
 pub mod quadrature;
 pub mod expression;

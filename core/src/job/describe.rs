@@ -35,7 +35,7 @@ pub fn describe(table: Option<&str>) -> Result<String> {
 
 /// A name, for searches by a word.
 #[derive(Clone)]
-pub(crate) struct Named {
+pub struct Named {
     /// The name.
     pub name: String,
     /// How lists show it.
@@ -47,7 +47,7 @@ pub(crate) struct Named {
 }
 
 /// As [`describe`], of any kind of document; words are also searched among `others`.
-pub(crate) fn describe_kind(kind: Kind, table: Option<&str>, others: &[Named]) -> Result<String> {
+pub fn describe_kind(kind: Kind, table: Option<&str>, others: &[Named]) -> Result<String> {
     let all = tables(kind);
     let wanted = table.unwrap_or_default().trim_matches(['[', ']']);
     if let Some((path, key)) = wanted.rsplit_once('.') {
@@ -112,7 +112,7 @@ pub fn describe_markdown() -> String {
 }
 
 /// As [`describe_markdown`], of another kind of document.
-pub(crate) fn markdown_of(kind: Kind) -> String {
+pub fn markdown_of(kind: Kind) -> String {
     let what = kind.prefix.replace('.', " ");
     let mut page = format!(
         "# Keys of a {}\n\n`solver describe {what}--markdown` prints this page; it is generated from the source. {}\n\n",
@@ -133,7 +133,7 @@ fn entry(path: &str, meaning: &str) -> String {
 }
 
 /// All tables and keys of a kind of document, for searches by a word.
-pub(crate) fn named(kind: Kind) -> Vec<Named> {
+pub fn named(kind: Kind) -> Vec<Named> {
     let mut found = Vec::new();
     // Materials of regions have the keys of `material`.
     for table in tables(kind).iter().filter(|table| !table.path.starts_with("region.material")) {
@@ -370,7 +370,7 @@ impl Key {
 }
 
 /// Text of a table in Markdown; what is between backquotes stays as it is.
-pub(crate) fn escaped(text: &str) -> String {
+pub fn escaped(text: &str) -> String {
     let plain = |part: &str| part.replace('*', "\\*").replace('<', "&lt;").replace('|', "\\|");
     let part = |(at, part): (usize, &str)| if at % 2 == 0 { plain(part) } else { part.replace('|', "\\|") };
     text.split('`').enumerate().map(part).collect::<Vec<_>>().join("`")
@@ -459,7 +459,7 @@ fn flat(text: &str) -> String {
 }
 
 /// The text in lines, each after `indent` blanks.
-pub(crate) fn lines(text: &str, indent: usize) -> String {
+pub fn lines(text: &str, indent: usize) -> String {
     if text.is_empty() {
         return String::new();
     }

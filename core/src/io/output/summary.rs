@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
 /// The file in the output folder.
-pub(crate) const SUMMARY: &str = "summary.json";
+pub const SUMMARY: &str = "summary.json";
 
 /// Norm of the strain above which a warning about the theory of small strains is given.
 const LARGEST_STRAIN: f64 = 0.1;
@@ -213,7 +213,7 @@ pub struct PartitionQuality {
 
 /// A member of `summary.json`.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Member {
+pub struct Member {
     /// Its name; that of a member of an object after the name of the object and a dot.
     pub name: String,
     /// Its unit in the plane and in space; empty for words, numbers without a unit and objects.
@@ -240,13 +240,13 @@ impl Member {
 }
 
 /// The unit of a number of `summary.json` by its name, such as `wall_seconds.total`; empty for one without a unit.
-pub(crate) fn unit(name: &str, dimension: usize) -> &'static str {
+pub fn unit(name: &str, dimension: usize) -> &'static str {
     MEMBERS.iter().find_map(|member| member.unit_of(name, dimension)).unwrap_or_default()
 }
 
 /// The kind of a member of `summary.json`, as far as quantities of runs are concerned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum MemberKind {
+pub enum MemberKind {
     /// A number.
     Number,
     /// Numbers with names or positions that depend on the run.
@@ -256,7 +256,7 @@ pub(crate) enum MemberKind {
 }
 
 /// All members in the order of the file, those of objects after the object; last the figures of fields.
-pub(crate) static MEMBERS: LazyLock<Vec<Member>> = LazyLock::new(|| {
+pub static MEMBERS: LazyLock<Vec<Member>> = LazyLock::new(|| {
     static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(schema_of::<Summary>);
     let mut members = Vec::new();
     collect("", Schema::of_root(&SCHEMA), &mut members);

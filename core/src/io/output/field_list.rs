@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{error::Result, linear_algebra::tensor::von_mises};
 
-pub(crate) use super::further_fields::STATES_OF_CONTACT;
+pub use super::further_fields::STATES_OF_CONTACT;
 
 /// Computes a field; `None`, on all ranks, if the run does not have this field. Collective.
 type Compute<const D: usize, const S: usize> =
@@ -19,13 +19,13 @@ type Compute<const D: usize, const S: usize> =
 /// it.
 macro_rules! fields {
     ($($(#[$meaning:meta])* $name:ident = $field:expr, |$at:ident| $computed:expr;)*) => {
-        $($(#[$meaning])* pub(crate) const $name: OutputField = $field;)*
+        $($(#[$meaning])* pub const $name: OutputField = $field;)*
 
         /// Number of fields.
         pub(super) const COUNT: usize = [$(stringify!($name)),*].len();
 
         /// All of them, in the order of field files.
-        pub(crate) static FIELDS: [OutputField; COUNT] = [$($name),*];
+        pub static FIELDS: [OutputField; COUNT] = [$($name),*];
 
         /// Their positions in this list.
         #[expect(non_camel_case_types, clippy::upper_case_acronyms, reason = "the names of the fields above")]
@@ -180,12 +180,12 @@ static HISTORIES: [OutputField; 8] = [
 ];
 
 /// All fields and histories that field files may have.
-pub(crate) fn declared() -> impl Iterator<Item = &'static OutputField> {
+pub fn declared() -> impl Iterator<Item = &'static OutputField> {
     FIELDS.iter().chain(&HISTORIES)
 }
 
 /// The unit of a field or a history; empty for one without a unit.
-pub(crate) fn unit(name: &str, dimension: usize) -> &'static str {
+pub fn unit(name: &str, dimension: usize) -> &'static str {
     declared().find(|field| field.name == name).map_or("", |field| field.unit(dimension))
 }
 

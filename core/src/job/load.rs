@@ -54,7 +54,7 @@ impl Job {
 }
 
 /// A document and the faults found so far.
-pub(crate) struct Document {
+pub struct Document {
     root: Node,
     texts: Texts,
     faults: Vec<Fault>,
@@ -66,7 +66,7 @@ pub(crate) struct Document {
 
 /// Where a document comes from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Origin<'a> {
+pub struct Origin<'a> {
     /// Its name in messages.
     pub name: &'a str,
     /// The folder of relative paths.
@@ -75,7 +75,7 @@ pub(crate) struct Origin<'a> {
 
 impl Document {
     /// Parses `text`, applies `overrides`, reads tables relative to its folder and checks every key against the schema.
-    pub(crate) fn new(
+    pub fn new(
         kind: Kind,
         text: &str,
         Origin { name, folder }: Origin<'_>,
@@ -101,12 +101,12 @@ impl Document {
     }
 
     /// Adds a fault at the value of `path`, or at the innermost existing table on this path.
-    pub(crate) fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
+    pub fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
         self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
     }
 
     /// Adds a fault at a free name in a table, which may contain dots.
-    pub(crate) fn fault_at_name(
+    pub fn fault_at_name(
         &mut self,
         (table, name): (&str, &str),
         message: impl Into<String>,
@@ -118,13 +118,13 @@ impl Document {
     }
 
     /// The struct of the document, with neutral values in place of those that could not be read.
-    pub(crate) fn fill<T: DeserializeOwned>(&self) -> Result<T> {
+    pub fn fill<T: DeserializeOwned>(&self) -> Result<T> {
         T::deserialize(self.root.plain())
             .map_err(|error| self.texts.refuse(vec![Fault::new(Place::new(0, 0..0), error.message(), "")]))
     }
 
     /// An error with all faults, if there are some.
-    pub(crate) fn refuse(&self) -> Result<()> {
+    pub fn refuse(&self) -> Result<()> {
         if self.faults.is_empty() { Ok(()) } else { Err(self.texts.refuse(self.faults.clone())) }
     }
 }
@@ -227,7 +227,7 @@ impl Job {
 }
 
 /// The path without `.` and without each `..` that follows a name.
-pub(crate) fn normal(path: &Path) -> PathBuf {
+pub fn normal(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for part in path.components() {
         match part {
@@ -266,13 +266,13 @@ fn is_study(root: &Node) -> bool {
 }
 
 /// Whether the file can be read and is a study.
-pub(crate) fn file_is_study(path: &Path) -> bool {
+pub fn file_is_study(path: &Path) -> bool {
     let text = std::fs::read_to_string(path).ok();
     text.and_then(|text| parse(&text).ok()).is_some_and(|root| is_study(&root))
 }
 
 /// What a file with this extension is, if it is one that is often given in place of another.
-pub(crate) fn by_extension(path: &Path) -> Option<&'static str> {
+pub fn by_extension(path: &Path) -> Option<&'static str> {
     match path.extension()?.to_str()? {
         "geo" => Some("a geometry for Gmsh: make the mesh with gmsh -2 (in 3D -3) -format msh41 FILE.geo"),
         "stl" => Some(
@@ -308,7 +308,7 @@ fn other_file(bytes: &[u8]) -> Option<&'static str> {
 }
 
 /// The text of a file of this kind, and the folder it is in.
-pub(crate) fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
+pub fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
     let absolute = std::path::absolute(path).map_err(|error| Error::unreadable(path, error))?;
     let folder = absolute.parent().unwrap_or(Path::new("/")).to_owned();
     let mut bytes = Vec::new();

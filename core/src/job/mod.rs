@@ -22,12 +22,12 @@ mod validate;
 mod written;
 
 pub use crate::laws::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
-pub(crate) use describe::{Named, describe_kind, escaped, lines, markdown_of, named};
-pub use describe::{describe, describe_json, describe_markdown};
+pub use describe::{
+    Named, describe, describe_json, describe_kind, describe_markdown, escaped, lines, markdown_of, named,
+};
 pub use document::*;
 pub use effective::differing_keys;
 pub use findings::{MeshNames, number_of_group};
-pub use load::Loaded;
-pub(crate) use load::{Document, Origin, by_extension, file_is_study, normal, read};
-pub(crate) use schema::{Kind, Schema, schema_of};
+pub use load::{Document, Loaded, Origin, by_extension, file_is_study, normal, read};
+pub use schema::{Kind, Schema, schema_of};
 pub use written::Written;

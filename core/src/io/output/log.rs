@@ -13,7 +13,7 @@ use std::{
 };
 
 /// Where the words of a line begin, behind its title.
-pub(crate) const WORDS: usize = 11;
+pub const WORDS: usize = 11;
 
 /// Least time between two lines of steps on the standard output.
 const BETWEEN_STEPS: Duration = Duration::from_secs(1);

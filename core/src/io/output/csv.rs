@@ -23,7 +23,7 @@ const MARKED: [char; 7] = ['=', '+', '-', '@', '\t', '\r', MARK];
 const MARK: char = '\'';
 
 /// Text as an entry of a table.
-pub(crate) fn entry(text: &str) -> String {
+pub fn entry(text: &str) -> String {
     let marked = if text.starts_with(MARKED) { format!("{MARK}{text}") } else { text.to_owned() };
     let mut writer = Writer::from_writer(Vec::new());
     // Writing to memory does not fail.
@@ -40,7 +40,7 @@ fn text(entry: &str) -> &str {
 
 /// A row of a table that was read.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Record {
+pub struct Record {
     /// Number of its line in the file, from 1.
     pub line: u64,
     /// Its entries.
@@ -48,7 +48,7 @@ pub(crate) struct Record {
 }
 
 /// The rows of a table, the header first.
-pub(crate) fn records(bytes: &[u8]) -> impl Iterator<Item = Record> {
+pub fn records(bytes: &[u8]) -> impl Iterator<Item = Record> {
     let reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(bytes);
     reader.into_byte_records().map_while(|record| record.ok()).map(|record| Record {
         line: record.position().map_or(0, csv::Position::line),

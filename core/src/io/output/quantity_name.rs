@@ -11,7 +11,7 @@ use crate::{job::Job, laws::nearest::nearest};
 const OVER_TIME: [&str; 6] = ["max", "min", "mean", "amplitude", "period", "arrival"];
 
 /// A quantity of a table, by its name.
-pub(crate) struct TableQuantity<'a> {
+pub struct TableQuantity<'a> {
     /// The table.
     pub table: &'static RunTable,
     /// The probe, source or boundary, which may contain dots; absent for a table without names.
@@ -24,7 +24,7 @@ pub(crate) struct TableQuantity<'a> {
 
 impl<'a> TableQuantity<'a> {
     /// The parts of `TABLE.NAME.COLUMN` or `TABLE.NAME.SIDE.COLUMN`, in tables without names those without `NAME`.
-    pub(crate) fn parse(name: &'a str) -> Option<Self> {
+    pub fn parse(name: &'a str) -> Option<Self> {
         let (word, rest) = name.split_once('.')?;
         let table = RunTable::of(word)?;
         let (before, column) = rest.rsplit_once('.').unwrap_or(("", rest));
@@ -54,7 +54,8 @@ const FORMS: &str = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN
 
 /// A job whose runs have quantities.
 #[derive(Clone, Copy)]
-pub(crate) struct RunOf<'a> {
+pub struct RunOf<'a> {
+    /// The job.
     pub job: &'a Job,
     /// What messages call it: `the job`.
     pub called: &'a str,
@@ -65,7 +66,7 @@ pub(crate) struct RunOf<'a> {
 impl RunOf<'_> {
     /// What is wrong with the name of a quantity: messages with advice. A quantity has a known form, a probe, source or profile of the job, and
     /// a column of its table that the job has.
-    pub(crate) fn faults_of_name(&self, name: &str) -> Vec<[String; 2]> {
+    pub fn faults_of_name(&self, name: &str) -> Vec<[String; 2]> {
         let Some(quantity) = TableQuantity::parse(name) else {
             return self.fault_of_number(name).into_iter().collect();
         };
@@ -94,7 +95,7 @@ impl RunOf<'_> {
     }
 
     /// What is wrong with the name of a probe, and with a column of `probes.csv`.
-    pub(crate) fn faults_of_probe(&self, probe: &str, column: &str) -> [Option<[String; 2]>; 2] {
+    pub fn faults_of_probe(&self, probe: &str, column: &str) -> [Option<[String; 2]>; 2] {
         [self.fault_of_place(PROBES.word, probe), self.fault_of_column(&PROBES, column, column)]
     }
 
@@ -283,8 +284,9 @@ on = 'bottom'
 
     #[test]
     fn names_of_all_jobs_of_the_repository_are_known() {
-        let mut folders: Vec<PathBuf> =
-            ["jobs", "tests/cases"].map(|name| Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).to_vec();
+        let mut folders: Vec<PathBuf> = ["jobs", "tests/cases"]
+            .map(|name| Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(name))
+            .to_vec();
         let mut count = 0;
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(&folder).expect("folder") {

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use std::path::PathBuf;
 
 fn folder(folder: &str, name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(folder).join(name)
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(folder).join(name)
 }
 
 fn two(mesh: AnyMesh) -> GlobalMesh<2> {
