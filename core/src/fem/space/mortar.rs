@@ -29,10 +29,9 @@
 
 use crate::linear_algebra::tensor::Vector;
 use geometry::{Plane, Point, Shape, clip, dot, measure_and_centroid, oriented, quadrature, sides, subtract};
-use parry3d_f64::{
-    bounding_volume::Aabb,
-    math::Vector as BoxVector,
-    partitioning::{Bvh, BvhBuildStrategy, BvhNode},
+use rstar::{
+    AABB, RTree, RTreeObject, SelectionFunction,
+    primitives::{GeomWithData, Rectangle},
 };
 
 mod facet;
@@ -154,11 +153,14 @@ struct Part<'a, const D: usize> {
     gap: (f64, Point),
 }
 
+/// The bounding box of a facet with the number of the facet.
+type BoxOfFacet = GeomWithData<Rectangle<[f64; 3]>, usize>;
+
 /// Master facets in a tree of bounding boxes.
 struct Search<'a, const D: usize> {
     /// Those with finite coordinates.
     masters: Vec<&'a Facet<D>>,
-    tree: Bvh,
+    tree: RTree<BoxOfFacet>,
     /// The largest penetration and the largest gap of a pair in m.
     reach: [f64; 2],
 }
@@ -167,19 +169,27 @@ impl<'a, const D: usize> Search<'a, D> {
     fn new(masters: &'a [Facet<D>], reach: [f64; 2]) -> Self {
         let finite = |master: &&Facet<D>| master.corners.as_flattened().iter().all(|x| x.is_finite());
         let masters: Vec<_> = masters.iter().filter(finite).collect();
-        let boxes = masters.iter().map(|master| {
-            let [low, high] = master.bounds().map(|corner| BoxVector::from(embed(&corner)));
-            Aabb::new(low, high)
+        let boxes = masters.iter().enumerate().map(|(number, master)| {
+            let [low, high] = master.bounds().map(|corner| embed(&corner));
+            GeomWithData::new(Rectangle::from_corners(low, high), number)
         });
-        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes.enumerate());
+        let tree = RTree::bulk_load(boxes.collect());
         Self { masters, tree, reach }
+    }
+
+    /// The numbers of the master facets that may form a pair with a slave facet, ascending.
+    fn near(&self, slave: &Slave<D>) -> Vec<usize> {
+        let prism = Prism::new(slave, self.reach);
+        let mut near: Vec<_> =
+            self.tree.locate_with_selection_function(&prism).map(|facet| facet.data).collect();
+        near.sort_unstable();
+        near
     }
 
     /// The parts of a slave facet that master facets cover.
     fn covered(&self, slave: &Slave<D>) -> Vec<Part<'a, D>> {
-        let prism = Prism::new(slave, self.reach);
-        let near = self.tree.leaves(|node| prism.meets(node));
-        let mut parts: Vec<_> = near.filter_map(|i| self.part(slave, self.masters[i as usize])).collect();
+        let mut parts: Vec<_> =
+            self.near(slave).into_iter().filter_map(|i| self.part(slave, self.masters[i])).collect();
         parts.sort_by(|a, b| a.gap.0.abs().total_cmp(&b.gap.0.abs()));
         let mut taken: Vec<Part<D>> = Vec::with_capacity(parts.len());
         for part in parts {
@@ -244,8 +254,8 @@ impl Prism {
     }
 
     /// Whether a box may meet the prism, by the directions of the prism alone.
-    fn meets(&self, node: &BvhNode) -> bool {
-        let (low, high) = (node.mins().to_array(), node.maxs().to_array());
+    fn meets(&self, bounds: &AABB<[f64; 3]>) -> bool {
+        let (low, high) = (bounds.lower(), bounds.upper());
         self.directions.iter().zip(&self.bounds).all(|(direction, &(least, most))| {
             let (mut middle, mut half) = (0.0, 0.0);
             for i in 0..3 {
@@ -254,6 +264,16 @@ impl Prism {
             }
             middle + half >= least && middle - half <= most
         })
+    }
+}
+
+impl SelectionFunction<BoxOfFacet> for &Prism {
+    fn should_unpack_parent(&self, bounds: &AABB<[f64; 3]>) -> bool {
+        self.meets(bounds)
+    }
+
+    fn should_unpack_leaf(&self, facet: &BoxOfFacet) -> bool {
+        self.meets(&facet.envelope())
     }
 }
 

@@ -23,6 +23,7 @@ mod polyline;
 mod steepness;
 mod stl;
 mod table;
+mod triangle;
 mod wear;
 
 pub use adhesion::{Adhesion, Toughness};

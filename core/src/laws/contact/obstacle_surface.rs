@@ -1,12 +1,11 @@
 //! A triangulated surface that bounds an obstacle.
 
-use super::stl;
-use crate::linear_algebra::tensor::Vector;
-use parry3d_f64::{
-    math::Vector as Point,
-    query::{PointQuery, Ray, RayCullingMode},
-    shape::{TriMesh, TriMeshFlags, Triangle},
+use super::{
+    stl,
+    triangle::{First, Line, Part, Triangle, find_nearest},
 };
+use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
+use rstar::RTree;
 use std::collections::HashMap;
 
 /// The most triangles of a surface.
@@ -15,11 +14,14 @@ const MOST_TRIANGLES: usize = 1 << 22;
 const INSIDE: [[f64; 3]; 3] = [[0.34, 0.33, 0.33], [0.5, 0.3, 0.2], [0.2, 0.27, 0.53]];
 /// The distance from a triangle, as a share of its longest side, at which the surface must be outside of itself.
 const BESIDE: f64 = 1e-6;
+/// Rounding of coordinates, as a share of the largest one.
+const ROUNDING: f64 = 1e-13;
 
 /// A closed surface of triangles, which are counterclockwise as seen from outside of the obstacle.
 #[derive(Debug)]
 pub(super) struct TriangulatedSurface {
-    triangles: TriMesh,
+    triangles: RTree<Triangle>,
+    normals: Vec<NormalsOfParts>,
     digest: u64,
     extent: f64,
 }
@@ -55,11 +57,14 @@ impl TriangulatedSurface {
         check_closed(corners, &triangles)?;
         let digest = digest(corners, &triangles);
         let extent = corners.as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let points = corners.iter().map(|&[x, y, z]| Point::new(x, y, z)).collect();
-        // There are fewer corners than triangles, and fewer triangles than 2^32.
-        let indices = triangles.iter().map(|corners| corners.map(|corner| corner as u32)).collect();
-        let mesh = TriMesh::with_flags(points, indices, TriMeshFlags::ORIENTED);
-        let surface = Self { triangles: mesh.map_err(|error| error.to_string())?, digest, extent };
+        // There are fewer triangles than 2^32.
+        let with_corners = triangles.iter().enumerate().map(|(number, triangle)| Triangle {
+            corners: triangle.map(|corner| corners[corner]),
+            number: number as u32,
+        });
+        let with_corners: Vec<_> = with_corners.collect();
+        let normals = normals_of_parts(&triangles, &with_corners);
+        let surface = Self { triangles: RTree::bulk_load(with_corners), normals, digest, extent };
         surface.check_intersections()?;
         Ok(surface)
     }
@@ -76,44 +81,105 @@ impl TriangulatedSurface {
 
     /// The distance in m of a place from the surface, negative inside of the obstacle.
     pub(super) fn distance(&self, place: &Vector<3>) -> f64 {
-        let point = Point::new(place[0], place[1], place[2]);
-        if !point.is_finite() {
+        if place.iter().any(|x| !x.is_finite()) {
             return f64::NAN;
         }
-        let nearest = self.triangles.project_local_point(point, false);
-        let distance = (point - nearest.point).length();
-        if nearest.is_inside { -distance } else { distance }
+        let mut best = None;
+        find_nearest(self.triangles.root(), place, &mut best);
+        let Some((_, triangle)) = best else { return f64::NAN };
+        let (outward, part) = triangle.nearest(place);
+        let of_parts = &self.normals[triangle.number as usize];
+        let normal = match part {
+            Part::Face => triangle.area(),
+            Part::Side(side) => of_parts.sides[side],
+            Part::Corner(corner) => of_parts.corners[corner],
+        };
+        if dot(&outward, &normal) < 0.0 { -norm(&outward) } else { norm(&outward) }
+    }
+
+    /// How far the obstacle is from a place along a direction of length 1, in m: negative for a place inside, infinite where it is not in
+    /// front of the place. `None` where a `slack` in m decides, or the surface is nearly parallel to the direction.
+    pub(super) fn along(&self, place: &Vector<3>, direction: &Vector<3>, slack: f64) -> Option<f64> {
+        if place.iter().chain(direction).any(|x| !x.is_finite()) {
+            return None;
+        }
+        let line = Line { from: *place, direction: *direction };
+        match line.first(&self.triangles, [-slack, slack]) {
+            First::Enters(length) => Some(length),
+            First::Misses => Some(f64::INFINITY),
+            // From inside, the place at which the line has entered.
+            First::Leaves(length) if length > slack => {
+                let back = Line { from: *place, direction: direction.map(|x| -x) };
+                match back.first(&self.triangles, [0.0, slack]) {
+                    First::Leaves(depth) => Some(-depth),
+                    _ => None,
+                }
+            }
+            First::Leaves(_) | First::Unclear => None,
+        }
     }
 
     /// Refuses parts of the surface that lie inside of others: the distance from such a surface jumps.
     fn check_intersections(&self) -> Result<(), String> {
-        match self
-            .triangles
-            .triangles()
-            .find(|triangle| INSIDE.iter().all(|place| self.is_buried(triangle, place)))
-        {
+        let buried = |triangle: &&Triangle| INSIDE.iter().all(|place| self.is_buried(triangle, place));
+        match self.triangles.iter().filter(buried).min_by_key(|triangle| triangle.number) {
             None => Ok(()),
             Some(buried) => Err(format!(
                 "its triangle at {:?} m lies inside another part of the obstacle; unite parts that overlap, and order the \
                  corners of all triangles counterclockwise as seen from outside",
-                buried.center().to_array()
+                buried.point(&[1.0 / 3.0; 3])
             )),
         }
     }
 
     /// Whether the ray outward from a place of a triangle leaves the obstacle before it enters it.
-    fn is_buried(&self, triangle: &Triangle, [a, b, c]: &[f64; 3]) -> bool {
-        let Some(normal) = triangle.normal() else { return false };
-        let size =
-            triangle.edges_scaled_directions().iter().fold(0.0, |most: f64, side| most.max(side.length()));
-        let place = triangle.a * *a + triangle.b * *b + triangle.c * *c;
-        let outward = Ray::new(place + normal * (BESIDE * size), normal);
-        let first = |ignored| {
-            let hit = self.triangles.cast_local_ray_with_culling(&outward, f64::MAX, ignored);
-            hit.map_or(f64::INFINITY, |hit| hit.time_of_impact)
-        };
-        first(RayCullingMode::IgnoreFrontfaces) < first(RayCullingMode::IgnoreBackfaces)
+    fn is_buried(&self, triangle: &Triangle, place: &[f64; 3]) -> bool {
+        let direction = unit(&triangle.area());
+        let size = triangle.sides().iter().map(norm).fold(0.0, f64::max);
+        let from = add_scaled(&triangle.point(place), BESIDE * size, &direction);
+        let line = Line { from, direction };
+        direction != [0.0; 3]
+            && matches!(line.first(&self.triangles, [0.0, ROUNDING * self.extent]), First::Leaves(_))
     }
+}
+
+/// The outward normals at the sides and corners of a triangle, of any length: a place whose nearest point lies there is outside where the
+/// vector to it has a positive component along the normal (Baerentzen and Aanaes 2005).
+#[derive(Debug)]
+struct NormalsOfParts {
+    sides: [Vector<3>; 3],
+    corners: [Vector<3>; 3],
+}
+
+/// At sides the sum of the unit normals of both triangles; at corners that of all triangles, weighted by their angles there.
+fn normals_of_parts(triangles: &[[usize; 3]], with_corners: &[Triangle]) -> Vec<NormalsOfParts> {
+    let (mut at_sides, mut at_corners) = (HashMap::new(), HashMap::new());
+    let side = |triangle: &[usize; 3], k: usize| {
+        let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
+        [from.min(to), from.max(to)]
+    };
+    for (triangle, with_corners) in triangles.iter().zip(with_corners) {
+        let normal = unit(&with_corners.area());
+        let sides = with_corners.sides().map(|side| unit(&side));
+        for k in 0..3 {
+            let angle = (-dot(&sides[k], &sides[(k + 2) % 3])).clamp(-1.0, 1.0).acos();
+            let at_side = at_sides.entry(side(triangle, k)).or_insert([0.0; 3]);
+            *at_side = add_scaled(at_side, 1.0, &normal);
+            let at_corner = at_corners.entry(triangle[k]).or_insert([0.0; 3]);
+            *at_corner = add_scaled(at_corner, angle, &normal);
+        }
+    }
+    let of_parts = |triangle: &[usize; 3]| NormalsOfParts {
+        sides: std::array::from_fn(|k| at_sides[&side(triangle, k)]),
+        corners: triangle.map(|corner| at_corners[&corner]),
+    };
+    triangles.iter().map(of_parts).collect()
+}
+
+/// The vector divided by its length; zero if it has none.
+fn unit(vector: &Vector<3>) -> Vector<3> {
+    let length = norm(vector);
+    if length > 0.0 { vector.map(|x| x / length) } else { [0.0; 3] }
 }
 
 /// Refuses a surface with an edge that does not join two triangles of the same orientation.
@@ -149,7 +215,7 @@ fn digest(corners: &[Vector<3>], triangles: &[[usize; 3]]) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::linear_algebra::tensor::{add_scaled, cross, dot, larger, norm};
     use proptest::prelude::*;
@@ -261,7 +327,7 @@ mod tests {
     }
 
     /// An icosahedron with divided faces, whose corners have these distances from the origin.
-    fn star(radii: &[f64]) -> (Vec<Vector<3>>, Vec<[usize; 3]>) {
+    pub(in crate::laws::contact) fn star(radii: &[f64]) -> (Vec<Vector<3>>, Vec<[usize; 3]>) {
         let golden = (1.0 + 5f64.sqrt()) / 2.0;
         let mut corners: Vec<Vector<3>> = Vec::new();
         for axis in 0..3 {

@@ -899,13 +899,11 @@ fn the_search_finds_all_pairs() {
         let (mut pairs, mut visited) = (0, 0);
         for slave in &slaves {
             let slave = Slave::new(slave);
-            let prism = Prism::new(&slave, [0.0, reach]);
-            let mut near: Vec<u32> = search.tree.leaves(|node| prism.meets(node)).collect();
-            near.sort_unstable();
+            let near = search.near(&slave);
             visited += near.len();
             for (i, master) in masters.iter().enumerate() {
                 if search.part(&slave, master).is_some() {
-                    assert!(near.binary_search(&(i as u32)).is_ok());
+                    assert!(near.binary_search(&i).is_ok());
                     pairs += 1;
                 }
             }

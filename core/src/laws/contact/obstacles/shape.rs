@@ -3,6 +3,7 @@
 //! The distance `f` is positive outside of the obstacle and negative inside, and changes by at most the way between two places. Along
 //! the ray from a place outside, the obstacle is therefore at least `f` away: the search goes on by this length until the surface is
 //! near, and its last part is halved (Hart, Sphere tracing, The Visual Computer 12, 1996). From a place inside, the search goes back.
+//! A surface of triangles is met at once where the ray crosses it clearly.
 
 use crate::{
     laws::{
@@ -124,6 +125,11 @@ impl Obstacle for Shape {
         // Where body and obstacle nearly meet at the centre, rounding is that of the coordinates from which the place is computed.
         let size = largest(largest(near, place), &centre);
         let slack = larger(self.slack([near, size]), self.rounding(offset));
+        let straight =
+            self.triangles().and_then(|surface| surface.along(&in_space(offset), &in_space(normal), slack));
+        if let Some(length) = straight {
+            return length;
+        }
         let Search { length, nearest } = self.search(offset, normal, [size, 0.0]);
         if length.is_nan() || nearest > slack {
             return length;
@@ -156,16 +162,16 @@ impl Shape {
         if let Some(distance) = &self.distance {
             return distance.evaluate(0.0, offset);
         }
-        let triangles = self.surface.as_ref().and_then(|surface| surface.triangles.as_ref());
-        triangles.map_or(f64::NAN, |triangles| {
-            triangles.distance(&std::array::from_fn(|i| offset.get(i).copied().unwrap_or(0.0)))
-        })
+        self.triangles().map_or(f64::NAN, |surface| surface.distance(&in_space(offset)))
+    }
+
+    fn triangles(&self) -> Option<&TriangulatedSurface> {
+        self.surface.as_ref()?.triangles.as_deref()
     }
 
     /// The largest coordinate of the corners of the surface, in m, by which distances from it are rounded; 0 for an expression.
     fn extent(&self) -> f64 {
-        let triangles = self.surface.as_ref().and_then(|surface| surface.triangles.as_ref());
-        triangles.map_or(0.0, |triangles| triangles.extent())
+        self.triangles().map_or(0.0, TriangulatedSurface::extent)
     }
 
     /// Sets the surface to the contents of its STL file. An error says what is wrong with it.
@@ -179,7 +185,7 @@ impl Shape {
 
     /// A hash of the surface that was read.
     pub fn surface_digest(&self) -> Option<u64> {
-        Some(self.surface.as_ref()?.triangles.as_ref()?.digest())
+        Some(self.triangles()?.digest())
     }
 
     /// The distance from the surface in m by which a ray may miss it, for places of this size in m relative to the centre and for any.
@@ -281,6 +287,11 @@ impl Shape {
     }
 }
 
+/// A vector with zeros for missing components.
+fn in_space<const D: usize>(vector: &Vector<D>) -> Vector<3> {
+    std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
+}
+
 /// What a search has found.
 #[derive(Debug, Clone, Copy)]
 struct Search {
@@ -321,7 +332,7 @@ fn zero_between(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::expression::Expression;
+    use crate::laws::{contact::obstacle_surface::tests, expression::Expression};
     use proptest::prelude::*;
 
     fn shape(distance: &str) -> Shape {
@@ -482,7 +493,52 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_ray_through_a_block_of_triangles_is_met_at_once_and_at_its_edges_by_the_search() {
+        let (corners, triangles) = tests::star(&[1.0; 42]);
+        let ball = TriangulatedSurface::new(&corners, triangles).expect("a surface");
+        let slack = 2.5e-7;
+        // The first corner of the icosahedron, and above it.
+        let [x, y, z] = corners[0];
+        let toward = |place: [f64; 3]| ball.along(&place, &[-x, -y, -z], slack);
+        assert!(
+            (toward([2.0 * x, 2.0 * y, 2.0 * z]).expect("a corner that all faces turn outward") - 1.0).abs()
+                < 1e-14
+        );
+        assert!((toward([0.5 * x, 0.5 * y, 0.5 * z]).expect("inside") + 0.5).abs() < 1e-14);
+        assert_eq!(toward([-2.0 * x, -2.0 * y, -2.0 * z]), Some(f64::INFINITY), "behind");
+        let beside: Vector<3> = [y, -x, 0.0].map(|component| component / x.hypot(y));
+        assert_eq!(
+            ball.along(&add_scaled(&corners[0], 3.0, &beside), &beside.map(|x| -x), slack),
+            None,
+            "its edge"
+        );
+        assert_eq!(toward([f64::NAN, 0.0, 0.0]), None);
+    }
+
     proptest! {
+        #[test]
+        fn rays_to_a_ragged_surface_end_where_the_search_ends(
+            radii in prop::collection::vec(0.4f64..1.6, 42),
+            places in prop::collection::vec((prop::array::uniform3(-2.0f64..2.0), prop::array::uniform3(-1.0f64..1.0)), 8),
+        ) {
+            let (corners, triangles) = tests::star(&radii);
+            let surface = TriangulatedSurface::new(&corners, triangles).expect("a surface");
+            let surface = Surface { file: PathBuf::new(), triangles: Some(Arc::new(surface)) };
+            let shape = Shape { surface: Some(surface), ..Shape::default() };
+            let mut clear = 0;
+            for (place, direction) in places {
+                let length = norm(&direction);
+                prop_assume!(length > 0.1);
+                let direction = direction.map(|x| x / length);
+                let Some(found) = shape.triangles().and_then(|s| s.along(&place, &direction, 2.5e-7)) else { continue };
+                clear += 1;
+                let Search { length: wanted, .. } = shape.search(&place, &direction, [2.0, 0.0]);
+                prop_assert!(found == wanted || (found - wanted).abs() < 1e-11, "{} for {}", found, wanted);
+            }
+            prop_assert!(clear >= 3, "only {} of eight are clear", clear);
+        }
+
         #[test]
         fn the_end_of_the_ray_is_the_first_zero(
             place in prop::array::uniform3(-3.0f64..3.0), direction in prop::array::uniform3(-1.0f64..1.0),
