@@ -51,7 +51,7 @@ impl Gap {
     pub fn passes<const D: usize>(&self, sweep: &Sweep<D>) -> Result<bool> {
         let Sweep { times, places, normal, loses_obstacle, .. } = sweep;
         let Some(depth) = self.depth(times[1], &places[1]) else { return Ok(false) };
-        if self.comes_and_goes(sweep) {
+        if self.comes_and_goes(sweep, depth) {
             return Ok(true);
         }
         let has_other_side = self.has_other_side();
@@ -81,8 +81,9 @@ impl Gap {
         Ok(at(-width) - at(width) > 2.0 * BEHIND * width)
     }
 
-    /// Whether the prescribed motion takes the obstacle to a point and away again, unseen at the ends of the step and of its neighbours.
-    fn comes_and_goes<const D: usize>(&self, sweep: &Sweep<D>) -> bool {
+    /// Whether the prescribed motion takes the obstacle to a point and away again, unseen at the ends of the step, at the second of which
+    /// the point has this depth in m, and of its neighbours.
+    fn comes_and_goes<const D: usize>(&self, sweep: &Sweep<D>, depth_at_end: f64) -> bool {
         let Sweep { times: [start, end], places: [before, after], .. } = sweep;
         if !self.is_driven() {
             return false;
@@ -90,8 +91,7 @@ impl Gap {
         let place = |share: f64| std::array::from_fn(|i| before[i] + share * (after[i] - before[i]));
         let depth_at =
             |time: f64, share: f64| self.depth::<D>(time, &place(share)).unwrap_or(f64::NEG_INFINITY);
-        let depth = |share: f64| depth_at(start + share * (end - start), share);
-        let ends = [depth(0.0), depth(1.0)];
+        let ends = [depth_at(*start, 0.0), depth_at_end];
         // Coordinates of one point may all be zero.
         let centres: [Vector<D>; 2] = [*start, *end].map(|time| self.centre(time));
         let places = [before, after].into_iter().chain(&centres).flatten();
@@ -99,6 +99,15 @@ impl Gap {
         if ends.iter().any(|end| *end > rounding) {
             return false;
         }
+        // Without a turn, depths change by at most the way of the point as seen from the obstacle: most points stay outside.
+        let offset =
+            |share: f64| add_scaled(&place(share), -1.0, &self.centre(start + share * (end - start)));
+        let at_start = offset(0.0);
+        let depth = |share: f64| {
+            let way = || norm(&add_scaled(&offset(share), -1.0, &at_start));
+            let stays_outside = self.has_other_side() && ends[0] + way() <= 0.0;
+            if stays_outside { ends[0] } else { depth_at(start + share * (end - start), share) }
+        };
         // An obstacle that jumps as the step begins takes a point with it that it touches at the end.
         let jump = depth(EARLY) / (1.0 - EARLY);
         let takes_along = ends[1] >= -rounding && jump < sweep.body_size;

@@ -32,6 +32,13 @@ impl Triangle {
         cross(&last, &first)
     }
 
+    /// The smallest and the largest coordinates.
+    fn bounds(&self) -> [Vector<3>; 2] {
+        let [a, b, c] = &self.corners;
+        let low = std::array::from_fn(|i| a[i].min(b[i]).min(c[i]));
+        [low, std::array::from_fn(|i| a[i].max(b[i]).max(c[i]))]
+    }
+
     /// The point with these shares of the corners.
     pub(super) fn point(&self, shares: &[f64; 3]) -> Vector<3> {
         std::array::from_fn(|i| (0..3).map(|k| shares[k] * self.corners[k][i]).sum())
@@ -87,7 +94,8 @@ impl RTreeObject for Triangle {
     type Envelope = AABB<Vector<3>>;
 
     fn envelope(&self) -> Self::Envelope {
-        AABB::from_points(&self.corners)
+        let [low, high] = self.bounds();
+        AABB::from_corners(low, high)
     }
 }
 
@@ -104,7 +112,11 @@ pub(super) fn find_nearest<'a>(
     for children in node.children().chunks(AT_ONCE) {
         let mut order = [(f64::INFINITY, 0); AT_ONCE];
         for (at, (child, entry)) in children.iter().zip(&mut order).enumerate() {
-            *entry = (to_box(&child.envelope(), place), at);
+            let bounds = match child {
+                RTreeNode::Parent(node) => [node.envelope().lower(), node.envelope().upper()],
+                RTreeNode::Leaf(triangle) => triangle.bounds(),
+            };
+            *entry = (to_box(&bounds, place), at);
         }
         order.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
         for (distance, at) in order.into_iter().take(children.len()) {
@@ -126,8 +138,7 @@ pub(super) fn find_nearest<'a>(
 }
 
 /// The square of the distance of a place from a box.
-fn to_box(bounds: &AABB<Vector<3>>, place: &Vector<3>) -> f64 {
-    let (low, high) = (bounds.lower(), bounds.upper());
+fn to_box([low, high]: &[Vector<3>; 2], place: &Vector<3>) -> f64 {
     (0..3).map(|i| (low[i] - place[i]).max(place[i] - high[i]).max(0.0).powi(2)).sum()
 }
 
