@@ -30,6 +30,8 @@ pub struct State {
     pub step: u64,
     /// Length of the last step in s; 0 before the first.
     pub step_length: f64,
+    /// The number of the fallback of Newton's method that solved the last step; 0: the first one.
+    pub fallback: usize,
 }
 
 /// Values of a field, or what they exceed those of another one by.
@@ -74,6 +76,7 @@ impl State {
             time: 0.0,
             step: 0,
             step_length: 0.0,
+            fallback: 0,
         })
     }
 

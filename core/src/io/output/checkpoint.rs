@@ -55,6 +55,9 @@ pub struct Header {
     pub time: f64,
     /// Length of the last step in s.
     pub step_length: f64,
+    /// The number of the fallback of Newton's method that solved the last step.
+    #[serde(default)]
+    pub fallback: usize,
     /// Sums over the steps so far.
     pub totals: Totals,
     /// For each contact whose obstacle a force moves: displacement in m and velocity in m/s after the last step, and before it.
@@ -118,6 +121,7 @@ impl Header {
             step: state.step,
             time: state.time,
             step_length: state.step_length,
+            fallback: state.fallback,
             totals: *totals,
             obstacles: motions(0).map(LoadedMotion::saved).collect(),
             obstacle_resultants: motions(0).map(LoadedMotion::resultant).collect(),
@@ -268,6 +272,7 @@ pub fn restore<const D: usize, const S: usize>(
         contact.closeness = Closeness::restored(saved);
     }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
+    state.fallback = header.fallback;
     Ok(header)
 }
 

@@ -138,6 +138,15 @@ impl Properties {
         })
     }
 
+    /// The fallbacks with their numbers for a step after one that the fallback with the number `last` has solved: this one comes second,
+    /// because what made others fail usually lasts.
+    pub(super) fn fallbacks_after(self, last: usize) -> impl Iterator<Item = (usize, Fallback)> {
+        let is_first = move |number: usize| number == 0 || number == last;
+        let numbered = move || self.fallbacks().enumerate();
+        let first = numbered().filter(move |(number, _)| is_first(*number));
+        first.chain(numbered().filter(move |(number, _)| !is_first(*number)))
+    }
+
     /// Whether the equations are those of the minimum of a convex energy, with linear forces beside those of the contact points.
     pub(super) fn is_convex(self) -> bool {
         self.interior_is_linear && !self.has_friction && !self.softens

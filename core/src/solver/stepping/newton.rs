@@ -134,10 +134,10 @@ impl Newton {
         }
         write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let mut failure = String::new();
-        let is_yielding = |fallback: &Fallback| fallback.search == Search::Yielding;
-        let mut rest = properties.fallbacks().take(system.fallbacks);
+        let is_yielding = |(_, fallback): &(usize, Fallback)| fallback.search == Search::Yielding;
+        let mut rest = properties.fallbacks_after(problem.state.fallback).take(system.fallbacks);
         let (mut next, mut has_yielded) = (rest.next(), false);
-        while let Some(fallback) = next {
+        while let Some((number, fallback)) = next {
             loop {
                 self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
                 let reason = match fallback.search {
@@ -164,7 +164,8 @@ impl Newton {
                 };
                 match reason {
                     None if self.suits_friction(problem) => {
-                        return self.finish(problem, &mut equations, fallback.search);
+                        let outcome = self.finish(problem, &mut equations, fallback.search)?;
+                        return Ok(StepOutcome { fallback: number, ..outcome });
                     }
                     // From this solution, with parameters for the pressures there.
                     None => {}
@@ -180,10 +181,10 @@ impl Newton {
                     }
                 }
             }
-            has_yielded |= is_yielding(&fallback);
+            has_yielded |= is_yielding(&(number, fallback));
             // Full steps move a body that nothing but friction holds to and fro.
             next = match self.counts.singular > 0 && !has_yielded {
-                true => properties.fallbacks().find(is_yielding),
+                true => properties.fallbacks().enumerate().find(is_yielding),
                 false => None,
             };
             next = next.or_else(|| rest.find(|fallback| !(has_yielded && is_yielding(fallback))));

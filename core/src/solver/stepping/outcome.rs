@@ -33,6 +33,8 @@ pub struct StepOutcome {
     pub residual: f64,
     /// Whether the solution lies beyond unstable states, into which laws that soften lead.
     pub fell: bool,
+    /// The number of the fallback of Newton's method that solved it.
+    pub fallback: usize,
     /// Number of different solutions found, if a search was requested; otherwise 0.
     pub solutions: usize,
     /// Whether some of them differ by far more than the accuracy of a solution.
@@ -53,6 +55,7 @@ impl StepOutcome {
         Self {
             indefinite_solves: self.indefinite_solves + next.indefinite_solves,
             fell: self.fell || next.fell,
+            fallback: self.fallback.max(next.fallback),
             ..next
         }
     }

@@ -544,6 +544,7 @@ impl Stepper {
         }
         self.find_temperature(session, body, state, step)?;
         self.integrator.commit(state, &self.trial, step)?;
+        state.fallback = outcome.fallback;
         commit_tractions(body, state)?;
         keep_closeness(session, body, state)?;
         body.commit();
