@@ -225,6 +225,8 @@ pub struct Scratch {
     open: DistributedVector,
     /// The change of the velocities to equilibrium, where steps are solved in this way.
     correction: Option<DistributedVector>,
+    /// The unknowns at which branches recurred, once they have.
+    pub recurring: Option<DistributedVector>,
     /// What a solution of the linearised equations leaves of their right-hand side, once that was computed.
     left: Option<DistributedVector>,
     /// Values and forces with ghosts, where some contact reads ghost nodes.
@@ -242,6 +244,7 @@ impl Scratch {
             is_hidden: false,
             open: like.like()?,
             correction: None,
+            recurring: None,
             left: None,
             ghosted: if ghosts { Some([like.like()?, like.like()?]) } else { None },
         })
@@ -575,7 +578,14 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         let residual = self.scratch.residuals[0];
         self.counts.sets.push(Linearisation { derivatives, branches, residual });
         match self.counts.period(!self.halves) {
-            Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle_message(period))),
+            Some(period) if self.stop_at_cycles => {
+                let kept = match &mut self.scratch.recurring {
+                    Some(kept) => kept,
+                    none => none.insert(x.like()?),
+                };
+                kept.copy_from(x)?;
+                Err(Error::Failed(cycle_message(period)))
+            }
             _ => Ok(()),
         }
     }

@@ -18,6 +18,9 @@ pub(super) enum Search {
     FullSteps,
     /// The same, given up sooner.
     FewFullSteps,
+    /// Full steps with small parameters, at which points that would slide against their traction stick first; from where these end, with
+    /// the parameters of the first full steps.
+    Sticking,
     /// Steps of half the length until the branches of the contact graphs stay the same.
     HalfSteps,
     /// Each step is shortened until the residual decreases enough.
@@ -38,7 +41,7 @@ pub(super) enum Search {
 impl Search {
     /// Whether each step leads to the solution of the linearised equations, or at first half of the way there.
     pub(super) fn follows_branches(self) -> bool {
-        matches!(self, Self::FullSteps | Self::FewFullSteps | Self::HalfSteps)
+        matches!(self, Self::FullSteps | Self::FewFullSteps | Self::Sticking | Self::HalfSteps)
     }
 
     /// Whether steps lower an energy.
@@ -96,7 +99,8 @@ impl Properties {
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         use FrictionIteration::{FixedPoint, Newton};
         use Search::{
-            Backtracking, Descent, Equilibrated, Falling, FewFullSteps, FullSteps, HalfSteps, Yielding,
+            Backtracking, Descent, Equilibrated, Falling, FewFullSteps, FullSteps, HalfSteps, Sticking,
+            Yielding,
         };
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
@@ -105,6 +109,7 @@ impl Properties {
         [
             (self.falls_with_gap && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
+            (follows_bounds && rubs, Sticking, 1e-6, Newton),
             (follows_bounds && rubs, HalfSteps, 1.0, Newton),
             (rubs && follows_bounds, FewFullSteps, 10.0, Newton),
             (rubs && follows_bounds, FewFullSteps, 100.0, Newton),

@@ -160,6 +160,14 @@ impl Newton {
                         self.set_graph_parameters(contacts, system.scales, fallback);
                         self.solve_with_bounds(problem, &mut equations, fallback)?
                     }
+                    Search::Sticking => match self.solve_with_bounds(problem, &mut equations, fallback)? {
+                        None => None,
+                        Some(_) => {
+                            let fallback = Fallback { stiffness_factor: 1.0, ..fallback };
+                            self.set_graph_parameters(&mut problem.body.contacts, system.scales, fallback);
+                            self.solve_with_bounds(problem, &mut equations, fallback)?
+                        }
+                    },
                     _ => self.solve_with_bounds(problem, &mut equations, fallback)?,
                 };
                 match reason {
@@ -363,6 +371,12 @@ impl Newton {
         if search == Search::Equilibrated {
             equations.velocity.copy_from(&self.scratch.velocity)?;
         } else {
+            // Where branches recur, no unknowns were found after these.
+            if let Some(last) = self.scratch.recurring.as_ref().filter(|_| search == Search::Sticking)
+                && equations.velocity.norm()?.is_nan()
+            {
+                equations.velocity.copy_from(last)?;
+            }
             write_velocities(&mut problem.body.contacts, equations.velocity)?;
             if self.is_at_floor(problem, equations, failure.is_none())? {
                 failure = None;
@@ -418,7 +432,7 @@ impl Newton {
             Search::FullSteps if limit >= PATIENCE && sharpness == 1.0 => {
                 [most, if self.flow.is_some() { PATIENCE_OF_FLOW } else { PATIENCE }]
             }
-            Search::FewFullSteps if limit >= PATIENCE => [most, LITTLE_PATIENCE],
+            Search::FewFullSteps | Search::Sticking if limit >= PATIENCE => [most, LITTLE_PATIENCE],
             _ => [limit, usize::MAX],
         };
         self.counts.restart_search();
