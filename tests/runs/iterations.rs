@@ -93,6 +93,38 @@ fn a_pair_of_quadratic_cells_that_full_steps_turn_round_takes_few_iterations() {
     assert!(found <= 30.0, "{found} iterations");
 }
 
+/// Two stiff blocks on a base that moves to and fro, of which one sticks and one slides: little but friction holds them, so that full steps
+/// let all points of a block slide to and fro.
+#[test]
+fn stacked_blocks_of_which_one_slides_take_few_iterations() {
+    let blocks = || {
+        Case::written_as(
+        "
+        mesh.rectangle = [{name = 'base', size = [0.5, 0.05], corner = [-0.25, 0.0], cells = [5, 1]},
+                          {name = 'low', size = [0.36, 0.05], corner = [-0.18, 0.05], cells = [4, 1]},
+                          {name = 'high', size = [0.24, 0.05], corner = [-0.12, 0.1], cells = [3, 1]}]
+        time = {scheme = 'implicit_euler', step = 0.005, end = 0.15}
+        gravity.acceleration = [0.0, -9.81]
+        support = [{on = ['base.bottom'], fix = 'all', displacement = ['0.06*(1 - cos(9*t))', 0.0]},
+                   {on = ['base.top'], fix = ['x'], displacement = ['0.06*(1 - cos(9*t))']}]
+        contact = [{on = ['low.bottom'], against = ['base.top'], normal.unilateral = {}, friction.coulomb.coefficient = 0.5},
+                   {on = ['high.bottom'], against = ['low.top'], normal.unilateral = {}, friction.coulomb.coefficient = 0.25}]
+        [material]
+        hypothesis = 'plane_strain'
+        density = 2000.0
+        elasticity = {youngs_modulus = 2e10, poisson_ratio = 0.0}
+        ",
+    )
+    };
+    let (straight, stopped) = (blocks(), blocks());
+    let found = straight.run(1).number("newton_iterations");
+    assert!(found <= 200.0, "{found} iterations in 30 steps");
+    // The fallback of the last step is known after a restart.
+    stopped.run_with(1, &["--set", "time.end=0.06"]).expect(0);
+    stopped.run_with(1, &["--restart"]).expect(0).says("step 12");
+    assert_eq!(straight.results().text("history.csv"), stopped.results().text("history.csv"));
+}
+
 /// Loads carry a stiff body on soft springs far along a sphere: full steps let its nodes touch and part in turn, and a descent ends at kinks.
 #[test]
 fn a_body_on_soft_springs_that_is_carried_along_a_sphere_takes_few_iterations() {

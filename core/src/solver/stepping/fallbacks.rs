@@ -237,17 +237,36 @@ mod tests {
         assert_eq!(found.iter().filter(|search| **search == Search::Yielding).count(), 1);
         let coulomb = Properties { has_friction: true, follows_pressure: true, ..FRICTIONLESS };
         let tresca = Properties { has_friction: true, ..FRICTIONLESS };
-        let next = [Search::HalfSteps, Search::FewFullSteps, Search::FewFullSteps, Search::Yielding];
-        assert!([coulomb, tresca].into_iter().all(|friction| searches(friction)[1..5] == next));
+        let next = [
+            Search::Sticking,
+            Search::HalfSteps,
+            Search::FewFullSteps,
+            Search::FewFullSteps,
+            Search::Yielding,
+        ];
+        assert!([coulomb, tresca].into_iter().all(|friction| searches(friction)[1..6] == next));
         let resting = |properties: Properties| properties.may_be_solved_at_rest();
         assert!(resting(Properties { may_rest: true, ..tresca }) && !resting(tresca));
         assert!(!resting(Properties { may_rest: true, ..FRICTIONLESS }));
         assert!(!resting(Properties { may_rest: true, falls_with_gap: true, softens: true, ..tresca }));
         let weakening = searches(Properties { softens: true, ..tresca });
-        assert_eq!(weakening[1], Search::HalfSteps);
+        assert_eq!(weakening[1..3], [Search::Sticking, Search::HalfSteps]);
         assert_eq!(weakening.last(), Some(&Search::Falling));
         assert_eq!(weakening[weakening.len() - 2], Search::Yielding);
         assert!(!searches(FRICTIONLESS).contains(&Search::Yielding));
+    }
+
+    #[test]
+    fn the_fallback_of_the_last_step_comes_second() {
+        let friction = Properties { has_friction: true, ..FRICTIONLESS };
+        let numbers = |last| friction.fallbacks_after(last).map(|(number, _)| number).collect::<Vec<_>>();
+        let usual: Vec<usize> = (0..searches(friction).len()).collect();
+        assert_eq!(numbers(0), usual);
+        assert_eq!(numbers(99), usual, "of other properties");
+        assert_eq!(numbers(5)[..4], [0, 5, 1, 2]);
+        let mut all = numbers(5);
+        all.sort_unstable();
+        assert_eq!(all, usual);
     }
 
     #[test]
