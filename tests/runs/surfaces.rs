@@ -139,3 +139,30 @@ fn files_that_hold_no_closed_surface_are_refused() {
         case.run_with(2, &[]).expect(2).says("box.stl: ").says(words).says("export it again");
     }
 }
+
+/// Where an obstacle touches exactly at the end of a step, the gap there is a rounding error.
+#[test]
+fn a_plate_of_triangles_that_touches_at_the_end_of_a_step_goes_on_beside_another_obstacle() {
+    let case = Case::written_as(
+        "
+        mesh.box = {size = [1.0, 1.0, 0.5], cells = [8, 8, 4]}
+        time = {scheme = 'implicit_euler', step = 0.05, end = 0.3}
+        material.elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}
+        support = [{on = ['bottom'], fix = 'all'}]
+        [[contact]]
+        on = ['top']
+        where = 'x < 0.5'
+        normal.unilateral = {}
+        obstacle.shape = {surface = 'box.stl', centre = [0.0, 0.0, '1.001 - 0.02*t']}
+        [[contact]]
+        on = ['top']
+        where = 'x > 0.5'
+        normal.unilateral = {}
+        obstacle.plane = {point = [0.0, 0.0, '0.505 - 0.02*t'], normal = [0.0, 0.0, -1.0]}",
+    );
+    // 1 m high; its largest coordinates are those of a box of 1.6 m.
+    write(&case, stl(1.0 / 3.0, [0, 1, 2]));
+    let results = case.run(1);
+    let force = results.table("resultants.csv").only("source", "contact top").last("force_z");
+    assert!(force < 0.0, "{force} N");
+}
