@@ -3,7 +3,7 @@
 use super::{Newton, write_branches};
 use crate::{
     error::Result,
-    fem::effect::{COUNTS, PointCount},
+    fem::effect::{COUNTS, Contact, PointCount},
     linear_algebra::{petsc::DistributedVector, tensor::larger},
     solver::stepping::{StepOutcome, fallbacks::Search, problem::StepProblem, solver::Reduced},
 };
