@@ -381,6 +381,12 @@ impl<const D: usize> Pair<D> {
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
         let curvatures = curvatures(&gather_facets(session, mesh, places, &self.on)?);
+        let mut smooth: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
+        if !self.slides {
+            for point in surface_points(session, mesh, &self.on)? {
+                smooth.entry(mesh.global_node(point.node)).or_default().push(point.normal);
+            }
+        }
         let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
         let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
         let mut lawless = self.lawless.clone();
@@ -397,7 +403,7 @@ impl<const D: usize> Pair<D> {
                         && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
                 };
                 let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
-                return Ok((paired(mesh, sums, (&at, &curvatures), self.slides), is_bare));
+                return Ok((paired(mesh, sums, (&at, &curvatures), Some(&smooth).filter(|_| !self.slides)), is_bare));
             }
             lawless.extend(further);
         }
@@ -479,6 +485,8 @@ pub fn inclined<const D: usize>(pairs: &[Pair<D>], held: &Held<D>) -> Vec<Inclin
 
 /// How many times as far as a curved boundary turns within the facets around a node it is inclined at most to a plane of symmetry.
 const CURVED: f64 = 4.0;
+/// Cosine of the angle up to which the mean normal of a part of the surface is that of a face (20 degrees).
+const SAME_FACE: f64 = 0.94;
 /// The held part of a normal is a rounding error below this.
 const ROUNDING: f64 = 1e-6;
 /// The least free part of a normal along which a node may open the boundary.
@@ -736,24 +744,32 @@ fn curvatures<const D: usize>(facets: &[Facet<D>]) -> BTreeMap<u32, f64> {
 }
 
 /// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m on a surface as curved as this there, and
-/// whether they slide.
+/// the normals of the faces around them if they do not slide.
 fn paired<const D: usize>(
     mesh: &Mesh<D>,
     sums: BTreeMap<u32, Sum<D>>,
     (places, curvatures): (&BTreeMap<u32, Vector<D>>, &BTreeMap<u32, f64>),
-    slides: bool,
+    smooth: Option<&BTreeMap<u32, Vec<Vector<D>>>>,
 ) -> Vec<PairedNode<D>> {
+    // The normal of the part of a curved face that faces the other side is that of the face.
+    let of_face = |node: u32, mean: Vector<D>, faces: &BTreeMap<u32, Vec<Vector<D>>>| {
+        let faces = faces.get(&node).into_iter().flatten();
+        let near = faces.filter(|normal| dot(normal, &mean) > SAME_FACE);
+        near.max_by(|a, b| dot(a, &mean).total_cmp(&dot(b, &mean))).copied().unwrap_or(mean)
+    };
     sums.into_iter()
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
         .filter(|(_, sum)| sum.whole > 0.0 && sum.carries_a_law())
         .map(|(node, sum)| {
-            let length = norm(&sum.normal);
-            let normal = if slides { direction(&sum.normals) } else { sum.normal.map(|n| n / length) };
+            let normal = match smooth {
+                None => direction(&sum.normals),
+                Some(faces) => of_face(node, sum.normal.map(|n| n / norm(&sum.normal)), faces),
+            };
             let mut distance = sum.gap / sum.weight;
             let shares = sum.masters.iter().map(|(master, value)| (*master, value / sum.weight));
             let mut masters: Vec<(u32, f64)> = shares.collect();
             face_along_normal(&mut masters, &sum.neighbours, (&places[&node], &normal), places);
-            if slides {
+            if smooth.is_none() {
                 let ways = masters
                     .iter()
                     .map(|(master, share)| (share, add_scaled(&places[master], -1.0, &places[&node])));

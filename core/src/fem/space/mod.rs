@@ -11,6 +11,7 @@ mod quadratic;
 mod quadrature;
 #[cfg(test)]
 pub mod samples;
+mod smooth_normal;
 mod surface;
 
 pub use assembly::{CellMatrix, assemble, assemble_numbers};

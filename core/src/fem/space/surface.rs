@@ -3,9 +3,10 @@
 use super::{
     quadratic::values,
     quadrature::{facet_rule, fine_facet_rule},
+    smooth_normal::smooth_normal,
 };
 use crate::{
-    linear_algebra::tensor::{Vector, dot, larger, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     mesh::{
         Mesh,
         shape::{facet_normal, linear_at},
@@ -73,7 +74,7 @@ pub(super) const FACE_AND_MIRROR_IMAGE: f64 = 0.939_692_620_785_908;
 /// The quadrature points of these boundaries at nodes owned here, ordered by node. Collective.
 ///
 /// A node on an edge between faces of the body gets a point for each face; facets that meet at a smaller angle share a
-/// point with their mean normal. A constant pressure has the same nodal forces as by exact integration: the weights are those of the
+/// point with the normal of the curved surface there, as far as its nodes tell. A constant pressure has the same nodal forces as by exact integration: the weights are those of the
 /// trapezoidal rule, for quadratic cells in the plane those of Simpson's rule, and in space those of the rule with the midpoints of
 /// edges, whose weights at corners are zero. On a body of revolution weights are those of the whole turn, and the normal on the axis is
 /// that of the face and its mirror image.
@@ -97,7 +98,8 @@ pub fn surface_means<const D: usize, const N: usize>(
     for &facet in facets {
         let corners = mesh.facets[facet as usize];
         for nodes in mesh.sub_facets(facet) {
-            let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
+            let places = nodes.map(|node| mesh.nodes[node as usize]);
+            let normal = facet_normal(&places);
             for (at, node) in nodes.into_iter().enumerate() {
                 let factor = match (mesh.order(), corners.contains(&node)) {
                     (1, _) => 1.0,
@@ -109,6 +111,8 @@ pub fn surface_means<const D: usize, const N: usize>(
                 let record = &mut outgoing[mesh.owner(global)];
                 record.extend([f64::from(global), factor * turn(mesh, &nodes, at)]);
                 record.extend(normal);
+                let others = (0..2).map(|k| places[(at + k + 1) % D]);
+                record.extend(others.flat_map(|place| add_scaled(&place, -1.0, &places[at])));
                 record.extend(of_facet(facet));
             }
         }
@@ -129,12 +133,13 @@ fn points_of_shares<const D: usize, const N: usize>(
     records: &[f64],
 ) -> Vec<(SurfacePoint<D>, [f64; N])> {
     let mut shares: Vec<Share<D, N>> = records
-        .chunks_exact(D + 2 + N)
+        .chunks_exact(2 + 3 * D + N)
         .map(|record| Share {
             node: record[0] as u32,
             factor: record[1],
-            normal: std::array::from_fn(|i| record[i + 2]),
-            values: std::array::from_fn(|i| record[i + 2 + D]),
+            normal: std::array::from_fn(|i| record[2 + i]),
+            others: std::array::from_fn(|k| std::array::from_fn(|i| record[2 + (k + 1) * D + i])),
+            values: std::array::from_fn(|i| record[2 + 3 * D + i]),
         })
         .collect();
     shares.sort_by(|a, b| {
@@ -154,6 +159,8 @@ struct Share<const D: usize, const N: usize> {
     factor: f64,
     /// Normal of the facet, as long as its measure.
     normal: Vector<D>,
+    /// The ways in m to its other nodes; 0 where there is none.
+    others: [Vector<D>; 2],
     /// Values of the facet.
     values: [f64; N],
 }
@@ -219,6 +226,7 @@ pub fn corner_means<const D: usize, const N: usize>(
             let record = &mut answers[mesh.owner(corner)];
             record.extend([f64::from(corner), 0.0]);
             record.extend(normal);
+            record.extend([[0.0; D]; 2].as_flattened());
             record.extend(values);
         }
     }
@@ -289,6 +297,8 @@ struct Face<const D: usize, const N: usize> {
     size: f64,
     /// Sum of their values times their measures.
     values: [f64; N],
+    /// The ways in m to their other nodes.
+    ways: Vec<Vector<D>>,
 }
 
 fn points_of_node<const D: usize, const N: usize>(
@@ -296,7 +306,8 @@ fn points_of_node<const D: usize, const N: usize>(
     shares: &[Share<D, N>],
 ) -> Vec<(SurfacePoint<D>, [f64; N])> {
     let mut faces: Vec<Face<D, N>> = Vec::new();
-    for Share { factor, normal, values, .. } in shares {
+    for Share { factor, normal, others, values, .. } in shares {
+        let ways = others.iter().filter(|way| **way != [0.0; D]);
         let size = norm(normal);
         let face =
             faces.iter_mut().find(|face| dot(&face.normal, normal) > SAME_FACE * size * norm(&face.normal));
@@ -308,19 +319,22 @@ fn points_of_node<const D: usize, const N: usize>(
                 face.weight += factor * size;
                 face.size += size;
                 face.values.iter_mut().zip(values).for_each(|(sum, value)| *sum += size * value);
+                face.ways.extend(ways);
             }
             None => faces.push(Face {
                 normal: *normal,
                 weight: factor * size,
                 size,
                 values: values.map(|value| size * value),
+                ways: ways.copied().collect(),
             }),
         }
     }
     let node = mesh.owned_node(shares[0].node) as u32;
     faces
         .into_iter()
-        .map(|Face { mut normal, weight, size, values }| {
+        .map(|Face { normal, weight, size, values, ways }| {
+            let mut normal = smooth_normal(&normal, &ways);
             // Facets that lie on the axis have no mirror images.
             if mesh.is_on_axis(&mesh.nodes[node as usize]) && normal[1] != 0.0 {
                 normal[0] = 0.0;
