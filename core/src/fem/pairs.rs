@@ -203,19 +203,19 @@ impl<const D: usize> Pair<D> {
         &self,
         session: &Session,
         mesh: &Mesh<D>,
-        places: &[Vector<D>],
+        (places, normals): (&[Vector<D>], &FaceNormals<D>),
     ) -> Result<Vec<Contribution<D>>, Agreed> {
         let depth = DEEPEST * longest_side(session, places);
         let of_facets = |on: &[u32], masters: &[Facet<D>]| {
-            let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
+            let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, normals, *facet)).collect();
             contributions(&slaves, masters, [depth, f64::INFINITY])
         };
         if self.sharing.is_empty() {
-            return Ok(of_facets(&self.on, &gather_facets(session, mesh, places, &self.against)?));
+            return Ok(of_facets(&self.on, &gather_facets(session, mesh, (places, normals), &self.against)?));
         }
         let mut masters = Vec::new();
         for sharing in &self.sharing {
-            masters.push(gather_facets(session, mesh, places, &sharing.against)?);
+            masters.push(gather_facets(session, mesh, (places, normals), &sharing.against)?);
         }
         // Facets by which of the contacts have them.
         let mut kinds: BTreeMap<Vec<bool>, Vec<u32>> = BTreeMap::new();
@@ -375,18 +375,13 @@ impl<const D: usize> Pair<D> {
         mesh: &Mesh<D>,
         places: &[Vector<D>],
     ) -> Result<(Vec<PairedNode<D>>, bool), Agreed> {
-        let mut all = self.contributions(session, mesh, places)?;
+        let normals = FaceNormals::of(session, mesh, [&self.on, &self.against])?;
+        let mut all = self.contributions(session, mesh, (places, &normals))?;
         let at = gather_places(session, mesh, places, [&self.on, &self.against])?;
         if mesh.order() == 2 {
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
-        let curvatures = curvatures(&gather_facets(session, mesh, places, &self.on)?);
-        let mut smooth: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
-        if !self.slides {
-            for point in surface_points(session, mesh, &self.on)? {
-                smooth.entry(mesh.global_node(point.node)).or_default().push(point.normal);
-            }
-        }
+        let curvatures = curvatures(&gather_facets(session, mesh, (places, &normals), &self.on)?);
         let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
         let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
         let mut lawless = self.lawless.clone();
@@ -403,7 +398,8 @@ impl<const D: usize> Pair<D> {
                         && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
                 };
                 let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
-                return Ok((paired(mesh, sums, (&at, &curvatures), Some(&smooth).filter(|_| !self.slides)), is_bare));
+                let normals = (!self.slides).then_some(&normals);
+                return Ok((paired(mesh, sums, (&at, &curvatures), normals), is_bare));
             }
             lawless.extend(further);
         }
@@ -503,12 +499,54 @@ const LEAST_SPREAD: f64 = 1e-3;
 /// is larger where facets are.
 const DEEPEST: f64 = 0.05;
 
+/// The outward unit normals of the faces around the nodes of both sides of a pair, in the undeformed bodies, by global numbers. The same on
+/// all ranks.
+struct FaceNormals<const D: usize>(BTreeMap<u32, Vec<Vector<D>>>);
+
+impl<const D: usize> FaceNormals<D> {
+    /// Those of these facets. Collective.
+    fn of(session: &Session, mesh: &Mesh<D>, sides: [&[u32]; 2]) -> Result<Self, Agreed> {
+        let mut own = Vec::new();
+        for side in sides {
+            for point in surface_points(session, mesh, side)? {
+                own.push(f64::from(mesh.global_node(point.node)));
+                own.extend(point.normal);
+            }
+        }
+        let mut normals: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
+        for record in gather(session.world(), &own)?.chunks_exact(D + 1) {
+            normals.entry(record[0] as u32).or_default().push(std::array::from_fn(|i| record[i + 1]));
+        }
+        Ok(Self(normals))
+    }
+
+    /// The normal at a node of the face of which a part has this mean normal.
+    fn at(&self, node: u32, mean: &Vector<D>) -> Vector<D> {
+        let faces = self.0.get(&node).into_iter().flatten();
+        let same = faces.filter(|normal| dot(normal, mean) > SAME_FACE);
+        same.max_by(|a, b| dot(a, mean).total_cmp(&dot(b, mean))).copied().unwrap_or(*mean)
+    }
+
+    /// The mean of the normals at the corners of a facet with this normal, which it is if the surface is flat.
+    fn of_facet(&self, corners: [u32; D], normal: &Vector<D>) -> Vector<D> {
+        let sum = corners.iter().fold([0.0; D], |sum, node| add_scaled(&sum, 1.0, &self.at(*node, normal)));
+        let mean = sum.map(|n| n / norm(&sum));
+        if norm(&add_scaled(&mean, -1.0, normal)) < ROUNDING { *normal } else { mean }
+    }
+}
+
 /// A facet of this rank.
-fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) -> Facet<D> {
+fn facet_of<const D: usize>(
+    mesh: &Mesh<D>,
+    places: &[Vector<D>],
+    normals: &FaceNormals<D>,
+    facet: u32,
+) -> Facet<D> {
     let of_corners = mesh.facets[facet as usize];
     let nodes = mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect();
     let turns = of_corners.map(|node| mesh.turn(&mesh.nodes[node as usize]));
-    let undeformed = Facet::new(Vec::new(), mesh.facet_corners(facet)).normal;
+    let flat = Facet::new(Vec::new(), mesh.facet_corners(facet)).normal;
+    let undeformed = normals.of_facet(of_corners.map(|node| mesh.global_node(node)), &flat);
     Facet { turns, undeformed, ..Facet::new(nodes, of_corners.map(|node| places[node as usize])) }
 }
 
@@ -516,10 +554,10 @@ fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) ->
 fn gather_facets<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
-    places: &[Vector<D>],
+    (places, normals): (&[Vector<D>], &FaceNormals<D>),
     facets: &[u32],
 ) -> Result<Vec<Facet<D>>, Agreed> {
-    let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
+    let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, normals, *facet)).collect();
     let nodes: Vec<u32> = own.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
     let places: Vec<f64> = own.iter().flat_map(|facet| facet.corners.as_flattened()).copied().collect();
     let normals: Vec<f64> = own.iter().flat_map(|facet| facet.undeformed).collect();
@@ -749,27 +787,21 @@ fn paired<const D: usize>(
     mesh: &Mesh<D>,
     sums: BTreeMap<u32, Sum<D>>,
     (places, curvatures): (&BTreeMap<u32, Vector<D>>, &BTreeMap<u32, f64>),
-    smooth: Option<&BTreeMap<u32, Vec<Vector<D>>>>,
+    normals: Option<&FaceNormals<D>>,
 ) -> Vec<PairedNode<D>> {
-    // The normal of the part of a curved face that faces the other side is that of the face.
-    let of_face = |node: u32, mean: Vector<D>, faces: &BTreeMap<u32, Vec<Vector<D>>>| {
-        let faces = faces.get(&node).into_iter().flatten();
-        let near = faces.filter(|normal| dot(normal, &mean) > SAME_FACE);
-        near.max_by(|a, b| dot(a, &mean).total_cmp(&dot(b, &mean))).copied().unwrap_or(mean)
-    };
     sums.into_iter()
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
         .filter(|(_, sum)| sum.whole > 0.0 && sum.carries_a_law())
         .map(|(node, sum)| {
-            let normal = match smooth {
+            let normal = match normals {
                 None => direction(&sum.normals),
-                Some(faces) => of_face(node, sum.normal.map(|n| n / norm(&sum.normal)), faces),
+                Some(normals) => normals.at(node, &sum.normal.map(|n| n / norm(&sum.normal))),
             };
             let mut distance = sum.gap / sum.weight;
             let shares = sum.masters.iter().map(|(master, value)| (*master, value / sum.weight));
             let mut masters: Vec<(u32, f64)> = shares.collect();
             face_along_normal(&mut masters, &sum.neighbours, (&places[&node], &normal), places);
-            if smooth.is_none() {
+            if normals.is_none() {
                 let ways = masters
                     .iter()
                     .map(|(master, share)| (share, add_scaled(&places[master], -1.0, &places[&node])));
