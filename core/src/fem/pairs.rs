@@ -4,7 +4,7 @@ use super::coupling::{Inclined, MasterShare};
 use crate::{
     fem::space::{
         Held, SurfacePoint, longest_side,
-        mortar::{Contribution, Facet, Normals, contributions, direction},
+        mortar::{Contribution, Facet, Normals, contributions, direction, smooth_direction},
         surface_points,
     },
     linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, larger, norm, outside},
@@ -203,19 +203,19 @@ impl<const D: usize> Pair<D> {
         &self,
         session: &Session,
         mesh: &Mesh<D>,
-        (places, normals): (&[Vector<D>], &FaceNormals<D>),
+        places: &[Vector<D>],
     ) -> Result<Vec<Contribution<D>>, Agreed> {
         let depth = DEEPEST * longest_side(session, places);
         let of_facets = |on: &[u32], masters: &[Facet<D>]| {
-            let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, normals, *facet)).collect();
+            let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
             contributions(&slaves, masters, [depth, f64::INFINITY])
         };
         if self.sharing.is_empty() {
-            return Ok(of_facets(&self.on, &gather_facets(session, mesh, (places, normals), &self.against)?));
+            return Ok(of_facets(&self.on, &gather_facets(session, mesh, places, &self.against)?));
         }
         let mut masters = Vec::new();
         for sharing in &self.sharing {
-            masters.push(gather_facets(session, mesh, (places, normals), &sharing.against)?);
+            masters.push(gather_facets(session, mesh, places, &sharing.against)?);
         }
         // Facets by which of the contacts have them.
         let mut kinds: BTreeMap<Vec<bool>, Vec<u32>> = BTreeMap::new();
@@ -376,12 +376,12 @@ impl<const D: usize> Pair<D> {
         places: &[Vector<D>],
     ) -> Result<(Vec<PairedNode<D>>, bool), Agreed> {
         let normals = FaceNormals::of(session, mesh, [&self.on, &self.against])?;
-        let mut all = self.contributions(session, mesh, (places, &normals))?;
+        let mut all = self.contributions(session, mesh, places)?;
         let at = gather_places(session, mesh, places, [&self.on, &self.against])?;
         if mesh.order() == 2 {
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
-        let curvatures = curvatures(&gather_facets(session, mesh, (places, &normals), &self.on)?);
+        let curvatures = curvatures(&gather_facets(session, mesh, places, &self.on)?);
         let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
         let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
         let mut lawless = self.lawless.clone();
@@ -398,8 +398,7 @@ impl<const D: usize> Pair<D> {
                         && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
                 };
                 let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
-                let normals = (!self.slides).then_some(&normals);
-                return Ok((paired(mesh, sums, (&at, &curvatures), normals), is_bare));
+                return Ok((paired(mesh, sums, (&at, &curvatures), (&normals, self.slides)), is_bare));
             }
             lawless.extend(further);
         }
@@ -526,27 +525,14 @@ impl<const D: usize> FaceNormals<D> {
         let same = faces.filter(|normal| dot(normal, mean) > SAME_FACE);
         same.max_by(|a, b| dot(a, mean).total_cmp(&dot(b, mean))).copied().unwrap_or(*mean)
     }
-
-    /// The mean of the normals at the corners of a facet with this normal, which it is if the surface is flat.
-    fn of_facet(&self, corners: [u32; D], normal: &Vector<D>) -> Vector<D> {
-        let sum = corners.iter().fold([0.0; D], |sum, node| add_scaled(&sum, 1.0, &self.at(*node, normal)));
-        let mean = sum.map(|n| n / norm(&sum));
-        if norm(&add_scaled(&mean, -1.0, normal)) < ROUNDING { *normal } else { mean }
-    }
 }
 
 /// A facet of this rank.
-fn facet_of<const D: usize>(
-    mesh: &Mesh<D>,
-    places: &[Vector<D>],
-    normals: &FaceNormals<D>,
-    facet: u32,
-) -> Facet<D> {
+fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) -> Facet<D> {
     let of_corners = mesh.facets[facet as usize];
     let nodes = mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect();
     let turns = of_corners.map(|node| mesh.turn(&mesh.nodes[node as usize]));
-    let flat = Facet::new(Vec::new(), mesh.facet_corners(facet)).normal;
-    let undeformed = normals.of_facet(of_corners.map(|node| mesh.global_node(node)), &flat);
+    let undeformed = Facet::new(Vec::new(), mesh.facet_corners(facet)).normal;
     Facet { turns, undeformed, ..Facet::new(nodes, of_corners.map(|node| places[node as usize])) }
 }
 
@@ -554,10 +540,10 @@ fn facet_of<const D: usize>(
 fn gather_facets<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
-    (places, normals): (&[Vector<D>], &FaceNormals<D>),
+    places: &[Vector<D>],
     facets: &[u32],
 ) -> Result<Vec<Facet<D>>, Agreed> {
-    let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, normals, *facet)).collect();
+    let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
     let nodes: Vec<u32> = own.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
     let places: Vec<f64> = own.iter().flat_map(|facet| facet.corners.as_flattened()).copied().collect();
     let normals: Vec<f64> = own.iter().flat_map(|facet| facet.undeformed).collect();
@@ -683,6 +669,18 @@ impl<const D: usize> Sum<D> {
         weight > LEAST_SHARE * whole && weight + passed > LEAST_STRETCH * weight
     }
 
+    /// The normals of a node and of what it faces, of curved faces where these are.
+    fn smooth_normals(&self, node: u32, normals: &FaceNormals<D>) -> [Vector<D>; 2] {
+        let [own, faced] = [0, 1].map(|side| self.normals[side].mean());
+        let masters = self.masters.iter().filter(|(master, _)| !self.neighbours.contains(master));
+        let sum = masters
+            .fold([0.0; D], |sum, (master, share)| add_scaled(&sum, *share, &normals.at(*master, &faced)));
+        let length = norm(&sum);
+        // The shares of what is faced sum to the part of the surface, unless neighbours have no law.
+        let is_whole = length > 0.5 * self.weight;
+        [normals.at(node, &own), if is_whole { sum.map(|n| n / length) } else { faced }]
+    }
+
     /// The angle in rad of the edges of the other side over the part of the surface for which a node at this distance in m stands: by how much
     /// that side turns there, or is inclined to it where it ends. Steep flanks of a corner see ends that are far away.
     fn sharpness(&self, distance: f64) -> f64 {
@@ -782,26 +780,27 @@ fn curvatures<const D: usize>(facets: &[Facet<D>]) -> BTreeMap<u32, f64> {
 }
 
 /// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m on a surface as curved as this there, and
-/// the normals of the faces around them if they do not slide.
+/// the normals of the faces around them, and whether they slide.
 fn paired<const D: usize>(
     mesh: &Mesh<D>,
     sums: BTreeMap<u32, Sum<D>>,
     (places, curvatures): (&BTreeMap<u32, Vector<D>>, &BTreeMap<u32, f64>),
-    normals: Option<&FaceNormals<D>>,
+    (normals, slides): (&FaceNormals<D>, bool),
 ) -> Vec<PairedNode<D>> {
     sums.into_iter()
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
         .filter(|(_, sum)| sum.whole > 0.0 && sum.carries_a_law())
         .map(|(node, sum)| {
-            let normal = match normals {
-                None => direction(&sum.normals),
-                Some(normals) => normals.at(node, &sum.normal.map(|n| n / norm(&sum.normal))),
+            let normal = match slides {
+                true => smooth_direction(&sum.normals, sum.smooth_normals(node, normals))
+                    .unwrap_or_else(|| direction(&sum.normals)),
+                false => normals.at(node, &sum.normal.map(|n| n / norm(&sum.normal))),
             };
             let mut distance = sum.gap / sum.weight;
             let shares = sum.masters.iter().map(|(master, value)| (*master, value / sum.weight));
             let mut masters: Vec<(u32, f64)> = shares.collect();
             face_along_normal(&mut masters, &sum.neighbours, (&places[&node], &normal), places);
-            if normals.is_none() {
+            if slides {
                 let ways = masters
                     .iter()
                     .map(|(master, share)| (share, add_scaled(&places[master], -1.0, &places[&node])));

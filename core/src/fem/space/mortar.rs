@@ -41,7 +41,7 @@ mod normals;
 mod tests;
 
 pub use facet::Facet;
-pub use normals::{Normals, direction};
+pub use normals::{Normals, direction, smooth_direction};
 
 /// A master facet faces a slave facet if its normal has a component along the slave normal below this.
 const FACING: f64 = -0.2;

@@ -5,6 +5,9 @@ use crate::linear_algebra::tensor::{Vector, add_scaled, dot, eigenvectors, norm}
 /// How much the unit normals of a surface may vary, as the mean square of their components along it, for it to count as flat (0.8 degrees).
 const FLAT: f64 = 2e-4;
 
+/// The largest turn in rad on either side of the mean normal without an edge (20 degrees).
+const EDGE: f64 = 0.35;
+
 /// The outward unit normals `n` of a part of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normals<const D: usize> {
@@ -84,6 +87,20 @@ pub fn direction<const D: usize>([own, faced]: &[Normals<D>; 2]) -> Vector<D> {
     sum.map(|n| n / length)
 }
 
+/// The same between surfaces without edges, with the normals of the curved surfaces where they touch; `None` if there is an edge.
+pub fn smooth_direction<const D: usize>(
+    sides: &[Normals<D>; 2],
+    [own, faced]: [Vector<D>; 2],
+) -> Option<Vector<D>> {
+    if sides.iter().any(|side| side.turn() > EDGE) {
+        return None;
+    }
+    let [first, second] = [0, 1].map(|at| sides[at].turn().sin().powi(2));
+    let sum = add_scaled(&own.map(|n| second * n), -(first + FLAT), &faced);
+    let length = norm(&sum);
+    Some(sum.map(|n| n / length))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,6 +152,23 @@ mod tests {
         for edge in edges {
             assert!((dot(&found, &edge) / norm(&edge)).abs() < 2e-3, "{found:?} along {edge:?}");
         }
+    }
+
+    #[test]
+    fn curved_surfaces_touch_along_their_normals_and_a_flat_one_has_its_own() {
+        let tilted = |angle: f64| [angle.sin(), -angle.cos()];
+        let [flat, round] = [of(&[[0.0, -1.0]; 2]), of(&[tilted(0.1), tilted(-0.1)])];
+        let normals = [tilted(0.02), tilted(0.06).map(|x| -x)];
+        let angle = |sides: [Normals<2>; 2]| {
+            let [x, y] = smooth_direction(&sides, normals).expect("smooth");
+            x.atan2(-y)
+        };
+        assert!((angle([round, round]) - 0.04).abs() < 1e-3, "{}", angle([round, round]));
+        assert!((angle([round, flat]) - 0.06).abs() < 1e-3);
+        assert!((angle([flat, round]) - 0.02).abs() < 1e-3);
+        assert!((angle([flat, flat]) - 0.06).abs() < 1e-12, "of the second one");
+        let corner = of(&[[1.0, -1.0], [-1.0, -1.0]]);
+        assert_eq!(smooth_direction(&[corner, flat], normals), None);
     }
 
     #[test]
