@@ -82,7 +82,7 @@ mod tests {
             let ways = PLACES.map(|[x, y]| [x, y, -0.5 * (along * x * x + across * y * y)]);
             let [found, mean] = of_fan(&ways);
             assert!(norm(&add_scaled(&found, -1.0, &[0.0, 0.0, 1.0])) < 2e-3, "{found:?}, mean {mean:?}");
-            assert!(norm(&add_scaled(&mean, -1.0, &[0.0, 0.0, 1.0])) > 8e-3, "{mean:?}");
+            assert!(norm(&add_scaled(&mean, -1.0, &[0.0, 0.0, 1.0])) > 5e-3, "{mean:?}");
         }
     }
 
