@@ -392,4 +392,10 @@ fn a_folder_without_a_run_is_refused_with_the_remedy() {
     let case = Case::square(4);
     refused(&case.written(), "that is a job; give the output folder of its run");
     assert!(!empty.join("report").exists());
+    let study = folder.path().join("study");
+    std::fs::create_dir(&study).expect("folder");
+    std::fs::write(study.join("study.json"), "{}").expect("written");
+    launch::run_alone(&["report".as_ref(), empty.as_os_str(), study.as_os_str()])
+        .expect(2)
+        .says("study is the folder of a study, and runs are compared");
 }

@@ -50,6 +50,14 @@ pub fn report(folder: &Path, options: Options) -> Result<Made> {
 
 /// Writes `report/comparison.html` in the first folder: a page with two runs side by side.
 pub fn compare(folders: [&Path; 2], options: Options) -> Result<Made> {
+    if let Some(study) = folders.into_iter().find(|folder| study::is_study(folder)) {
+        let words = format!(
+            "{} is the folder of a study, and runs are compared; its own report is that of `solver report {0}`, and the runs of a \
+             study are in its folders",
+            study.display()
+        );
+        return Err(Error::Refused(words));
+    }
     let found = [RunFiles::read(folders[0])?, RunFiles::read(folders[1])?];
     let page = comparison::page(&found, options)?;
     let missing = found.iter().flat_map(|found| {
