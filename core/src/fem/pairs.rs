@@ -398,7 +398,8 @@ impl<const D: usize> Pair<D> {
                         && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
                 };
                 let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
-                return Ok((paired(mesh, sums, (&at, &curvatures), (&normals, self.slides)), is_bare));
+                let surface = Surface { places: &at, curvatures: &curvatures, normals: &normals };
+                return Ok((paired(mesh, sums, &surface, self.slides), is_bare));
             }
             lawless.extend(further);
         }
@@ -779,13 +780,21 @@ fn curvatures<const D: usize>(facets: &[Facet<D>]) -> BTreeMap<u32, f64> {
     largest
 }
 
-/// The nodes of this rank with these sums that carry a law, in a mesh with nodes at these places in m on a surface as curved as this there, and
-/// the normals of the faces around them, and whether they slide.
+/// Both sides of a pair, by the global numbers of nodes.
+struct Surface<'a, const D: usize> {
+    /// Places in m.
+    places: &'a BTreeMap<u32, Vector<D>>,
+    /// How curved the slave side is, as [`PairedNode::curvature`].
+    curvatures: &'a BTreeMap<u32, f64>,
+    normals: &'a FaceNormals<D>,
+}
+
+/// The nodes of this rank with these sums that carry a law on a surface, and whether they slide.
 fn paired<const D: usize>(
     mesh: &Mesh<D>,
     sums: BTreeMap<u32, Sum<D>>,
-    (places, curvatures): (&BTreeMap<u32, Vector<D>>, &BTreeMap<u32, f64>),
-    (normals, slides): (&FaceNormals<D>, bool),
+    Surface { places, curvatures, normals }: &Surface<'_, D>,
+    slides: bool,
 ) -> Vec<PairedNode<D>> {
     sums.into_iter()
         // Corners of quadratic cells on the axis of a body of revolution stand for nothing.
