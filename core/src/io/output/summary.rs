@@ -184,7 +184,7 @@ pub struct Errors {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of stress and velocity at the end by the steps, relative")]
     pub error_of_steps: Option<f64>,
-    /// The order at which `error_of_steps` falls with the steps; missing where states of longer steps do not approach that of the run.
+    /// The order at which `error_of_steps` falls with the steps; missing where the states of longer steps show none that is near that of the scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub order_of_steps: Option<f64>,
 }
