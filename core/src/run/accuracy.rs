@@ -13,7 +13,7 @@
 //!
 //! The order is that of the scheme at most. It is trusted if it is 0.7 or more, above that of the scheme by 0.5 at most, and if the states
 //! change in one direction: the cosine between `S_1 - S_2` and `S_2 - S_4` is 0.5 or more. Steps that do not resolve a vibration or a jump show
-//! any order between two pairs of states. Otherwise `p` is 0.7, and the error is uncertain.
+//! any order between two pairs of states. Otherwise the error is uncertain, and `p` is 0.7 unless too high an order is all that is wrong.
 //!
 //! Where longer steps are refused or are not fewer, the run is repeated once with steps half as long instead, and `p` is 1:
 //! `e = F 2 |S_1 - S_1/2|`.
@@ -34,14 +34,14 @@ use crate::{
 };
 const SAFETY: f64 = 1.25;
 /// That of the error indicator.
-const SAFETY_OF_INDICATOR: f64 = 1.5;
+const SAFETY_OF_INDICATOR: f64 = 2.0;
 /// A body vibrates whose kinetic energy is more than this share of its elastic energy.
 const VIBRATING: f64 = 1e-2;
 /// The step of repetitions over that of the run.
 const LONGER: [f64; 2] = [2.0, 4.0];
 /// The same where longer steps say nothing.
 const SHORTER: f64 = 0.5;
-/// The least order that is trusted, that of uncertain errors.
+/// The least order that is trusted, and the one assumed where states show less or change to and fro.
 const LEAST_ORDER: f64 = 0.7;
 /// How far above the order of the scheme an order is trusted.
 const EXCESS: f64 = 0.5;
@@ -182,16 +182,16 @@ pub fn error_of_steps<const D: usize, const S: usize>(
     let (order, share) = if first < 1.0 {
         (Some(1.0), SAFETY / (1.0 - first))
     } else {
-        let order = match &far {
+        let (order, is_trusted) = match &far {
             Ok(far) => {
                 let between = near.distance(session, body, Some(far))?;
                 let across = end.distance(session, body, Some(far))?;
                 let ratios = [first, ratio(&near, far)];
-                trusted_order([distance, between, across], ratios, loaded.job.order_in_time().into())
+                order_of([distance, between, across], ratios, loaded.job.order_in_time().into())
             }
-            Err(_) => Some(1.0),
+            Err(_) => (1.0, true),
         };
-        (order, SAFETY / (first.powf(order.unwrap_or(LEAST_ORDER)) - 1.0))
+        (is_trusted.then_some(order), SAFETY / (first.powf(order) - 1.0))
     };
     let error = if distance > 0.0 { share * distance / norm } else { 0.0 };
     let least = loaded.job.solver.tolerance;
@@ -222,13 +222,15 @@ fn repeated<const D: usize, const S: usize>(
     }
 }
 
-/// The order at which states approach each other, at most that of the scheme, given the distances of neighbours, the finer ones first, and of
-/// the outer ones, and the ratios of the numbers of steps; `None` if it is not trusted.
-fn trusted_order([near, far, across]: [f64; 3], ratios: [f64; 2], of_scheme: f64) -> Option<f64> {
-    let order = observed_order([near, far], ratios);
-    let is_regular = (LEAST_ORDER..=of_scheme + EXCESS).contains(&order);
+/// The order to assume, at most that of the scheme, and whether it is trusted, given the distances of neighbouring states, the finer ones
+/// first, and of the outer ones, and the ratios of the numbers of steps.
+fn order_of([near, far, across]: [f64; 3], ratios: [f64; 2], of_scheme: f64) -> (f64, bool) {
+    let shown = observed_order([near, far], ratios);
     let is_straight = across * across - near * near - far * far >= 2.0 * LEAST_COSINE * near * far;
-    (is_regular && is_straight).then(|| order.min(of_scheme))
+    if !(is_straight && shown >= LEAST_ORDER) {
+        return (LEAST_ORDER, false);
+    }
+    (shown.min(of_scheme), shown <= of_scheme + EXCESS)
 }
 
 /// The order at which states approach each other, given the distances of neighbours and the ratios of their numbers of steps, the finer ones
@@ -278,20 +280,21 @@ mod tests {
 
     #[test]
     fn orders_are_trusted_near_that_of_the_scheme_where_states_change_in_one_direction() {
-        let of = |distances: [f64; 3], scheme: f64| trusted_order(distances, [2.0, 2.0], scheme);
-        let known = of([1.0, 2.0, 3.0], 1.0).expect("the order of the scheme");
-        assert!((known - 1.0).abs() < 1e-9, "{known}");
-        assert_eq!(of([1.0, 2.8, 3.8], 1.0), Some(1.0), "somewhat above that of the scheme");
-        assert_eq!(of([1.0, 4.0, 5.0], 1.0), None, "of order 2, by chance");
-        assert!(of([1.0, 4.0, 5.0], 2.0).is_some_and(|order| order > 1.999));
-        assert_eq!(of([1.0, 1.5, 2.5], 1.0), None, "slower than order 0.7");
-        assert_eq!(of([1.0, 2.0, 1.0], 1.0), None, "to and fro");
-        assert_eq!(of([1.0, 2.0, f64::sqrt(5.0)], 1.0), None, "each change in another direction");
-        assert_eq!(of([0.0, 1.0, 1.0], 1.0), Some(1.0), "nothing changes");
+        let of = |distances: [f64; 3], scheme: f64| order_of(distances, [2.0, 2.0], scheme);
+        let (known, is_trusted) = of([1.0, 2.0, 3.0], 1.0);
+        assert!((known - 1.0).abs() < 1e-9 && is_trusted, "{known}");
+        assert_eq!(of([1.0, 2.8, 3.8], 1.0), (1.0, true), "somewhat above that of the scheme");
+        assert_eq!(of([1.0, 4.0, 5.0], 1.0), (1.0, false), "of order 2, by chance");
+        assert!(of([1.0, 4.0, 5.0], 2.0).1);
+        assert_eq!(of([0.0, 1.0, 1.0], 1.0), (1.0, true), "nothing changes");
+        let uncertain = (LEAST_ORDER, false);
+        assert_eq!(of([1.0, 1.5, 2.5], 1.0), uncertain, "slower than order 0.7");
+        assert_eq!(of([1.0, 2.0, 1.0], 1.0), uncertain, "to and fro");
+        assert_eq!(of([1.0, 2.0, f64::sqrt(5.0)], 1.0), uncertain, "each change in another direction");
         for at in 0..3 {
             let mut distances = [1.0, 2.0, 3.0];
             distances[at] = f64::NAN;
-            assert_eq!(of(distances, 1.0), None);
+            assert_eq!(of(distances, 1.0), uncertain);
         }
     }
 

@@ -253,10 +253,13 @@ mod tests {
 
     #[test]
     fn where_friction_weakens_a_short_descent_and_one_with_fixed_bounds_follow_full_and_half_steps() {
-        let weakens = Properties { has_friction: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
-        let found: Vec<_> = weakens.fallbacks().map(|fallback| (fallback.search, fallback.iteration)).collect();
+        let weakens =
+            Properties { has_friction: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
+        let found: Vec<_> =
+            weakens.fallbacks().map(|fallback| (fallback.search, fallback.iteration)).collect();
         use FrictionIteration::{FixedPoint, Newton};
-        let first = [(Search::FullSteps, Newton), (Search::HalfSteps, Newton), (Search::ShortDescent, Newton)];
+        let first =
+            [(Search::FullSteps, Newton), (Search::HalfSteps, Newton), (Search::ShortDescent, Newton)];
         assert_eq!(found[..3], first);
         assert_eq!(found[3], (Search::Descent, FixedPoint));
         assert_eq!(found.iter().filter(|other| **other == found[3]).count(), 1);
