@@ -193,10 +193,10 @@ pub fn error_of_steps<const D: usize, const S: usize>(
         };
         (is_trusted.then_some(order), SAFETY / (first.powf(order) - 1.0))
     };
-    let error = if distance > 0.0 { share * distance / norm } else { 0.0 };
+    let error = if distance == 0.0 { 0.0 } else { share * distance / norm };
     let least = loaded.job.solver.tolerance;
     // States that are equal within the tolerance show none.
-    let order = if error > least { order } else { order.or(Some(1.0)) };
+    let order = if error <= least { order.or(Some(1.0)) } else { order };
     Ok(Ok(ErrorOfSteps { relative: larger(error, least), order, norm }))
 }
 
