@@ -51,6 +51,14 @@ enum Of {
 
 type Outcome<T> = Result<T, String>;
 
+/// The error of a run.
+struct Measured {
+    estimate: f64,
+    actual: f64,
+    /// Whether the estimate is not said to be uncertain.
+    is_trusted: bool,
+}
+
 fn words(error: impl ToString) -> String {
     error.to_string()
 }
@@ -77,7 +85,7 @@ fn of_steps<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     mesh: Mesh<D>,
-) -> Outcome<[f64; 2]> {
+) -> Outcome<Measured> {
     let simulation = run::<D, S>(session, loaded, mesh.clone(), LONGEST[0])?;
     let began = Instant::now();
     let is_late = || began.elapsed() > LONGEST[1];
@@ -85,7 +93,8 @@ fn of_steps<const D: usize, const S: usize>(
     let fine = run::<D, S>(session, &with_steps(loaded, TRUE_STEP), mesh, LONGEST[1])?;
     let [end, fine] = [&simulation, &fine].map(EndState::of);
     let distance = end.map_err(words)?.distance(session, &simulation.body, Some(&fine.map_err(words)?));
-    Ok([estimate.relative, distance.map_err(words)? / estimate.norm])
+    let actual = distance.map_err(words)? / estimate.norm;
+    Ok(Measured { estimate: estimate.relative, actual, is_trusted: estimate.order.is_some() })
 }
 
 /// The errors of the mesh of a run.
@@ -93,7 +102,7 @@ fn of_mesh<const D: usize, const S: usize>(
     session: &Session,
     [loaded, fine]: [&Loaded; 2],
     [mesh, fine_mesh]: [Mesh<D>; 2],
-) -> Outcome<[f64; 2]> {
+) -> Outcome<Measured> {
     let coarse = run::<D, S>(session, loaded, mesh, LONGEST[0])?;
     let estimate = error_of_mesh(session, &loaded.job, &coarse).map_err(words)?.ok_or("no estimate")?;
     if vibrates(&coarse.totals) {
@@ -117,7 +126,7 @@ fn of_mesh<const D: usize, const S: usize>(
             size += volume * tensor.inverse_square(&own);
         }
     }
-    Ok([estimate, (error / size).sqrt()])
+    Ok(Measured { estimate, actual: (error / size).sqrt(), is_trusted: true })
 }
 
 /// The cell that contains a place or is nearest to it, with the barycentric coordinates there.
@@ -162,7 +171,7 @@ fn is_plane_strain(loaded: &Loaded) -> bool {
 }
 
 /// Estimates and measures the errors of steps of a job with these keys changed.
-fn steps_of(session: &Session, path: &Path, set: &[String]) -> Outcome<[f64; 2]> {
+fn steps_of(session: &Session, path: &Path, set: &[String]) -> Outcome<Measured> {
     let (loaded, scene) = load(session, path, set)?;
     match scene {
         Scene::Two(mesh) if is_plane_strain(&loaded) => of_steps::<2, 4>(session, &loaded, mesh),
@@ -172,7 +181,7 @@ fn steps_of(session: &Session, path: &Path, set: &[String]) -> Outcome<[f64; 2]>
 }
 
 /// Estimates and measures the errors of a job's mesh with these numbers of cells.
-fn mesh_of(session: &Session, path: &Path, cells: &[u32]) -> Outcome<[f64; 2]> {
+fn mesh_of(session: &Session, path: &Path, cells: &[u32]) -> Outcome<Measured> {
     let block = if cells.len() == 2 { "rectangle" } else { "box" };
     let set = |factor: u32| {
         let cells: Vec<u32> = cells.iter().map(|count| count * factor).collect();
@@ -195,7 +204,7 @@ fn mesh_of(session: &Session, path: &Path, cells: &[u32]) -> Outcome<[f64; 2]> {
 }
 
 /// What is measured of a job, of its variants: estimated and true errors. Bodies that vibrate have no estimate of the error by the mesh.
-fn variants(session: &Session, path: &Path, of: Of) -> Vec<(String, Outcome<[f64; 2]>)> {
+fn variants(session: &Session, path: &Path, of: Of) -> Vec<(String, Outcome<Measured>)> {
     let Ok(loaded) = Job::load(path, &[]) else { return Vec::new() };
     let time = &loaded.job.time;
     match of {
@@ -228,28 +237,36 @@ struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, of: &str, name: &str, [estimated, actual]: [f64; 2]) {
+    fn add(&mut self, of: &str, name: &str, Measured { estimate, actual, .. }: Measured) {
         if actual < NEGLIGIBLE {
             self.negligible[0] += 1;
-            self.negligible[1] += usize::from(estimated < LARGEST_RATIO * NEGLIGIBLE);
+            self.negligible[1] += usize::from(estimate < LARGEST_RATIO * NEGLIGIBLE);
             return;
         }
-        let ratio = estimated / actual;
+        let ratio = estimate / actual;
         self.ratios.push(ratio);
         if !(1.0..=LARGEST_RATIO).contains(&ratio) {
-            writeln!(self.outside, "| {of} | {name} | {estimated:.1e} | {actual:.1e} | {ratio:.2} |")
+            writeln!(self.outside, "| {of} | {name} | {estimate:.1e} | {actual:.1e} | {ratio:.2} |")
                 .expect("text");
         }
     }
 
+    fn is_empty(&self) -> bool {
+        self.ratios.is_empty() && self.negligible[0] == 0
+    }
+
     fn row(&mut self, of: &str) -> String {
         self.ratios.sort_by(f64::total_cmp);
-        let share = |count: usize| format!("{count} of {}", self.ratios.len());
-        let held = self.ratios.iter().filter(|ratio| **ratio >= 1.0).count();
-        let tight = self.ratios.iter().filter(|ratio| **ratio <= LARGEST_RATIO).count();
+        let share = |is_inside: &dyn Fn(f64) -> bool| {
+            let inside = self.ratios.iter().filter(|ratio| is_inside(**ratio)).count();
+            format!("{inside} of {}", self.ratios.len())
+        };
+        let held = share(&|ratio| ratio >= 1.0);
+        let tight = share(&|ratio| ratio <= LARGEST_RATIO);
+        let both = share(&|ratio| (1.0..=LARGEST_RATIO).contains(&ratio));
         let median = self.ratios.get(self.ratios.len() / 2).copied().unwrap_or(f64::NAN);
         let [negligible, small] = self.negligible;
-        format!("| {of} | {} | {} | {median:.2} | {small} of {negligible} |\n", share(held), share(tight))
+        format!("| {of} | {held} | {tight} | {both} | {median:.2} | {small} of {negligible} |\n")
     }
 }
 
@@ -260,21 +277,25 @@ fn main() {
     assert!(options.iter().all(|option| option == "--write"), "known is --write");
     let mpi = Mpi::start().expect("MPI");
     let session = mpi.session().expect("a session");
-    let mut table = "| error by | estimate at least the true error | at most three times | median of estimate over truth | negligible, and \
-                     said to be |\n|---|---|---|--:|---|\n"
+    let mut table = "| error by | estimate at least the true error | at most three times | both | median of estimate over truth | negligible, \
+                     and said to be |\n|---|---|---|---|--:|---|\n"
         .to_owned();
     let mut outside = String::new();
     for (of, name) in [(Of::Steps, "steps"), (Of::Mesh, "mesh")] {
-        let mut tally = Tally::default();
+        let names = [name.to_owned(), format!("{name}, uncertain")];
+        let mut tallies = [Tally::default(), Tally::default()];
         for path in jobs(&words) {
             let stem = path.file_stem().expect("a name").to_string_lossy().into_owned();
             for (variant, found) in variants(&session, &path, of) {
                 let run = format!("`{}`", [stem.as_str(), variant.as_str()].join(" ").trim());
                 match found {
-                    Ok(errors) => {
-                        let [estimated, actual] = errors;
-                        println!("{name} {run} {estimated:.2e} for {actual:.2e}");
-                        tally.add(name, &run, errors);
+                    Ok(measured) => {
+                        let kind = usize::from(!measured.is_trusted);
+                        println!(
+                            "{} {run} {:.2e} for {:.2e}",
+                            names[kind], measured.estimate, measured.actual
+                        );
+                        tallies[kind].add(&names[kind], &run, measured);
                     }
                     Err(reason) => {
                         println!("{name} {run} left out: {}", reason.lines().next().unwrap_or_default())
@@ -282,8 +303,10 @@ fn main() {
                 }
             }
         }
-        table += &tally.row(name);
-        outside += &tally.outside;
+        for (tally, name) in tallies.iter_mut().zip(&names).filter(|(tally, _)| !tally.is_empty()) {
+            table += &tally.row(name);
+            outside += &tally.outside;
+        }
     }
     write!(table, "\n| error by | run | estimate | true error | ratio |\n|---|---|--:|--:|--:|\n{outside}")
         .expect("text");

@@ -9,8 +9,11 @@
 //!
 //! with the safety factor `F = 1.25` of the grid convergence index (P. J. Roache, Journal of Fluids Engineering 116 (1994) 405-413). Adaptive
 //! steps do not become exactly twice as long: the ratios of the numbers of steps stand for 2. The distance is that of energy: of stresses in
-//! the compliance norm and of velocities in the mass norm. Where the states do not approach each other, `F` is 3, that of the index for
-//! solutions without an observed order, `p` is 0.7, and the error is uncertain.
+//! the compliance norm and of velocities in the mass norm.
+//!
+//! The order is that of the scheme at most. It is trusted if it is 0.7 or more, above that of the scheme by 0.5 at most, and if the states
+//! change in one direction: the cosine between `S_1 - S_2` and `S_2 - S_4` is 0.5 or more. Steps that do not resolve a vibration or a jump show
+//! any order between two pairs of states. Otherwise the error is uncertain, and `p` is 0.7 unless too high an order is all that is wrong.
 //!
 //! Where longer steps are refused or are not fewer, the run is repeated once with steps half as long instead, and `p` is 1:
 //! `e = F 2 |S_1 - S_1/2|`.
@@ -29,18 +32,21 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-/// Safety factors: where the states approach each other, and where they do not.
-const SAFETY: [f64; 2] = [1.25, 3.0];
+const SAFETY: f64 = 1.25;
 /// That of the error indicator.
-const SAFETY_OF_INDICATOR: f64 = 1.5;
+const SAFETY_OF_INDICATOR: f64 = 2.0;
 /// A body vibrates whose kinetic energy is more than this share of its elastic energy.
 const VIBRATING: f64 = 1e-2;
 /// The step of repetitions over that of the run.
 const LONGER: [f64; 2] = [2.0, 4.0];
 /// The same where longer steps say nothing.
 const SHORTER: f64 = 0.5;
-/// The least order that is assumed: states that show less do not approach each other.
+/// The least order that is trusted, and the one assumed where states show less or change to and fro.
 const LEAST_ORDER: f64 = 0.7;
+/// How far above the order of the scheme an order is trusted.
+const EXCESS: f64 = 0.5;
+/// The least cosine between the changes of trusted states.
+const LEAST_COSINE: f64 = 0.5;
 /// Numbers of steps with a smaller ratio say nothing about the steps.
 const LEAST_RATIO: f64 = 1.25;
 /// The largest order that is looked for, and the halvings of its interval.
@@ -56,8 +62,7 @@ const LEAST_SHARE: f64 = 0.05;
 pub struct ErrorOfSteps {
     /// The error of stress and velocity at the end over `norm`; uncertain where there is no order.
     pub relative: f64,
-    /// The order that the repetitions show, at most that of the job, and 1 where they can show none; `None` where their states do not approach
-    /// each other.
+    /// The order that the repetitions show, at most that of the job, and 1 where they can show none; `None` where it is not trusted.
     pub order: Option<f64>,
     /// The norm of stress and velocity at the end in J^(1/2), in two dimensions (J/m)^(1/2); at least a twentieth of the largest in the run.
     pub norm: f64,
@@ -175,21 +180,24 @@ pub fn error_of_steps<const D: usize, const S: usize>(
     let distance = end.distance(session, body, Some(&near))?;
     let first = ratio(&end, &near);
     let (order, share) = if first < 1.0 {
-        (Some(1.0), SAFETY[0] / (1.0 - first))
+        (Some(1.0), SAFETY / (1.0 - first))
     } else {
-        let shown = match &far {
-            Ok(far) => observed_order(
-                [distance, near.distance(session, body, Some(far))?],
-                [first, ratio(&near, far)],
-            ),
-            Err(_) => 1.0,
+        let (order, is_trusted) = match &far {
+            Ok(far) => {
+                let between = near.distance(session, body, Some(far))?;
+                let across = end.distance(session, body, Some(far))?;
+                let ratios = [first, ratio(&near, far)];
+                order_of([distance, between, across], ratios, loaded.job.order_in_time().into())
+            }
+            Err(_) => (1.0, true),
         };
-        let order = (shown >= LEAST_ORDER).then(|| shown.min(f64::from(loaded.job.order_in_time())));
-        let safety = SAFETY[usize::from(order.is_none())];
-        (order, safety / (first.powf(order.unwrap_or(LEAST_ORDER)) - 1.0))
+        (is_trusted.then_some(order), SAFETY / (first.powf(order) - 1.0))
     };
-    let error = if distance > 0.0 { share * distance / norm } else { 0.0 };
-    Ok(Ok(ErrorOfSteps { relative: larger(error, loaded.job.solver.tolerance), order, norm }))
+    let error = if distance == 0.0 { 0.0 } else { share * distance / norm };
+    let least = loaded.job.solver.tolerance;
+    // States that are equal within the tolerance show none.
+    let order = if error <= least { order.or(Some(1.0)) } else { order };
+    Ok(Ok(ErrorOfSteps { relative: larger(error, least), order, norm }))
 }
 
 const INTERRUPTED: &str = "interrupted";
@@ -212,6 +220,17 @@ fn repeated<const D: usize, const S: usize>(
         Err(error) if error.exit() == Exit::Internal => Err(error),
         Err(error) => Ok(Err(format!("with steps of {} s: {error}", Digits(loaded.job.time.step)))),
     }
+}
+
+/// The order to assume, at most that of the scheme, and whether it is trusted, given the distances of neighbouring states, the finer ones
+/// first, and of the outer ones, and the ratios of the numbers of steps.
+fn order_of([near, far, across]: [f64; 3], ratios: [f64; 2], of_scheme: f64) -> (f64, bool) {
+    let shown = observed_order([near, far], ratios);
+    let is_straight = across * across - near * near - far * far >= 2.0 * LEAST_COSINE * near * far;
+    if !(is_straight && shown >= LEAST_ORDER) {
+        return (LEAST_ORDER, false);
+    }
+    (shown.min(of_scheme), shown <= of_scheme + EXCESS)
 }
 
 /// The order at which states approach each other, given the distances of neighbours and the ratios of their numbers of steps, the finer ones
@@ -258,6 +277,26 @@ pub fn vibrates(totals: &Totals) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn orders_are_trusted_near_that_of_the_scheme_where_states_change_in_one_direction() {
+        let of = |distances: [f64; 3], scheme: f64| order_of(distances, [2.0, 2.0], scheme);
+        let (known, is_trusted) = of([1.0, 2.0, 3.0], 1.0);
+        assert!((known - 1.0).abs() < 1e-9 && is_trusted, "{known}");
+        assert_eq!(of([1.0, 2.8, 3.8], 1.0), (1.0, true), "somewhat above that of the scheme");
+        assert_eq!(of([1.0, 4.0, 5.0], 1.0), (1.0, false), "of order 2, by chance");
+        assert!(of([1.0, 4.0, 5.0], 2.0).1);
+        assert_eq!(of([0.0, 1.0, 1.0], 1.0), (1.0, true), "nothing changes");
+        let uncertain = (LEAST_ORDER, false);
+        assert_eq!(of([1.0, 1.5, 2.5], 1.0), uncertain, "slower than order 0.7");
+        assert_eq!(of([1.0, 2.0, 1.0], 1.0), uncertain, "to and fro");
+        assert_eq!(of([1.0, 2.0, f64::sqrt(5.0)], 1.0), uncertain, "each change in another direction");
+        for at in 0..3 {
+            let mut distances = [1.0, 2.0, 3.0];
+            distances[at] = f64::NAN;
+            assert_eq!(of(distances, 1.0), uncertain);
+        }
+    }
 
     #[test]
     fn states_that_halve_their_distance_at_each_doubling_are_of_first_order() {

@@ -165,7 +165,9 @@ fn errors(log: &mut Log, summary: &Summary) {
             Some(order) => {
                 format!("; half of it takes {} times as many steps", two_digits(2f64.powf(1.0 / order)))
             }
-            None => ", uncertain: states of longer steps do not approach that of the run".to_owned(),
+            None => {
+                ", uncertain: the states of longer steps show no order near that of the scheme".to_owned()
+            }
         };
         let error = percent(error);
         log.line(format!("errors     by the steps {error} of stress and velocity at the end{more}"));

@@ -172,7 +172,7 @@ pub struct Summary {
 /// The estimated errors of the state at the end of a run; only with `[output] error_estimate`, and where they are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Errors {
-    /// Estimated error of the stress at the end by the mesh, relative: 1.5 times the relative error indicator, at most 1, or its least value
+    /// Estimated error of the stress at the end by the mesh, relative: twice the relative error indicator, at most 1, or its least value
     /// where the body vibrates; only with `[output] error_estimate`, and where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of the stress at the end by the mesh, relative")]
@@ -184,7 +184,7 @@ pub struct Errors {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of stress and velocity at the end by the steps, relative")]
     pub error_of_steps: Option<f64>,
-    /// The order at which `error_of_steps` falls with the steps; missing where states of longer steps do not approach that of the run.
+    /// The order at which `error_of_steps` falls with the steps; missing where the states of longer steps show none that is near that of the scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub order_of_steps: Option<f64>,
 }

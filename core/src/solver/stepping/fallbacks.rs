@@ -96,22 +96,27 @@ impl Properties {
     /// second, steps of half the length third, then full steps with larger parameters, which fail or succeed soon, and friction points that
     /// yield less and less. For a light obstacle on a stiff body, which points that stick and slide in turn move to and fro, they yield after more full
     /// steps, and where laws soften at last: on the way they slide, while there may be another solution in which they stick. Where friction
-    /// falls faster with the sliding speed than the body resists, bounds follow the speeds from one solution to the next.
+    /// falls with the sliding speed, shorter steps and larger parameters fail one after the other. A short descent comes before them, which solves
+    /// many steps and otherwise ends near the pressures of the solution; then a descent with fixed bounds, and parameters for these pressures.
+    /// Where friction falls faster than the body resists, bounds follow the speeds from one solution to the next at last.
     pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         use FrictionIteration::{FixedPoint, Newton};
         use Search::{
-            Backtracking, Descent, Equilibrated, Falling, FewFullSteps, FullSteps, HalfSteps, Sticking,
-            Yielding,
+            Backtracking, Descent, Equilibrated, Falling, FewFullSteps, FullSteps, HalfSteps, ShortDescent,
+            Sticking, Yielding,
         };
         let follows_bounds = !self.follows_pressure || self.friction == Newton;
         let fixes_bounds = self.follows_pressure;
         let rubs = self.rubs();
         let turns = rubs && !self.softens;
+        let weakens = follows_bounds && self.has_friction && self.softens && !self.falls_with_gap;
         [
             (self.falls_with_gap && follows_bounds, Descent, 1.0, Newton),
             (follows_bounds, FullSteps, 1.0, Newton),
             (follows_bounds && turns, Sticking, 1e-6, Newton),
             (follows_bounds && rubs, HalfSteps, 1.0, Newton),
+            (weakens, ShortDescent, 1.0, Newton),
+            (fixes_bounds && weakens, Descent, 1.0, FixedPoint),
             (rubs && follows_bounds, FewFullSteps, 10.0, Newton),
             (rubs && follows_bounds, FewFullSteps, 100.0, Newton),
             (turns, Yielding, 1.0, FixedPoint),
@@ -131,7 +136,7 @@ impl Properties {
             (fixes_bounds, Equilibrated, 30.0, FixedPoint),
             (fixes_bounds, Backtracking, 30.0, FixedPoint),
             (follows_bounds && self.softens, Descent, 1.0, Newton),
-            (fixes_bounds, Descent, 1.0, FixedPoint),
+            (fixes_bounds && !weakens, Descent, 1.0, FixedPoint),
             (rubs && self.softens, Yielding, 1.0, FixedPoint),
             (self.has_friction, Falling, 1.0, FixedPoint),
         ]
@@ -278,6 +283,26 @@ mod tests {
         assert_eq!(searches(falls).last(), Some(&Search::Falling));
         for other in [Properties { softens: false, ..falls }, Properties { has_friction: false, ..falls }] {
             assert!(!searches(other).contains(&Search::Falling));
+        }
+    }
+
+    #[test]
+    fn where_friction_weakens_a_short_descent_and_one_with_fixed_bounds_follow_full_and_half_steps() {
+        let weakens =
+            Properties { has_friction: true, follows_pressure: true, softens: true, ..FRICTIONLESS };
+        let found: Vec<_> =
+            weakens.fallbacks().map(|fallback| (fallback.search, fallback.iteration)).collect();
+        use FrictionIteration::{FixedPoint, Newton};
+        let first =
+            [(Search::FullSteps, Newton), (Search::HalfSteps, Newton), (Search::ShortDescent, Newton)];
+        assert_eq!(found[..3], first);
+        assert_eq!(found[3], (Search::Descent, FixedPoint));
+        assert_eq!(found.iter().filter(|other| **other == found[3]).count(), 1);
+        let driving = searches(Properties { friction_moves_obstacles: true, ..weakens });
+        assert_eq!(driving[..3], [Search::FullSteps, Search::ShortDescent, Search::Descent]);
+        let fixed = Properties { friction: FixedPoint, ..weakens };
+        for other in [fixed, Properties { falls_with_gap: true, ..weakens }] {
+            assert!(!searches(other).contains(&Search::ShortDescent));
         }
     }
 
