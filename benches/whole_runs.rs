@@ -1,5 +1,5 @@
 //! Whole runs against the memory bandwidth of the same machine:
-//! `cargo bench --bench whole_runs -- [--quick] [--ranks N] [--orders] [--peer "COMMAND"] [--write]`.
+//! `cargo bench --bench whole_runs -- [--quick] [--ranks N] [--orders] [--pairs] [--peer "COMMAND"] [--write]`.
 //!
 //! Runs the solver on the problem of Wang and Cheng (2022) in the plane and in space, on one process, and takes seconds and bytes
 //! by phase from `summary.json`. The bytes are those that have to be moved at the least if nothing stays in cache; a triad before
@@ -10,6 +10,9 @@
 //!
 //! With `--orders` they are run with quadratic cells and with linear cells of half the size instead, in turn, three times: with equal
 //! unknowns.
+//!
+//! With `--pairs` a block pressed and sheared on another one is compared with one block of as many unknowns on a rigid plane, in turn, three
+//! times; with itself without contact, with `sliding = "finite"`, and on two processes; and its set-up on two meshes.
 //!
 //! A peer is another program for the same problem: its command is given the dimension, the cells along an edge, the number of steps,
 //! the preconditioner (cholesky or gamg) and the number of processes, and prints the seconds that a step took as its last word. Its
@@ -92,6 +95,7 @@ struct Wanted {
     quick: bool,
     ranks: Option<u32>,
     orders: bool,
+    pairs: bool,
     peer: Option<String>,
     write: bool,
 }
@@ -106,29 +110,36 @@ fn wanted() -> Wanted {
             "--quick" => wanted.quick = true,
             "--write" => wanted.write = true,
             "--orders" => wanted.orders = true,
+            "--pairs" => wanted.pairs = true,
             "--ranks" => {
                 let count = words.next().and_then(|word| word.parse().ok()).filter(|count| *count > 1);
                 wanted.ranks = Some(count.expect("a number above 1 behind --ranks"));
             }
             "--peer" => wanted.peer = Some(words.next().expect("a command behind --peer")),
             other => {
-                panic!("{other}: known are --quick, --write, --orders, --ranks N and --peer \"COMMAND\"")
+                panic!(
+                    "{other}: known are --quick, --write, --orders, --pairs, --ranks N and --peer \"COMMAND\""
+                )
             }
         }
     }
     wanted
 }
 
-/// Runs the solver on this many processes; gives its `summary.json`.
+/// Runs the problem of Wang and Cheng on this many processes; gives its `summary.json`.
 fn run(case: &Case, ranks: u32) -> Value {
     let (job, cells) = match case.dimension {
         2 => ("wang_cheng_2022.toml", format!("mesh.rectangle.cells=[{0},{0}]", case.cells)),
         _ => ("wang_cheng_cube.toml", format!("mesh.box.cells=[{0},{0},{0}]", case.cells)),
     };
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(job);
+    solve(&file, case, ranks, vec![cells, format!("mesh.order={}", case.order)])
+}
+
+/// Runs a job on this many processes, with these settings and those of the case; gives its `summary.json`.
+fn solve(job: &Path, case: &Case, ranks: u32, mut settings: Vec<String>) -> Value {
     let folder = tempfile::tempdir().expect("a folder");
-    let settings = [
-        cells,
-        format!("mesh.order={}", case.order),
+    settings.extend([
         format!("time.step={}", 1.0 / f64::from(RATE)),
         format!("time.end={}", f64::from(case.steps) / f64::from(RATE)),
         format!("solver.preconditioner={:?}", case.preconditioner),
@@ -136,14 +147,14 @@ fn run(case: &Case, ranks: u32) -> Value {
         format!("output.folder={:?}", folder.path().join("out")),
         "output.fields={every=1000000}".into(),
         "checkpoint.every=1000000".into(),
-    ];
+    ]);
     let solver = env!("CARGO_BIN_EXE_solver");
     let mut command = Command::new(if ranks == 1 { solver } else { "mpirun" });
     if ranks > 1 {
         command.args(["-n", &ranks.to_string(), solver]);
     }
     let output = command
-        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(job))
+        .arg(job)
         .args(settings.iter().flat_map(|setting| ["--set", setting]))
         .output()
         .expect("the solver");
@@ -309,8 +320,170 @@ fn orders(wanted: &Wanted) {
     }
 }
 
+/// What is pressed and sheared.
+#[derive(Clone, Copy, PartialEq)]
+enum Scene {
+    /// One block on a rigid plane.
+    OneBody,
+    /// A block on another one, both of half the height; the columns of the lower one are graded, so that no nodes meet.
+    TwoBodies,
+    /// They pass through each other.
+    WithoutContact,
+    /// What nodes face is found anew.
+    Finite,
+}
+
+/// A job of blocks of this many layers of cells, on which a shear traction acts that grows by this much in a second, up to 4 Pa.
+fn blocks(case: &Case, layers: usize, scene: Scene, shear: f64) -> String {
+    let Case { dimension, cells, .. } = case;
+    let (shape, zero, hypothesis) = match dimension {
+        2 => ("rectangle", "", "hypothesis = \"plane_strain\""),
+        _ => ("box", "0.0, ", ""),
+    };
+    let block = |name: &str, (low, high): (usize, usize)| {
+        let (height, thickness) = (low as f64 / *cells as f64, (high - low) as f64 / *cells as f64);
+        let [side, columns] = if *dimension == 2 {
+            [String::new(), String::new()]
+        } else {
+            ["1.0, ".into(), format!("{cells}, ")]
+        };
+        let graded = if name == "lower" { "grading = { x = 1.2, toward = [\"left\"] }" } else { "" };
+        format!(
+            "[[mesh.{shape}]]\nname = {name:?}\ncorner = [0.0, {zero}{height}]\nsize = [1.0, {side}{thickness}]\n\
+             cells = [{cells}, {columns}{}]\n{graded}\n",
+            high - low
+        )
+    };
+    let pair = scene != Scene::OneBody;
+    let mut text = block("upper", (if pair { layers / 2 } else { 0 }, layers));
+    if pair {
+        text += &block("lower", (0, layers / 2));
+        text += "[[support]]\non = [\"lower.bottom\"]\nfix = \"all\"\n";
+    }
+    text += &format!(
+        "[material]\n{hypothesis}\ndensity = 1.0\n[material.elasticity]\nyoungs_modulus = 1000.0\npoisson_ratio = 0.3\n\
+         [[traction]]\non = [\"upper.top\"]\nvalue = [\"min({shear}*t, 4)\", {zero}-10.0]\n[time]\nscheme = \"bdf2\"\nend = 1.0\nstep = 1.0\n"
+    );
+    if scene != Scene::WithoutContact {
+        text += "[[contact]]\non = [\"upper.bottom\"]\nnormal.unilateral = {}\nfriction.coulomb.coefficient = 0.3\n";
+        text += if pair { "against = [\"lower.top\"]\nside = \"on\"\n" } else { "" };
+        text += if scene == Scene::Finite { "sliding = \"finite\"\n" } else { "" };
+    }
+    text
+}
+
+/// A run of blocks on this many processes.
+fn press(case: &Case, layers: usize, (scene, shear): (Scene, f64), ranks: u32) -> Value {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("blocks.toml");
+    std::fs::write(&file, blocks(case, layers, scene, shear)).expect("written");
+    solve(&file, case, ranks, Vec::new())
+}
+
+/// Growth of the shear traction, in Pa/s, on blocks that stick.
+const STUCK: f64 = 2.0;
+/// That on blocks that slide after 75 ms, by a facet a step in the end.
+const SLIDING: f64 = 40.0;
+/// Blocks, with and without a factor.
+const BLOCKS: [Case; 6] = [
+    case(2, 128, 32, "cholesky", true),
+    case(2, 256, 32, "cholesky", true),
+    case(3, 16, 32, "cholesky", true),
+    case(3, 32, 8, "cholesky", false),
+    case(2, 256, 16, "gamg", false),
+    case(3, 32, 4, "gamg", false),
+];
+/// Cells along the edges of two plates of which the set-up is measured.
+const PLATES: [usize; 2] = [56, 112];
+
+/// What pairs of bodies cost.
+fn pairs(wanted: &Wanted) {
+    let mut triad = Triad::new();
+    let bandwidth = BYTES as f64 / fastest(&mut || triad.run());
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let corrections = |summary: &Value| {
+        let [newton, linear] = ["newton_iterations", "linear_iterations"].map(|key| number(&summary[key]));
+        // Linear steps are solved without a correction.
+        let (steps, solves) = (number(&summary["steps"]), newton.max(number(&summary["steps"])));
+        format!("{:.1} x {:.1}", solves / steps, linear / solves)
+    };
+    // What is compared: words, scenes with their shear tractions, and the processes of the second.
+    let one = ("one body, two bodies", [(Scene::OneBody, SLIDING), (Scene::TwoBodies, SLIDING)], 1);
+    let without =
+        ("without contact, with it", [(Scene::WithoutContact, SLIDING), (Scene::TwoBodies, SLIDING)], 1);
+    let sticks = ("`small`, `finite`, no slip", [(Scene::TwoBodies, STUCK), (Scene::Finite, STUCK)], 1);
+    let slides = ("`small`, `finite`, slip", [(Scene::TwoBodies, SLIDING), (Scene::Finite, SLIDING)], 1);
+    let ranks = ("1 rank, 2 ranks", [(Scene::TwoBodies, SLIDING); 2], 2);
+    let head = "| compared | problem, unknowns, preconditioner, steps | solves a step x iterations each | ms a step | ratio | \
+                whole run, s | ratio | peak memory, MB | ratio |\n|---|---|---|---|---|---|---|---|---|\n";
+    let mut tables = [head.to_owned(), head.to_owned()];
+    print!("{head}");
+    for case in BLOCKS.iter().filter(|case| case.quick || !wanted.quick) {
+        let multigrid = case.preconditioner == "gamg";
+        let rows = if multigrid { vec![without, ranks] } else { vec![one, sticks, slides, ranks] };
+        for (name, scenes, processes) in rows {
+            let mut costs = [Vec::new(), Vec::new()];
+            let mut words = [String::new(), String::new()];
+            let mut problem = String::new();
+            for _ in 0..REPETITIONS {
+                for (at, (scene, count)) in scenes.into_iter().zip([1, processes]).enumerate() {
+                    let summary = press(case, case.cells, scene, count);
+                    costs[at].push(cost(case, &summary));
+                    words[at] = corrections(&summary);
+                    problem = self::head(case, &summary);
+                }
+            }
+            let [first, second] = costs.map(|costs| median(&costs));
+            let line = against(&format!("{name} | {problem} | {}", words.join(", ")), first, second);
+            println!("{line}");
+            writeln!(tables[usize::from(processes > 1)], "{line}").expect("text");
+        }
+    }
+    let mut plates = "| facets of each plate, unknowns | set-up and assembly without contact, with it, s | difference, µs a facet |\n|---|---|---|\n".to_owned();
+    for cells in PLATES {
+        let case = case(3, cells, 1, "gamg", true);
+        let mut seconds = [Vec::new(), Vec::new()];
+        let mut unknowns = 0.0;
+        for _ in 0..REPETITIONS {
+            for (scene, seconds) in [Scene::WithoutContact, Scene::TwoBodies].into_iter().zip(&mut seconds) {
+                let summary = press(&case, 2, (scene, STUCK), 1);
+                seconds.push(
+                    ["setup", "assembly"]
+                        .map(|phase| number(&summary["wall_seconds"][phase]))
+                        .iter()
+                        .sum::<f64>(),
+                );
+                unknowns = number(&summary["unknowns"]);
+            }
+        }
+        let [without, with] = seconds.map(|mut seconds| {
+            seconds.sort_by(f64::total_cmp);
+            seconds[seconds.len() / 2]
+        });
+        let facets = 2 * cells * cells;
+        writeln!(
+            plates,
+            "| {facets}, {unknowns} | {without:.2}, {with:.2} | {:.1} |",
+            1e6 * (with - without) / facets as f64
+        )
+        .expect("text");
+    }
+    print!("{plates}");
+    if wanted.write {
+        let command = "make bench-runs ARGS='--pairs --write'";
+        let [speed, ranks] = tables;
+        table::write(PAGE, "pairs", command, bandwidth, &speed);
+        table::write(PAGE, "set-up of pairs", command, bandwidth, &plates);
+        table::write(RANKS_PAGE, "pairs", command, bandwidth, &ranks);
+    }
+}
+
 fn main() {
     let wanted = wanted();
+    if wanted.pairs {
+        pairs(&wanted);
+        return;
+    }
     if wanted.orders {
         orders(&wanted);
         return;

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""In-plane rupture of a fault between two elastic half-spaces, by a spectral boundary integral: a reference of docs/verification.
+"""Rupture of a fault between two elastic half-spaces, by a spectral boundary integral: references of docs/verification.
 
     scripts/boundary_integral.py slip_weakening [spacing in m]
     scripts/boundary_integral.py short_fault [spacing in m]
     scripts/boundary_integral.py rate_and_state [spacing in m]
+    scripts/boundary_integral.py slip_weakening_in_space [spacing in m]
 
 prints, at points of the fault, the times at which the slip rate first exceeds 1 mm/s and a hundredth of its largest value, that value and
 its time, and the slip at the end. It needs NumPy and shares nothing with the solver. Equations: for a slip D(x, t) the shear traction of the fault is
@@ -11,7 +12,8 @@ its time, and the slip at the end. It needs NumPy and shares nothing with the so
     T = T0 + dT(x, t) + f - mu V / (2 c_s),   f(k, t) = -mu |k| / 2 (w(0) D(k, t) - integral of w(|k| c_s s) V(k, t - s) ds),
 
 w(p) the integral of C(q) from p to infinity, C the kernel of mode II of P. H. Geubelle and J. R. Rice, J. Mech. Phys. Solids 43 (1995),
-1791-1824. The fault is repeated with a period; no wave of the next copy arrives within the run.
+1791-1824. In space the slip is a vector: its Fourier components along the wave vector have the kernel of mode II, those across it that
+of mode III, J1(q)/q. The fault is repeated with a period; no wave of the next copy arrives within the run.
 """
 
 import sys
@@ -32,8 +34,8 @@ def bessel(order, x):
     return total / points
 
 
-def remaining_kernel(largest, points_per_unit=100):
-    """The points p up to `largest`, and there the integral of the kernel from p to infinity."""
+def remaining_kernels(largest, points_per_unit=100):
+    """The points p up to `largest`, and there the integrals of the kernels of modes II and III from p to infinity."""
     p = np.linspace(0, largest, int(largest * points_per_unit) + 1)
     ratio = PRESSURE_SPEED / SHEAR_SPEED
     # J1(x)/x and its integral from 0, on a grid on which both arguments lie.
@@ -45,7 +47,7 @@ def remaining_kernel(largest, points_per_unit=100):
     kernel = at(quotient, p) + 4 * p * (at(w, ratio * p) - at(w, p))
     kernel += 3 * bessel(0, p) - 4 / ratio * bessel(0, ratio * p)
     static = 2 * (1 - (SHEAR_SPEED / PRESSURE_SPEED) ** 2)
-    return p, static - cumulative(kernel, p[1])
+    return p, static - cumulative(kernel, p[1]), at(w, p)
 
 
 def cumulative(values, spacing):
@@ -134,7 +136,7 @@ def run(fault_of, spacing, courant=0.4):
     steps = int(np.ceil(fault.end * PRESSURE_SPEED / (courant * spacing)))
     step = fault.end / steps
     wave = 2 * np.pi * np.fft.rfftfreq(count, spacing)
-    p, rest = remaining_kernel(wave[-1] * SHEAR_SPEED * fault.end)
+    p, rest, _ = remaining_kernels(wave[-1] * SHEAR_SPEED * fault.end)
     weights = np.array([np.interp(wave * SHEAR_SPEED * step * n, p, rest) for n in range(steps + 1)])
     # Slip rates at the middle of the steps: the kernel is integrated over each step.
     integrated = step / 2 * (weights[1:] + weights[:-1])
@@ -158,6 +160,80 @@ def run(fault_of, spacing, courant=0.4):
     return x, step, np.array(velocities), slip
 
 
+class SlipWeakeningInSpace:
+    """TPV5 of SCEC before waves from the surface and from the ends of the fault arrive: a quadrant, the first axis along the strike."""
+
+    period, end = 18e3, 2.0
+    points = [(0, 0), (2e3, 0), (3e3, 0), (4.5e3, 0), (0, 2e3), (0, 3e3), (2e3, 2e3)]
+
+    def __init__(self, x):
+        self.load = np.zeros((2, len(x), len(x)))
+        # Edges of the patch have the mean, its corner a quarter.
+        part = np.where(abs(x) < 1500 - 1e-6, 1.0, np.where(abs(x) < 1500 + 1e-6, 0.5, 0.0))
+        self.load[0] = 70e6 + 11.6e6 * part[:, None] * part
+
+    def advance(self, elastic, slipped):
+        """The slip rates where the tractions are elastic - DAMPING V, for a length of the path of slip at the end of the step."""
+        traction = self.load + elastic
+        size = np.hypot(*traction)
+        strength = 120e6 * np.maximum(0.525, 0.677 - 0.152 * slipped / 0.4)
+        return traction * np.maximum(0, (size - strength) / DAMPING) / size
+
+
+def run_in_space(spacing, courant=0.4):
+    """The slip along the strike is even in both coordinates and the other one odd, so that their transforms are real."""
+    count = int(round(SlipWeakeningInSpace.period / spacing))
+    half = count // 2 + 1
+    x = np.arange(half) * spacing
+    fault = SlipWeakeningInSpace(x)
+    steps = int(np.ceil(fault.end * PRESSURE_SPEED / (courant * spacing)))
+    step = fault.end / steps
+    along = 2 * np.pi * np.fft.rfftfreq(count, spacing)
+    wave = np.hypot(along[:, None], along)
+    cosine, sine = (part / np.maximum(wave, 1e-300) for part in np.broadcast_arrays(along[:, None], along))
+    p, *rest = remaining_kernels(wave.max() * SHEAR_SPEED * fault.end)
+    modes = [0, 1]
+    weights = np.zeros((steps, 2, half, half), np.float32)
+    before = [np.full_like(wave, rest[mode][0]) for mode in modes]
+    for n in range(steps):
+        for mode in modes:
+            after = np.interp(wave * SHEAR_SPEED * step * (n + 1), p, rest[mode])
+            weights[n, mode], before[mode] = step / 2 * (before[mode] + after), after
+    signs = np.array([1, -1])[:, None, None]
+
+    def whole(field):
+        mirrored = np.concatenate([field, signs * field[:, -2:0:-1]], axis=1)
+        return np.concatenate([mirrored, signs * mirrored[:, :, -2:0:-1]], axis=2)
+
+    def transform(field):
+        """Components along and across the wave vector."""
+        strike, dip = np.fft.rfft2(whole(field))[:, :half].real
+        return np.array([cosine * strike + sine * dip, cosine * dip - sine * strike])
+
+    def back(modal):
+        field = np.array([cosine * modal[0] - sine * modal[1], sine * modal[0] + cosine * modal[1]])
+        mirrored = np.concatenate([field, signs * field[:, -2:0:-1]], axis=1)
+        return np.fft.irfft2(mirrored, (count, count))[:, :half, :half]
+
+    static = np.array([kernel[0] for kernel in rest])[:, None, None]
+    rates = np.zeros((steps, 2, half, half), np.float32)
+    slip, slipped = np.zeros_like(fault.load), np.zeros((half, half))
+    velocity = fault.advance(0.0, slipped)
+    places = [tuple(int(round(part / spacing)) for part in point) for point in fault.points]
+    velocities = [[np.hypot(*velocity[:, i, j]) for i, j in places]]
+    for n in range(steps):
+        past = np.einsum("nmij,nmij->mij", weights[n:0:-1], rates[:n]) if n else 0
+        rate = velocity
+        for _ in range(4):
+            mean = (velocity + rate) / 2
+            force = static * transform(slip + step * mean) - past - weights[0] * transform(mean)
+            rate = fault.advance(back(-SHEAR_MODULUS * wave / 2 * force), slipped + step * np.hypot(*mean))
+        mean = (velocity + rate) / 2
+        rates[n], slip, slipped, velocity = transform(mean), slip + step * mean, slipped + step * np.hypot(*mean), rate
+        velocities.append([np.hypot(*velocity[:, i, j]) for i, j in places])
+    return step, np.array(velocities), [slipped[place] for place in places]
+
+
 def first_time(step, velocities, level):
     """The time at which the velocities, linear between the steps, first reach a level."""
     at = int(np.argmax(velocities >= level))
@@ -167,17 +243,26 @@ def first_time(step, velocities, level):
     return step * (at - 1 + (level - low) / (high - low))
 
 
+def show(point, step, velocities, slip):
+    times = [first_time(step, velocities, level) for level in (1e-3, 0.01 * velocities.max())]
+    largest, at = velocities.max(), step * velocities.argmax()
+    print(f"{point} {times[0]:9.4f} {times[1]:9.4f} {largest:9.4f} {at:9.4f} {slip:9.4f}")
+
+
 def main():
     faults = {"slip_weakening": SlipWeakening, "short_fault": ShortFault, "rate_and_state": RateAndState}
-    fault = faults[sys.argv[1]]
     spacing = float(sys.argv[2]) if len(sys.argv) > 2 else 100.0
+    print("place in m; times of 1 mm/s and of a hundredth of the largest slip rate in s; this in m/s, its time in s; slip at the end in m")
+    if sys.argv[1] == "slip_weakening_in_space":
+        step, velocities, slips = run_in_space(spacing)
+        for (strike, dip), rates, slip in zip(SlipWeakeningInSpace.points, velocities.T, slips):
+            show(f"{strike:8.0f} {dip:8.0f}", step, rates, slip)
+        return
+    fault = faults[sys.argv[1]]
     x, step, velocities, slip = run(fault, spacing)
-    print("x in m; times of 1 mm/s and of a hundredth of the largest slip rate in s; this in m/s, its time in s; slip at the end in m")
     for point in fault.points:
         i = int(round((point - x[0]) / spacing))
-        here = velocities[:, i]
-        times = [first_time(step, here, level) for level in (1e-3, 0.01 * here.max())]
-        print(f"{point:8.0f} {times[0]:9.4f} {times[1]:9.4f} {here.max():9.4f} {step * here.argmax():9.4f} {slip[i]:9.4f}")
+        show(f"{point:8.0f}", step, velocities[:, i], slip[i])
 
 
 if __name__ == "__main__":

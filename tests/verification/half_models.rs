@@ -317,3 +317,113 @@ fn planes_of_symmetry_at_any_angle_carry_no_friction() {
         }
     });
 }
+
+/// A body and beside it its mirror image at the plane at height 0: two bodies with boundaries "body.top", "image.top" and so on.
+fn with_image<const D: usize>(half: &GlobalMesh<D>) -> GlobalMesh<D> {
+    let mut both = half.clone();
+    let nodes = half.nodes.len() as u32;
+    both.nodes.extend(half.nodes.iter().map(|place| {
+        let mut image = *place;
+        image[up(D)] = -image[up(D)];
+        image
+    }));
+    for cell in half.cells.chunks_exact(D + 1) {
+        let first = both.cells.len();
+        both.cells.extend(cell.iter().map(|node| node + nodes));
+        both.cells.swap(first, first + 1);
+    }
+    both.cell_regions.extend(&half.cell_regions);
+    for (facet, cell) in half.facets.iter().zip(&half.facet_cells) {
+        let mut image = facet.map(|node| node + nodes);
+        image.swap(0, 1);
+        both.facets.push(image);
+        both.facet_cells.push(cell + half.cell_regions.len() as u32);
+    }
+    let named = |body: &'static str, first: u32| {
+        half.boundaries.iter().map(move |boundary| Boundary {
+            name: format!("{body}.{}", boundary.name),
+            facets: boundary.facets.iter().map(|facet| facet + first).collect(),
+        })
+    };
+    both.boundaries = named("body", 0).chain(named("image", half.facets.len() as u32)).collect();
+    both
+}
+
+/// A fault that weakens with slip breaks where its shear traction is above the strength. By antisymmetry its two sides move as one of them
+/// does under half of the slip and the same pressure.
+fn ruptures<const D: usize, const S: usize>(session: &Session, half: &GlobalMesh<D>) {
+    let hypothesis = if D == 2 { "hypothesis = \"plane_strain\"\n" } else { "" };
+    // Names that the mesh of a job must have; the mesh is handed over.
+    let [shape, size, corner] =
+        if D == 2 { ["rectangle", "1, 1", "2, 0"] } else { ["box", "1, 1, 1", "2, 0, 0"] };
+    let block =
+        |name: &str| format!("[[mesh.{shape}]]\nname = \"{name}\"\nsize = [{size}]\ncells = [{size}]\n");
+    let blocks = block("body") + &block("image") + &format!("corner = [{corner}]\n");
+    let side = |before: &str, sign: f64| {
+        let value: Vec<String> = (0..D)
+            .map(|axis| match axis {
+                0 => format!("\"{sign}*(5 + 2*(x < 0.35))\""),
+                1 if D == 3 => format!("\"{sign}*y\""),
+                _ => format!("{}", -10.0 * sign),
+            })
+            .collect();
+        let names = half.boundaries.iter().filter(|boundary| boundary.name != "bottom");
+        let names: Vec<String> = names.map(|boundary| format!("{before}{}", boundary.name)).collect();
+        format!(
+            "[[support]]\non = {names:?}\nabsorbing = true\n[[traction]]\non = [\"{before}bottom\"]\nvalue = [{}]\n",
+            value.join(", ")
+        )
+    };
+    for order in [1, 2] {
+        let job = |mesh: &str, contact: &str, distance: f64| {
+            format!(
+                "[mesh]\norder = {order}\n{mesh}[time]\nscheme = \"bdf2\"\nend = 0.12\nstep = 0.01\n[solver]\ntolerance = 1e-13\n\
+                 [material]\n{hypothesis}density = 1.0\nelasticity = {{ youngs_modulus = 20, poisson_ratio = 0.25 }}\n\
+                 [[contact]]\n{contact}\n\
+                 friction.distance_weakening = {{ static = 0.6, dynamic = 0.4, distance = {distance} }}\n"
+            )
+        };
+        let pressure = "on = [\"bottom\"]\nnormal.graph.points = [[-1.0, 10.0], [1.0, 10.0]]";
+        let one = job(any_mesh::<D>(), pressure, 0.05) + &side("", 1.0);
+        let pair = "on = [\"body.bottom\"]\nagainst = [\"image.bottom\"]\nnormal.unilateral = {}";
+        let two = job(&blocks, pair, 0.1) + &side("body.", 1.0) + &side("image.", -1.0);
+        let one = nodal::<D, S>(session, &one, half);
+        let two = nodal::<D, S>(session, &two, &with_image(half));
+        let (mut worst, mut sizes) = ([0.0f64; 2], [0.0f64; 2]);
+        let mut slips = Vec::new();
+        for [place, one @ ..] in &one {
+            let off = |other: &Vector<D>, own: &Vector<D>| {
+                norm(&std::array::from_fn::<_, D, _>(|i| other[i] - own[i]))
+            };
+            // On the fault, nodes of both bodies are at this place, with opposite displacements and tractions.
+            let far = |[_, other @ ..]: &[Vector<D>; 3]| off(&other[0], &one[0]) + off(&other[1], &one[1]);
+            let places = two.iter().filter(|[other, ..]| off(other, place) < 1e-9);
+            let nearest = places.min_by(|a, b| far(a).total_cmp(&far(b)));
+            let [_, two @ ..] = nearest.expect("the node of both bodies");
+            for k in 0..2 {
+                sizes[k] = larger(sizes[k], norm(&one[k]));
+                worst[k] = larger(worst[k], off(&one[k], &two[k]));
+            }
+            if place[up(D)] == 0.0 {
+                slips.push(2.0 * one[0][0]);
+            }
+        }
+        let broken = slips.iter().filter(|slip| **slip > 0.01).count();
+        let whole = slips.iter().filter(|slip| slip.abs() < 1e-9).count();
+        assert!(broken > 0 && whole > 0, "the fault breaks in part: {slips:?}");
+        for k in 0..2 {
+            assert!(
+                worst[k] <= 1e-10 * sizes[k],
+                "{D}D order {order}: off by {worst:?} of {sizes:?} (displacement, traction)"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_fault_between_a_body_and_its_mirror_image_breaks_as_under_one_of_them() {
+    run_on(&[1, 2], |world| {
+        ruptures::<2, 4>(&world.session, &crossed([8, 4]));
+        ruptures::<3, 6>(&world.session, &brick([4, 2, 2]));
+    });
+}

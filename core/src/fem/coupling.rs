@@ -162,7 +162,7 @@ pub struct Coupling<const D: usize> {
     /// The slave nodes that are inclined to supports, ascending.
     inclined: Vec<Inclined<D>>,
     /// The blocks of `T` of all ranks: for each slave node, by global numbers, its masters and how they move its free components.
-    blocks: BTreeMap<u32, Vec<(u32, Vec<f64>)>>,
+    blocks: BTreeMap<u32, Vec<(u32, Block<D>)>>,
     pool: Pool,
 }
 
@@ -236,9 +236,9 @@ impl<const D: usize> Coupling<D> {
             slaves.push((slave as u32, first..masters.len()));
         }
         let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);
-        let mut blocks: BTreeMap<u32, Vec<(u32, Vec<f64>)>> = BTreeMap::new();
+        let mut blocks: BTreeMap<u32, Vec<(u32, Block<D>)>> = BTreeMap::new();
         for (pair, block) in numbers.chunks_exact(2).zip(values.chunks_exact(D * D)) {
-            blocks.entry(pair[0]).or_default().push((pair[1], block.to_vec()));
+            blocks.entry(pair[0]).or_default().push((pair[1], block_at(block, 0)));
         }
         let (owned, pool) = (mesh.owned, Pool::default());
         Ok(Self { owned, slaves, masters, held_together, inclined, blocks, pool })
@@ -405,7 +405,7 @@ impl<const D: usize> Coupling<D> {
     /// `T^T K T` at free components, given the rows of `K` on this rank. Collective.
     pub fn transform(&self, session: &Session, mesh: &Mesh<D>, rows: BlockRows) -> Result<BlockRows, Agreed> {
         let first = mesh.first_node as u32;
-        let mut sums: Vec<Option<BTreeMap<u32, Vec<f64>>>> = vec![None; mesh.owned];
+        let mut sums: Vec<Option<Row<D>>> = vec![None; mesh.owned];
         for (row, sums) in sums.iter_mut().enumerate() {
             let range = rows.offsets[row]..rows.offsets[row + 1];
             let has_slaves = rows.columns[range.clone()].iter().any(|&column| self.is_slave(column));
@@ -413,23 +413,40 @@ impl<const D: usize> Coupling<D> {
                 *sums = Some(self.times_basis(&rows, range));
             }
         }
-        let mut outgoing = vec![Vec::new(); session.ranks()];
+        // A node that many slave nodes face: their rows are added before they are sent.
+        let mut of_masters: BTreeMap<u32, Row<D>> = BTreeMap::new();
         for (slave, _) in self.slaves() {
-            let Some(row) = sums[slave as usize].clone() else { continue };
-            let Some(masters) = self.blocks.get(&(first + slave)) else { continue };
-            for (master, block) in masters {
-                let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*master)];
-                for (&column, entry) in &row {
-                    list.extend([f64::from(*master), f64::from(column)]);
-                    list.extend(product::<D>(block, entry, true));
+            let Some(row) = &sums[slave as usize] else { continue };
+            for (master, block) in self.blocks.get(&(first + slave)).into_iter().flatten() {
+                let of_master = of_masters.entry(*master).or_default();
+                let transposed = std::array::from_fn(|i| std::array::from_fn(|j| block[j][i]));
+                row.iter()
+                    .for_each(|(column, entry)| add_block(of_master, *column, &product(&transposed, entry)));
+            }
+        }
+        let mut outgoing = vec![Vec::new(); session.ranks()];
+        let mut add = |master: u32, column: u32, block: &Block<D>| {
+            let row = mesh.owned_node(master);
+            let sums = sums[row].get_or_insert_with(|| {
+                let range = rows.offsets[row]..rows.offsets[row + 1];
+                range.map(|at| (rows.columns[at], block_at(&rows.values, at))).collect()
+            });
+            add_block(sums, column, block);
+        };
+        for (master, row) in of_masters {
+            let owner = mesh.owner(master);
+            for (column, block) in row {
+                if owner == session.rank() {
+                    add(master, column, &block);
+                } else {
+                    outgoing[owner].extend([f64::from(master), f64::from(column)]);
+                    outgoing[owner].extend(block.as_flattened());
                 }
             }
         }
         let incoming = exchange_lists(session.world(), &outgoing)?;
         for record in incoming.chunks_exact(2 + D * D) {
-            let (row, column) = (mesh.owned_node(record[0] as u32), record[1] as u32);
-            let sums = sums[row].get_or_insert_with(|| entries::<D>(&rows, row));
-            add_block(sums, column, &record[2..]);
+            add(record[0] as u32, record[1] as u32, &block_at(&record[2..], 0));
         }
         let mut out = BlockRows { offsets: vec![0], ..BlockRows::default() };
         out.columns.reserve(rows.columns.len());
@@ -443,7 +460,7 @@ impl<const D: usize> Coupling<D> {
                 }
                 Some(sums) => {
                     out.columns.extend(sums.keys());
-                    sums.values().for_each(|block| out.values.extend_from_slice(block));
+                    sums.values().for_each(|block| out.values.extend_from_slice(block.as_flattened()));
                 }
             }
             out.offsets.push(out.columns.len());
@@ -452,13 +469,13 @@ impl<const D: usize> Coupling<D> {
     }
 
     /// A row of `K T`, given the range of its entries in `K`.
-    fn times_basis(&self, rows: &BlockRows, range: Range<usize>) -> BTreeMap<u32, Vec<f64>> {
+    fn times_basis(&self, rows: &BlockRows, range: Range<usize>) -> Row<D> {
         let mut sums = BTreeMap::new();
         for at in range {
-            let (column, entry) = (rows.columns[at], &rows.values[at * D * D..(at + 1) * D * D]);
-            add_block(&mut sums, column, entry);
+            let (column, entry) = (rows.columns[at], block_at(&rows.values, at));
+            add_block(&mut sums, column, &entry);
             for (master, block) in self.blocks.get(&column).into_iter().flatten() {
-                add_block(&mut sums, *master, &product::<D>(entry, block, false));
+                add_block(&mut sums, *master, &product(&entry, block));
             }
         }
         sums
@@ -470,21 +487,23 @@ fn find<const D: usize>(inclined: &[Inclined<D>], slave: u32) -> Option<&Incline
     inclined.binary_search_by_key(&slave, |at| at.slave).ok().map(|at| &inclined[at])
 }
 
-/// The entries of a row.
-fn entries<const D: usize>(rows: &BlockRows, row: usize) -> BTreeMap<u32, Vec<f64>> {
-    let range = rows.offsets[row]..rows.offsets[row + 1];
-    range.map(|at| (rows.columns[at], rows.values[at * D * D..(at + 1) * D * D].to_vec())).collect()
+/// An entry of a matrix for the components of two nodes.
+type Block<const D: usize> = [[f64; D]; D];
+/// The entries of a row, by columns.
+type Row<const D: usize> = BTreeMap<u32, Block<D>>;
+
+/// The entry at this place of a list.
+fn block_at<const D: usize>(values: &[f64], at: usize) -> Block<D> {
+    std::array::from_fn(|i| std::array::from_fn(|j| values[(at * D + i) * D + j]))
 }
 
-fn add_block(sums: &mut BTreeMap<u32, Vec<f64>>, column: u32, block: &[f64]) {
-    let sum = sums.entry(column).or_insert_with(|| vec![0.0; block.len()]);
-    sum.iter_mut().zip(block).for_each(|(sum, value)| *sum += value);
+fn add_block<const D: usize>(sums: &mut Row<D>, column: u32, block: &Block<D>) {
+    let sum = sums.entry(column).or_insert([[0.0; D]; D]);
+    sum.as_flattened_mut().iter_mut().zip(block.as_flattened()).for_each(|(sum, value)| *sum += value);
 }
 
-/// The product of two blocks, with the transpose of the first if `transposed`.
-fn product<const D: usize>(a: &[f64], b: &[f64], transposed: bool) -> Vec<f64> {
-    let first = |i: usize, k: usize| if transposed { a[k * D + i] } else { a[i * D + k] };
-    (0..D * D).map(|at| (0..D).map(|k| first(at / D, k) * b[k * D + at % D]).sum()).collect()
+fn product<const D: usize>(a: &Block<D>, b: &Block<D>) -> Block<D> {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..D).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 /// The same for any pairs of these nodes of two surfaces, of which this rank owns the given ones: those that carry the law and the others.

@@ -32,6 +32,7 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
+/// The safety factor of distances between states.
 const SAFETY: f64 = 1.25;
 /// That of the error indicator.
 const SAFETY_OF_INDICATOR: f64 = 2.0;
