@@ -21,7 +21,9 @@ pub(super) fn smooth_normal<const D: usize>(mean: &Vector<D>, ways: &[Vector<D>]
     let unit = mean.map(|n| n / length);
     let size = ways.iter().map(norm).sum::<f64>() / ways.len() as f64;
     let highest = ways.iter().map(|way| dot(way, &unit).abs()).fold(0.0, larger);
-    if !(highest > FLAT * size) {
+    // Also without neighbours.
+    let is_curved = highest > FLAT * size;
+    if !is_curved {
         return *mean;
     }
     // Least squares for `height = slope . way + way . curvature way / 2`, with the ways along the plane.
@@ -53,7 +55,8 @@ pub(super) fn smooth_normal<const D: usize>(mean: &Vector<D>, ways: &[Vector<D>]
         add_scaled(&sum, dot(vector, &right_hand_side) / value, vector)
     });
     let slope: Vector<D> = std::array::from_fn(|i| solution[i]);
-    if !(norm(&slope) < STEEPEST) {
+    let is_fitted = norm(&slope) < STEEPEST;
+    if !is_fitted {
         return *mean;
     }
     let normal = add_scaled(&unit, -1.0, &slope);

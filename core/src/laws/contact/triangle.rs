@@ -74,8 +74,9 @@ impl Triangle {
         let (sides, area) = (self.sides(), self.area());
         let size = norm(&area);
         let cosine = dot(&area, &line.direction) / size;
-        // Also of triangles without area.
-        if !(cosine.abs() > ALONG) {
+        // Not of triangles without area either.
+        let is_across = cosine.abs() > ALONG;
+        if !is_across {
             return None;
         }
         let place = dot(&add_scaled(&self.corners[0], -1.0, &line.from), &area) / (size * cosine);
