@@ -764,10 +764,11 @@ fn the_licences_of_all_packages_are_allowed() {
 }
 
 /// The crates that a command of cargo compiles, with their features.
-fn compiled_crates(command: &str) -> BTreeSet<String> {
+fn compiled_crates(command: &[&str]) -> BTreeSet<String> {
     // Of what cargo tells, only the graph of its units has all features; it is an unstable format.
     let graph = Command::new(env!("CARGO"))
-        .args([command, "--release", "--locked", "--offline", "--unit-graph", "-Zunstable-options"])
+        .args(command)
+        .args(["--release", "--locked", "--offline", "--unit-graph", "-Zunstable-options"])
         .env("RUSTC_BOOTSTRAP", "1")
         .current_dir(root())
         .output()
@@ -780,10 +781,18 @@ fn compiled_crates(command: &str) -> BTreeSet<String> {
 
 #[test]
 fn what_make_run_has_compiled_serves_the_tests_too() {
-    let [solver, tests] = ["build", "test"].map(compiled_crates);
+    let of_core = ["test", "--lib", "--package", "clarke-core"];
+    let [solver, tests, of_core] = [&["build"][..], &["test"], &of_core].map(compiled_crates);
     assert!(solver.len() > 100, "only {} crates were seen", solver.len());
     let again: Vec<&String> = solver.difference(&tests).collect();
     assert!(again.is_empty(), "the crates of the tests ask these for more features: {again:#?}");
+    let names = |crates: &BTreeSet<String>| -> BTreeSet<String> {
+        crates.iter().filter_map(|one| one.split(' ').next()).map(str::to_owned).collect()
+    };
+    let known = names(&solver);
+    let is_known = |one: &&String| one.split(' ').next().is_some_and(|name| known.contains(name));
+    let again: Vec<&String> = of_core.difference(&solver).filter(is_known).collect();
+    assert!(again.is_empty(), "the tests of the library ask these for other features: {again:#?}");
 }
 
 #[test]
