@@ -674,12 +674,12 @@ impl<const D: usize> Sum<D> {
     fn smooth_normals(&self, node: u32, normals: &FaceNormals<D>) -> [Vector<D>; 2] {
         let [own, faced] = [0, 1].map(|side| self.normals[side].mean());
         let masters = self.masters.iter().filter(|(master, _)| !self.neighbours.contains(master));
-        let sum = masters
-            .fold([0.0; D], |sum, (master, share)| add_scaled(&sum, *share, &normals.at(*master, &faced)));
+        // Where little is faced, shares extrapolate far beyond it.
+        let sum = masters.fold([0.0; D], |sum, (master, share)| {
+            add_scaled(&sum, share.max(0.0), &normals.at(*master, &faced))
+        });
         let length = norm(&sum);
-        // The shares of what is faced sum to the part of the surface, unless neighbours have no law.
-        let is_whole = length > 0.5 * self.weight;
-        [normals.at(node, &own), if is_whole { sum.map(|n| n / length) } else { faced }]
+        [normals.at(node, &own), if length > 0.0 { sum.map(|n| n / length) } else { faced }]
     }
 
     /// The angle in rad of the edges of the other side over the part of the surface for which a node at this distance in m stands: by how much
