@@ -104,7 +104,7 @@ fn stacked_blocks_of_which_one_slides_take_few_iterations() {
                           {name = 'low', size = [0.36, 0.05], corner = [-0.18, 0.05], cells = [4, 1]},
                           {name = 'high', size = [0.24, 0.05], corner = [-0.12, 0.1], cells = [3, 1]}]
         time = {scheme = 'implicit_euler', step = 0.005, end = 0.15}
-        output.checkpoint = {every = 12}
+        checkpoint = {every = 12}
         gravity.acceleration = [0.0, -9.81]
         support = [{on = ['base.bottom'], fix = 'all', displacement = ['0.06*(1 - cos(9*t))', 0.0]},
                    {on = ['base.top'], fix = ['x'], displacement = ['0.06*(1 - cos(9*t))']}]
