@@ -5,7 +5,7 @@ use crate::{
     fem::space::{
         Held, SurfacePoint, longest_side,
         mortar::{Contribution, Facet, Normals, contributions, direction, smooth_direction},
-        surface_points,
+        smooth_points, surface_points,
     },
     linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, larger, norm, outside},
     mesh::{Mesh, shape::facet_normal},
@@ -508,7 +508,7 @@ impl<const D: usize> FaceNormals<D> {
     fn of(session: &Session, mesh: &Mesh<D>, sides: [&[u32]; 2]) -> Result<Self, Agreed> {
         let mut own = Vec::new();
         for side in sides {
-            for point in surface_points(session, mesh, side)? {
+            for point in smooth_points(session, mesh, side)? {
                 own.push(f64::from(mesh.global_node(point.node)));
                 own.extend(point.normal);
             }

@@ -26,5 +26,5 @@ pub use quadratic::{
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, facet_rule, fine_cell_rule};
 pub use surface::{
     FacetPoint, SurfacePoint, corner_means, facet_points, facet_sizes, facets, longest_side, omits_corners,
-    surface_means, surface_points,
+    smooth_points, surface_means, surface_points,
 };

@@ -74,7 +74,7 @@ pub(super) const FACE_AND_MIRROR_IMAGE: f64 = 0.939_692_620_785_908;
 /// The quadrature points of these boundaries at nodes owned here, ordered by node. Collective.
 ///
 /// A node on an edge between faces of the body gets a point for each face; facets that meet at a smaller angle share a
-/// point with the normal of the curved surface there, as far as its nodes tell. A constant pressure has the same nodal forces as by exact integration: the weights are those of the
+/// point with their mean normal. A constant pressure has the same nodal forces as by exact integration: the weights are those of the
 /// trapezoidal rule, for quadratic cells in the plane those of Simpson's rule, and in space those of the rule with the midpoints of
 /// edges, whose weights at corners are zero. On a body of revolution weights are those of the whole turn, and the normal on the axis is
 /// that of the face and its mirror image.
@@ -87,6 +87,16 @@ pub fn surface_points<const D: usize>(
     Ok(points.into_iter().map(|(point, [])| point).collect())
 }
 
+/// The same points with the normals of the curved surface, as far as its nodes tell. Collective.
+pub fn smooth_points<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    facets: &[u32],
+) -> Result<Vec<SurfacePoint<D>>, Agreed> {
+    let points = points_of_shares(mesh, &shares(session, mesh, facets, |_| [])?, smooth_normal);
+    Ok(points.into_iter().map(|(point, [])| point).collect())
+}
+
 /// The same points, each with the means of values of the facets around it. Collective.
 pub fn surface_means<const D: usize, const N: usize>(
     session: &Session,
@@ -94,6 +104,16 @@ pub fn surface_means<const D: usize, const N: usize>(
     facets: &[u32],
     of_facet: impl Fn(u32) -> [f64; N],
 ) -> Result<Vec<(SurfacePoint<D>, [f64; N])>, Agreed> {
+    Ok(points_of_shares(mesh, &shares(session, mesh, facets, of_facet)?, |mean, _| *mean))
+}
+
+/// The records of the linear facets at nodes owned here. Collective.
+fn shares<const D: usize, const N: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    facets: &[u32],
+    of_facet: impl Fn(u32) -> [f64; N],
+) -> Result<Vec<f64>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
     for &facet in facets {
         let corners = mesh.facets[facet as usize];
@@ -117,7 +137,7 @@ pub fn surface_means<const D: usize, const N: usize>(
             }
         }
     }
-    Ok(points_of_shares(mesh, &exchange_lists(session.world(), &outgoing)?))
+    exchange_lists(session.world(), &outgoing)
 }
 
 /// The factor of the weight of a node of a linear facet, or of one of the parts of a quadratic facet, on a body of revolution: exact
@@ -131,6 +151,7 @@ fn turn<const D: usize>(mesh: &Mesh<D>, nodes: &[u32; D], at: usize) -> f64 {
 fn points_of_shares<const D: usize, const N: usize>(
     mesh: &Mesh<D>,
     records: &[f64],
+    normal_of: impl Fn(&Vector<D>, &[Vector<D>]) -> Vector<D>,
 ) -> Vec<(SurfacePoint<D>, [f64; N])> {
     let mut shares: Vec<Share<D, N>> = records
         .chunks_exact(2 + 3 * D + N)
@@ -148,7 +169,10 @@ fn points_of_shares<const D: usize, const N: usize>(
             vectors.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
         })
     });
-    shares.chunk_by(|a, b| a.node == b.node).flat_map(|around| points_of_node(mesh, around)).collect()
+    shares
+        .chunk_by(|a, b| a.node == b.node)
+        .flat_map(|around| points_of_node(mesh, around, &normal_of))
+        .collect()
 }
 
 /// A linear facet at one of its nodes.
@@ -230,7 +254,7 @@ pub fn corner_means<const D: usize, const N: usize>(
             record.extend(values);
         }
     }
-    Ok(points_of_shares(mesh, &exchange_lists(session.world(), &answers)?))
+    Ok(points_of_shares(mesh, &exchange_lists(session.world(), &answers)?, |mean, _| *mean))
 }
 
 /// A Gauss point of a facet.
@@ -304,6 +328,7 @@ struct Face<const D: usize, const N: usize> {
 fn points_of_node<const D: usize, const N: usize>(
     mesh: &Mesh<D>,
     shares: &[Share<D, N>],
+    normal_of: impl Fn(&Vector<D>, &[Vector<D>]) -> Vector<D>,
 ) -> Vec<(SurfacePoint<D>, [f64; N])> {
     let mut faces: Vec<Face<D, N>> = Vec::new();
     for Share { factor, normal, others, values, .. } in shares {
@@ -334,7 +359,7 @@ fn points_of_node<const D: usize, const N: usize>(
     faces
         .into_iter()
         .map(|Face { normal, weight, size, values, ways }| {
-            let mut normal = smooth_normal(&normal, &ways);
+            let mut normal = normal_of(&normal, &ways);
             // Facets that lie on the axis have no mirror images.
             if mesh.is_on_axis(&mesh.nodes[node as usize]) && normal[1] != 0.0 {
                 normal[0] = 0.0;

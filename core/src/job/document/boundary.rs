@@ -89,8 +89,8 @@ pub enum Fix {
 pub enum FixedDirections {
     /// All components.
     All,
-    /// The normal component. Where the boundary is curved, a node has the normal of the curved surface through it and its neighbours;
-    /// where the normals of adjacent facets differ by more than 40 degrees, it is fixed along each of them.
+    /// The normal component. Where the boundary is curved, a node has the mean normal of the adjacent facets; where their normals
+    /// differ by more than 40 degrees, it is fixed along each of them.
     Normal,
 }
 
