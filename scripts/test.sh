@@ -21,7 +21,7 @@ export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((2 * $(nproc)))}
 failed=()
 {
     timed --config scripts/unit-tests.toml test --release --locked --lib --package clarke-core &&
-        timed --config 'profile.release.package.clarke.opt-level=0' test --release --locked --lib --package clarke &&
+        timed --config scripts/unit-tests-of-program.toml test --release --locked --lib --package clarke &&
         timed test --release --locked --test all &&
         cargo test --release --locked --doc &&
         CLARKE_SOLVER=$(realpath "${CARGO_TARGET_DIR:-target}")/release/solver \

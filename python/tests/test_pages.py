@@ -61,10 +61,11 @@ class Page(unittest.TestCase):
 
 class Version(unittest.TestCase):
     def test_the_package_has_the_version_of_the_program(self) -> None:
-        def version(file: str, table: str) -> str:
-            return str(tomllib.loads((sample.ROOT / file).read_text())[table]["version"])
+        def read(file: str) -> dict[str, Any]:
+            return tomllib.loads((sample.ROOT / file).read_text())
 
-        self.assertEqual(version("python/pyproject.toml", "project"), version("Cargo.toml", "package"))
+        program = read("Cargo.toml")["workspace"]["package"]["version"]
+        self.assertEqual(read("python/pyproject.toml")["project"]["version"], program)
 
 
 class Examples(unittest.TestCase):
