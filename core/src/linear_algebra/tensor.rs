@@ -115,6 +115,12 @@ pub fn larger(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }
 
+/// A vector of the plane or of space with zeros for missing components.
+#[inline]
+pub fn in_space(vector: &[f64]) -> Vector<3> {
+    std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
+}
+
 /// Vector product.
 pub fn cross(a: &Vector<3>, b: &Vector<3>) -> Vector<3> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     job::number_of_group,
-    linear_algebra::tensor::Vector,
+    linear_algebra::tensor::{Vector, in_space},
     parallel::{
         agreement::Agreed,
         exchange::{exchange, gather},
@@ -165,9 +165,7 @@ impl<const D: usize> Mesh<D> {
     /// The owned nodes of the points and curves with these names, ascending.
     pub fn nodes_of_point_sets(&self, names: &[&String]) -> Vec<u32> {
         let named = self.point_sets.iter().filter(|set| names.contains(&&set.name));
-        let bits = |place: &[f64]| -> [u64; 3] {
-            std::array::from_fn(|i| place.get(i).copied().unwrap_or(0.0).to_bits())
-        };
+        let bits = |place: &[f64]| in_space(place).map(f64::to_bits);
         let places: HashSet<[u64; 3]> = named.flat_map(|set| &set.places).map(|place| bits(place)).collect();
         if places.is_empty() {
             return Vec::new();

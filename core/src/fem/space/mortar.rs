@@ -27,7 +27,7 @@
 //! On quadratic triangles the middles of the sides carry laws alone: w_c of a corner is 0 where C is the whole facet. Where it is a part,
 //! each of the two middles beside a corner takes over half of its psi_c, so that the sum remains 1.
 
-use crate::linear_algebra::tensor::Vector;
+use crate::linear_algebra::tensor::{Vector, in_space};
 use geometry::{Plane, Point, Shape, clip, dot, measure_and_centroid, oriented, quadrature, sides, subtract};
 use rstar::{
     AABB, RTree, RTreeObject, SelectionFunction,
@@ -170,7 +170,7 @@ impl<'a, const D: usize> Search<'a, D> {
         let finite = |master: &&Facet<D>| master.corners.as_flattened().iter().all(|x| x.is_finite());
         let masters: Vec<_> = masters.iter().filter(finite).collect();
         let boxes = masters.iter().enumerate().map(|(number, master)| {
-            let [low, high] = master.bounds().map(|corner| embed(&corner));
+            let [low, high] = master.bounds().map(|corner| in_space(&corner));
             GeomWithData::new(Rectangle::from_corners(low, high), number)
         });
         let tree = RTree::bulk_load(boxes.collect());
@@ -247,8 +247,8 @@ impl Prism {
         };
         let [first, second] = slave.plane.tangents;
         Self {
-            origin: embed(&slave.plane.origin),
-            directions: [embed(&slave.plane.normal), embed(&first), embed(&second)],
+            origin: in_space(&slave.plane.origin),
+            directions: [in_space(&slave.plane.normal), in_space(&first), in_space(&second)],
             bounds: [(-depth.max(DEEPEST * slave.diameter) - margin, reach + margin), bound(0), bound(1)],
         }
     }
@@ -275,11 +275,6 @@ impl SelectionFunction<BoxOfFacet> for &Prism {
     fn should_unpack_leaf(&self, facet: &BoxOfFacet) -> bool {
         self.meets(&facet.envelope())
     }
-}
-
-/// A vector with zeros for missing components.
-fn embed<const D: usize>(vector: &Vector<D>) -> [f64; 3] {
-    std::array::from_fn(|i| if i < D { vector[i] } else { 0.0 })
 }
 
 /// A point of the quadrature on the covered part of a slave facet.

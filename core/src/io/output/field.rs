@@ -1,6 +1,6 @@
 //! A field: its location, its shape and its layout in files.
 
-use crate::linear_algebra::tensor::component;
+use crate::linear_algebra::tensor::{component, in_space};
 
 /// The location of the values of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,17 +75,13 @@ pub(super) fn view_columns(shape: Shape) -> &'static [usize] {
 pub(super) fn spread<const D: usize>(field: &Field, rows: usize) -> Vec<f64> {
     match field.shape {
         Shape::Scalar => field.values.to_vec(),
-        Shape::Vector => field.values.chunks_exact(D).flat_map(pad).collect(),
+        Shape::Vector => field.values.chunks_exact(D).flat_map(in_space).collect(),
         Shape::Tensor => match field.values.len().checked_div(rows) {
             Some(3) => field.values.chunks_exact(3).flat_map(plain_components::<3>).collect(),
             Some(4) => field.values.chunks_exact(4).flat_map(plain_components::<4>).collect(),
             _ => field.values.chunks_exact(6).flat_map(plain_components::<6>).collect(),
         },
     }
-}
-
-pub(super) fn pad(vector: &[f64]) -> [f64; 3] {
-    std::array::from_fn(|axis| vector.get(axis).copied().unwrap_or(0.0))
 }
 
 /// The components xx xy xz yy yz zz of a tensor in Mandel form.

@@ -20,7 +20,7 @@
 
 use super::csv::FLUSH_EVERY;
 use super::field::{
-    FieldKind, component_names, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread,
+    FieldKind, component_names, data_group, file_width, kind_of, list, place_word, shape_word, spread,
     view_columns,
 };
 use super::field_slab::Slab;
@@ -28,7 +28,7 @@ use super::hyperslab::TableRows;
 use super::parallel_file::{Element, METADATA_BYTES, ParallelFile};
 use super::xdmf;
 use crate::error::{Error, Result};
-use crate::linear_algebra::tensor::Vector;
+use crate::linear_algebra::tensor::{Vector, in_space};
 use crate::parallel::agreement::{Agreed, agree};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, Root};
@@ -305,7 +305,7 @@ impl<const D: usize> FieldFile<D> {
             file.create_rows::<i64>(&format!("VTKHDF/{name}"), 1, 1)?.write(0, &only_first(count))?;
         }
         let whole = |ids: &[u64]| ids.iter().map(|id| *id as i64).collect::<Vec<_>>();
-        let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| pad(point)).collect();
+        let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| in_space(point)).collect();
         file.create_packed_rows::<f64>("VTKHDF/Points", points.total, 3, *level)?
             .write(points.first, &coordinates)?;
         file.create_packed_rows::<i64>("Mesh/cells", cells.total, width, *level)?

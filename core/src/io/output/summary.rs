@@ -338,8 +338,12 @@ impl Summary {
         // Explicit stresses have a limit of their own.
         let is_implicit = self.certificates.explicit_step_bound.is_none();
         let generated = (is_implicit && self.energy_of_scheme > LARGEST_GENERATION).then(|| {
-            let share = Digits(100.0 * self.energy_of_scheme);
-            format!("the time scheme {} has generated {share} % of the energy that was supplied", self.scheme)
+            let share = if self.energy_of_scheme > 10.0 {
+                format!("{} times", Digits(self.energy_of_scheme))
+            } else {
+                format!("{} % of", Digits(100.0 * self.energy_of_scheme))
+            };
+            format!("the time scheme {} has generated {share} the energy that was supplied", self.scheme)
         });
         let unresolved = (self.unresolved_steps > 0).then(|| {
             let generated = generated.as_ref().map_or_else(String::new, |generated| format!("; {generated}"));

@@ -15,7 +15,7 @@
 
 use crate::{
     laws::step::start_of,
-    linear_algebra::tensor::{Vector, add_scaled, cross},
+    linear_algebra::tensor::{Vector, add_scaled, cross, in_space},
 };
 
 /// The formula of a scheme for the rate at the end of a step in terms of values at this time and at earlier times.
@@ -82,10 +82,6 @@ impl<const D: usize> ObstacleMotion<D> {
 /// An axis of rotation; in the plane, where none is given, z.
 pub(super) fn axis_of(given: &[f64]) -> Vector<3> {
     if given.is_empty() { [0.0, 0.0, 1.0] } else { in_space(given) }
-}
-
-fn in_space(vector: &[f64]) -> Vector<3> {
-    std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
 }
 
 fn in_plane<const D: usize>(vector: &Vector<3>) -> Vector<D> {

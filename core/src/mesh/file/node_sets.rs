@@ -2,6 +2,7 @@
 
 use super::document::Document;
 use crate::error::Result;
+use crate::linear_algebra::tensor::in_space;
 use crate::mesh::{Boundary, GlobalMesh, PointSet};
 
 /// Makes each set of nodes a boundary of the facets whose corners it contains; without such facets, named points. Sets with the name of
@@ -42,9 +43,8 @@ pub(super) fn name_node_sets<const D: usize>(
             }
             mesh.boundaries.push(Boundary { name: name.clone(), facets });
         } else if !nodes.is_empty() {
-            let place =
-                |&node: &usize| std::array::from_fn(|i| mesh.nodes[node].get(i).copied().unwrap_or(0.0));
-            mesh.point_sets.push(PointSet::new(name, nodes.iter().map(place).collect()));
+            let places = nodes.iter().map(|&node| in_space(&mesh.nodes[node])).collect();
+            mesh.point_sets.push(PointSet::new(name, places));
         }
     }
     Ok(notes)

@@ -3,7 +3,7 @@
 use super::document::Document;
 use crate::{
     error::Result,
-    linear_algebra::tensor::Vector,
+    linear_algebra::tensor::{Vector, in_space},
     mesh::{GlobalMesh, PointSet, midpoint},
 };
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ pub(super) fn name_points<const D: usize>(
             let corners: Option<Vec<u32>> = corners.collect::<Result<_>>()?;
             let Some(corners) = corners else { continue };
             let corners: Vec<&Vector<D>> = corners.iter().map(|&node| &mesh.nodes[node as usize]).collect();
-            places.extend(corners.iter().map(|place| in_space(place)));
+            places.extend(corners.iter().map(|place| in_space(*place)));
             if let &[a, b] = corners.as_slice() {
                 let side = match tags.get(2) {
                     Some(&tag) if mesh.is_second_order => middle(tag, element, [a, b])?,
@@ -47,8 +47,4 @@ pub(super) fn name_points<const D: usize>(
     let sets = sets.into_iter().filter(|(_, places)| !places.is_empty());
     mesh.point_sets = sets.map(|(name, places)| PointSet::new(name, places)).collect();
     Ok(())
-}
-
-fn in_space<const D: usize>(place: &Vector<D>) -> [f64; 3] {
-    std::array::from_fn(|i| place.get(i).copied().unwrap_or(0.0))
 }

@@ -32,7 +32,7 @@ use crate::{
         space::Held,
     },
     laws::contact::{FrictionLaw, SLIP, SlidingContext, Slip},
-    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, in_space, larger, norm},
     mesh::Mesh,
 };
 
@@ -221,8 +221,7 @@ impl<const D: usize> Friction<D> {
     /// Lets the law see the undeformed places of `points`.
     pub(super) fn update_places(&mut self, points: &[Point<D>]) {
         for point in &mut self.points {
-            let place = &points[point.at].place;
-            point.context.place = std::array::from_fn(|i| if i < D { place[i] } else { 0.0 });
+            point.context.place = in_space(&points[point.at].place);
         }
     }
 

@@ -21,7 +21,7 @@ use crate::{
         contact::{Gap, ObstacleLoad, Rate},
         expression::Scalar,
     },
-    linear_algebra::tensor::{Vector, add_scaled, cross, norm},
+    linear_algebra::tensor::{Vector, add_scaled, cross, in_space, norm},
 };
 
 /// Kinetic energy of the obstacles that forces and moments move.
@@ -129,7 +129,7 @@ impl<const D: usize> Obstacle<D> {
     /// force along it is the force along the direction, and its moment about the axis.
     pub(super) fn velocities_at(&self, arm: &Vector<D>) -> [Option<Vector<D>>; 2] {
         let turned = || {
-            let velocity = cross(&self.axis, &std::array::from_fn(|i| arm.get(i).copied().unwrap_or(0.0)));
+            let velocity = cross(&self.axis, &in_space(arm));
             std::array::from_fn(|i| velocity[i])
         };
         [self.moves().then_some(self.direction), self.turns().then(turned)]

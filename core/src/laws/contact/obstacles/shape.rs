@@ -14,7 +14,7 @@ use crate::{
         expression::Scalar,
         law::LawFault,
     },
-    linear_algebra::tensor::{Vector, add_scaled, larger, norm},
+    linear_algebra::tensor::{Vector, add_scaled, in_space, larger, norm},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -285,11 +285,6 @@ impl Shape {
         }
         f64::INFINITY
     }
-}
-
-/// A vector with zeros for missing components.
-fn in_space<const D: usize>(vector: &Vector<D>) -> Vector<3> {
-    std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
 }
 
 /// What a search has found.

@@ -7,6 +7,7 @@ use crate::{
     linear_algebra::{petsc::DistributedVector, tensor::larger},
     solver::stepping::{StepOutcome, fallbacks::Search, problem::StepProblem, solver::Reduced},
 };
+use smallvec::SmallVec;
 
 /// Where nodes stand for little of the surface, their pressures need smaller residuals: the ratio of one tolerance to that before, and how
 /// often it is applied.
@@ -87,21 +88,17 @@ impl Newton {
     ) -> Result<f64> {
         trial.update_ghosts()?;
         let (velocity, residual) = (trial.local()?, self.last_residual().owned()?);
-        let mut largest = 0.0;
         let contacts = &problem.body.contacts;
-        let highest = |highest: f64, contact: &Contact<D>| larger(highest, contact.range(&velocity)[1]);
-        let [highest] = match contacts.len() > 1 {
-            true => problem.session.largest([contacts.iter().fold(0.0, highest)]),
-            false => [0.0],
-        };
-        for contact in contacts {
-            let mut range = problem.session.largest(contact.range(&velocity));
+        let range = |contact: &Contact<D>| problem.session.largest(contact.range(&velocity));
+        let ranges: SmallVec<[[f64; 4]; 8]> = contacts.iter().map(range).collect();
+        let highest = ranges.iter().fold(0.0, |highest, &[_, pressure, ..]| larger(highest, pressure));
+        let mut largest = 0.0;
+        for (contact, mut range) in contacts.iter().zip(ranges) {
             // Errors of the forces at a boundary that nothing presses are measured by the pressure on the others.
             if range[1] == 0.0 {
                 range[1] = highest;
             }
-            let distance = contact.inclusion_residual(&velocity, &residual, range);
-            largest = larger(largest, distance);
+            largest = larger(largest, contact.inclusion_residual(&velocity, &residual, range));
         }
         Ok(problem.session.largest([largest])[0])
     }
