@@ -28,7 +28,7 @@ mod variational_inequality;
 mod vector;
 
 pub use coarse_space::Interpolation;
-pub use dense::{LocalFactor, times_own_transpose};
+pub use dense::LocalFactor;
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{
     Entered, Petsc, Stage, clear_option, has_option, launched_rank, set_default_option, set_option,

@@ -71,7 +71,7 @@ pub struct DenseFactor {
 }
 
 #[derive(Debug)]
-enum Numbers {
+pub(super) enum Numbers {
     Double(Vec<f64>),
     Single(Vec<f32>),
 }

@@ -1,9 +1,15 @@
 //! The matrix of a step, condensed to the motions on which contact laws act.
 
-use super::equations::{Linearised, LinearisedAction, NodeByNode, Rigid, StepMatrix};
+use super::{
+    equations::{Linearised, LinearisedAction, NodeByNode, Rigid, StepMatrix},
+    reduced_factor::ReducedFactor,
+};
 use crate::{
     error::Result,
-    linear_algebra::petsc::{DistributedVector, LocalFactor, MISSING_DIRECTIONS, times_own_transpose},
+    linear_algebra::{
+        petsc::{DistributedVector, LocalFactor, MISSING_DIRECTIONS},
+        sparse::{PackedSymmetric, column, columns},
+    },
     parallel::{
         exchange::Gathering,
         session::{Session, World},
@@ -45,6 +51,10 @@ pub(super) struct Workspace {
     own: Vec<f64>,
     all: Vec<f64>,
     gathering: Gathering,
+    /// Parts of products of this rank and of all ranks.
+    part: Vec<f64>,
+    parts: Vec<f64>,
+    part_gathering: Gathering,
     /// Amounts in the order of the factor.
     ordered_amounts: [Vec<f64>; 2],
     /// The blocks of a projection, of this rank and of all ranks, and the images of unit motions that they are made of.
@@ -53,6 +63,8 @@ pub(super) struct Workspace {
     block_gathering: Gathering,
     images: [Vec<f64>; MAX_DIMENSION],
     world: World,
+    /// The number of this rank, and of ranks.
+    rank: [usize; 2],
     /// Bytes read since the count of traffic was restarted.
     traffic: u64,
 }
@@ -67,12 +79,16 @@ impl Workspace {
             own: vec![0.0; motions.len()],
             all: vec![0.0; total],
             gathering: Gathering::new(&world, motions.len())?,
+            part: vec![0.0; total],
+            parts: vec![0.0; total * session.ranks()],
+            part_gathering: Gathering::new(&world, total)?,
             ordered_amounts: [vec![0.0; total], vec![0.0; total]],
             own_blocks: Vec::with_capacity(pairs),
             blocks: vec![0.0; block_gathering.total()],
             block_gathering,
             images: Default::default(),
             world,
+            rank: [session.rank(), session.ranks()],
             traffic: 0,
         }))
     }
@@ -85,9 +101,9 @@ pub(super) struct Subspace {
     projection_blocks: Vec<f64>,
     /// The same of symmetric, positive forces in addition to `S`; empty if there are none.
     additions: Vec<f64>,
-    /// `L L^T` as a full matrix, in the order of the motions, once it was needed.
-    product: Vec<f64>,
-    factor: Option<LocalFactor>,
+    /// `L L^T` in the order of the motions, once it was needed.
+    product: Option<PackedSymmetric>,
+    factor: Option<ReducedFactor>,
     is_active: bool,
     /// Factors of linearised equations, which precondition better than those on the subspace.
     linearised: Option<LocalFactor>,
@@ -97,12 +113,12 @@ impl Subspace {
     /// The whole space, for vectors with the layout of `like`.
     pub(super) fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
         let work_vector = like.like()?;
-        let (projection_blocks, additions, product) = (Vec::new(), Vec::new(), Vec::new());
+        let (projection_blocks, additions) = (Vec::new(), Vec::new());
         Ok(RefCell::new(Self {
             work_vector,
             projection_blocks,
             additions,
-            product,
+            product: None,
             factor: None,
             is_active: false,
             linearised: None,
@@ -141,7 +157,7 @@ impl CondensedMatrix {
         self.workspace.borrow_mut().traffic = 0;
     }
 
-    /// Bytes of `L`, or of the factor on a subspace, that products and solves have read since then.
+    /// Bytes of `L`, its product and the factor on a subspace that products and solves have read since then.
     pub(super) fn traffic(&self) -> u64 {
         self.workspace.borrow().traffic
     }
@@ -151,10 +167,9 @@ impl CondensedMatrix {
         self.subspace.borrow().is_active
     }
 
-    /// Reads the amounts of all motions in a vector of contact nodes into the first work vector, in the order of the factor.
-    /// Collective.
-    fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
-        let Workspace { own, all, gathering, world, ordered_amounts: [ordered, _], .. } = workspace;
+    /// Reads the amounts of all motions in a vector of contact nodes. Collective.
+    fn gather(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
+        let Workspace { own, all, gathering, world, .. } = workspace;
         {
             let values = vector.owned()?;
             for (amount, motion) in own.iter_mut().zip(&self.motions) {
@@ -162,23 +177,35 @@ impl CondensedMatrix {
             }
         }
         gathering.gather(world, own, all);
+        Ok(())
+    }
+
+    /// The same into the first work vector in the order of the factor. Collective.
+    fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
+        self.gather(vector, workspace)?;
+        let Workspace { all, ordered_amounts: [ordered, _], .. } = workspace;
         self.positions.iter().zip(all).for_each(|(&position, amount)| ordered[position] = *amount);
         Ok(())
     }
 
     /// Writes a vector of contact nodes with these amounts of the motions, given in the order of the factor.
     pub(super) fn write(&self, amounts: &[f64], vector: &mut DistributedVector) -> Result<()> {
+        self.write_own(|number| amounts[self.positions[number]], vector)
+    }
+
+    /// Writes a vector of contact nodes with these amounts of the motions of this rank, by their numbers among those of all ranks.
+    fn write_own(&self, amount: impl Fn(usize) -> f64, vector: &mut DistributedVector) -> Result<()> {
         let mut values = vector.owned_mut()?;
         values.fill(0.0);
         for (motion, number) in self.motions.iter().zip(self.own.clone()) {
-            let amount = amounts[self.positions[number]];
+            let amount = amount(number);
             let value = values[motion.at..].iter_mut();
             value.zip(&motion.direction).for_each(|(value, direction)| *value += amount * direction);
         }
         Ok(())
     }
 
-    /// Bytes of `L`; the factor on a subspace has the same size.
+    /// Bytes of `L`.
     fn bytes(&self) -> u64 {
         size_of_val(&self.lower[..]) as u64
     }
@@ -247,42 +274,20 @@ impl CondensedMatrix {
         Ok(())
     }
 
-    /// Writes `S` as a full matrix, in the order of the motions.
-    fn write_product(&self, full: &mut Vec<f64>) -> Result<()> {
-        let size = self.positions.len();
-        full.clear();
-        full.resize(size * size, 0.0);
-        for at in 0..size {
-            full[at * size + at..][..size - at].copy_from_slice(column(&self.lower, size, at));
-        }
-        let product = times_own_transpose(size, full)?;
-        for (to, &place) in full.chunks_exact_mut(size.max(1)).zip(&self.positions) {
-            let from = &product[place * size..][..size];
-            to.iter_mut().zip(&self.positions).for_each(|(value, &place)| *value = from[place]);
-        }
-        Ok(())
-    }
-
-    /// Factors `P (S + B) P + k (I - P)` with the blocks of `P` and of the additions `B`, in the order of the motions.
-    fn factor_on_subspace(&self, subspace: &mut Subspace) -> Result<LocalFactor> {
-        let Subspace { product, additions, projection_blocks: projection, .. } = subspace;
-        if product.is_empty() {
-            self.write_product(product)?;
-        }
-        let full = self.with_blocks(product, &[], [additions, projection, projection]);
-        LocalFactor::cholesky(self.positions.len(), &full)
+    /// `L L^T` in the order of the motions.
+    fn product<'a>(&self, product: &'a mut Option<PackedSymmetric>) -> &'a PackedSymmetric {
+        product.get_or_insert_with(|| PackedSymmetric::times_own_transpose(&self.lower, &self.positions))
     }
 
     /// `R (L L^T - D + C) P + k (I - P)` in the order of the motions, given a full `L L^T`, the springs `D` and the blocks of the
     /// forces `C`, if there are any, and those of the reduction `R` and the projection `P`; `k` is the mean of the diagonal of `L L^T`.
     fn with_blocks(
         &self,
-        product: &[f64],
+        mut full: Vec<f64>,
         springs: &[f64],
         [forces, reduction, projection]: [&[f64]; 3],
     ) -> Vec<f64> {
         let size = self.positions.len();
-        let mut full = product.to_vec();
         let mean = (0..size).map(|at| full[at * size + at]).sum::<f64>() / size as f64;
         springs.iter().enumerate().for_each(|(at, spring)| full[at * size + at] -= spring);
         let mut first = 0;
@@ -308,6 +313,14 @@ impl CondensedMatrix {
             }
         }
         full
+    }
+
+    /// Gives what springs add to the force along each motion of this rank, by its number among those of all ranks, at these amounts.
+    fn subtract_springs(&self, own: &[f64], mut subtract: impl FnMut(usize, f64)) {
+        let springs = self.springs.iter().flatten().zip(own);
+        springs
+            .zip(self.own.clone())
+            .for_each(|((spring, amount), number)| subtract(number, spring * amount));
     }
 
     /// The blocks of nodes, node after node of all ranks.
@@ -339,30 +352,55 @@ impl StepMatrix for CondensedMatrix {
         let [amounts, product] = &mut workspace.ordered_amounts;
         self.times_upper(amounts, product);
         self.times_lower(product, amounts);
-        for ((spring, amount), number) in
-            self.springs.iter().flatten().zip(&workspace.own).zip(self.own.clone())
-        {
-            amounts[self.positions[number]] -= spring * amount;
-        }
+        self.subtract_springs(&workspace.own, |number, force| amounts[self.positions[number]] -= force);
         self.write(amounts, y)
+    }
+
+    /// With the product `L L^T`, of which each rank reads its share; where it is not at hand in every run alike, as
+    /// [`multiply`](StepMatrix::multiply).
+    fn multiply_direction(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        let subspace = self.subspace.borrow();
+        let Some(product) = subspace.product.as_ref().filter(|_| subspace.is_active) else {
+            return self.multiply(x, y);
+        };
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.gather(x, workspace)?;
+        let Workspace { own, all, part, parts, part_gathering, world, rank, traffic, .. } = workspace;
+        let columns = product.share(rank[0], rank[1]);
+        *traffic += product.bytes(columns.clone());
+        part.fill(0.0);
+        product.add_product(columns, all, part);
+        part_gathering.gather(world, part, parts);
+        all.fill(0.0);
+        for part in parts.chunks_exact(all.len().max(1)) {
+            all.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
+        }
+        self.subtract_springs(own, |number, force| all[number] -= force);
+        self.write_own(|number| all[number], y)
     }
 
     fn precondition(&self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
-        self.read(r, workspace)?;
-        workspace.traffic += 2 * self.bytes();
-        let [amounts, ordered] = &mut workspace.ordered_amounts;
         let mut subspace = self.subspace.borrow_mut();
         match &mut *subspace {
-            Subspace { linearised: Some(factor), .. }
-            | Subspace { factor: Some(factor), is_active: true, .. } => {
-                ordered.iter_mut().zip(&self.positions).for_each(|(amount, &place)| *amount = amounts[place]);
-                factor.solve(ordered)?;
-                self.positions.iter().zip(ordered).for_each(|(&place, amount)| amounts[place] = *amount);
+            Subspace { linearised: Some(factor), .. } => {
+                self.gather(r, workspace)?;
+                workspace.traffic += 2 * self.bytes();
+                factor.solve(&mut workspace.all)?;
             }
-            _ => self.solve(amounts),
+            Subspace { factor: Some(factor), is_active: true, .. } => {
+                self.gather(r, workspace)?;
+                workspace.traffic += factor.bytes();
+                factor.solve(&self.nodes, &mut workspace.all);
+            }
+            _ => {
+                self.read(r, workspace)?;
+                workspace.traffic += 2 * self.bytes();
+                self.solve(&mut workspace.ordered_amounts[0]);
+                return self.write(&workspace.ordered_amounts[0], z);
+            }
         }
-        self.write(amounts, z)
+        self.write_own(|number| workspace.all[number], z)
     }
 
     fn factor_pays_after(&self) -> Option<usize> {
@@ -371,7 +409,12 @@ impl StepMatrix for CondensedMatrix {
     }
 
     fn forget_linearised(&self) {
-        self.subspace.borrow_mut().linearised = None;
+        let subspace = &mut *self.subspace.borrow_mut();
+        subspace.linearised = None;
+        if !subspace.additions.is_empty() {
+            subspace.additions.clear();
+            subspace.factor = None;
+        }
     }
 
     fn set_linearised(&self, bodies: Rigid, act: LinearisedAction<'_>) -> Result<bool> {
@@ -387,16 +430,14 @@ impl StepMatrix for CondensedMatrix {
             self.write_blocks(&mut |column| act(map, column), &mut subspace.work_vector, workspace)?;
             blocks.clone_from(&workspace.blocks);
         }
-        if subspace.product.is_empty() {
-            self.write_product(&mut subspace.product)?;
-        }
+        let full = self.product(&mut subspace.product).full();
         let mut springs = Vec::new();
         if let Some(own) = self.springs.as_ref().filter(|_| bodies == Rigid::Free) {
             springs.resize(self.positions.len(), 0.0);
             workspace.gathering.gather(&workspace.world, own, &mut springs);
         }
         // Of a singular matrix there are none.
-        let full = self.with_blocks(&subspace.product, &springs, blocks.each_ref().map(Vec::as_slice));
+        let full = self.with_blocks(full, &springs, blocks.each_ref().map(Vec::as_slice));
         subspace.linearised = LocalFactor::lu(self.positions.len(), &full).ok();
         Ok(subspace.linearised.is_some())
     }
@@ -418,7 +459,9 @@ impl StepMatrix for CondensedMatrix {
             return Ok(false);
         }
         subspace.projection_blocks.clone_from(blocks);
-        subspace.factor = Some(self.factor_on_subspace(subspace)?);
+        let Subspace { product, additions, projection_blocks, factor, .. } = subspace;
+        *factor =
+            Some(ReducedFactor::new(self.product(product), &self.nodes, [additions, projection_blocks])?);
         Ok(true)
     }
 
@@ -476,16 +519,6 @@ fn multiply_entries(entries: &mut [f64], block: &[f64], at: impl Iterator<Item =
     for (at, row) in at.zip(block.chunks_exact(count.max(1))) {
         entries[at] = dot(row, &before[..count]);
     }
-}
-
-/// A column of `L` from the diagonal down.
-fn column(lower: &[f64], size: usize, at: usize) -> &[f64] {
-    let start = at * size - at * at.saturating_sub(1) / 2;
-    &lower[start..start + size - at]
-}
-
-fn columns(lower: &[f64], size: usize) -> impl Iterator<Item = &[f64]> {
-    (0..size).map(move |at| column(lower, size, at))
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

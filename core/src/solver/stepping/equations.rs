@@ -43,6 +43,11 @@ pub trait StepMatrix {
     /// `y = K x`. Collective.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
 
+    /// The same within iterations for a direction, where rounding errors of the largest entries of `K` do no harm. Collective.
+    fn multiply_direction(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.multiply(x, y)
+    }
+
     /// `x . K x`. Collective.
     fn power(&self, x: &DistributedVector) -> Result<f64> {
         let mut product = x.like()?;
@@ -72,7 +77,7 @@ pub trait StepMatrix {
         None
     }
 
-    /// Later solves are preconditioned without factors of linearised equations.
+    /// Later solves are preconditioned without factors of linearised equations and without additions.
     fn forget_linearised(&self) {}
 
     /// Preconditions later solves by factors of these linearised equations, as they are or with soft springs where contact alone holds a
@@ -689,10 +694,15 @@ impl<const D: usize> ContactEquations<'_, D> {
             self.session.agree(self.linear_solver.forget_stiffening())?;
         }
         let mut has_additions = false;
-        if let Some(cells) = operator.cells.as_mut().filter(|_| is_slow || self.counts.sets.len() == 1) {
+        if is_slow || (self.counts.sets.len() == 1 && operator.cells.is_some()) {
             has_additions = self.matrix.set_additions(&mut |column| {
                 velocity.fill(0.0)?;
-                cells.add_derivative(column, velocity)?;
+                if let Some(cells) = &mut operator.cells {
+                    cells.add_derivative(column, velocity)?;
+                }
+                if is_slow {
+                    add_contact(operator.ghosted, operator.contacts, column, velocity, Contact::add_slopes)?;
+                }
                 column.copy_from(velocity)
             })?;
         }
@@ -803,6 +813,11 @@ struct ReducedJacobian<'a, const D: usize> {
 impl<const D: usize> ReducedJacobian<'_, D> {
     fn multiply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         self.matrix.multiply(x, y)?;
+        self.add_derivatives(x, y)
+    }
+
+    /// Adds what forces of cells, contacts and obstacles change.
+    fn add_derivatives(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         if let Some(cells) = &mut self.cells {
             cells.add_derivative(x, y)?;
         }
@@ -870,7 +885,8 @@ impl<const D: usize> ReducedJacobian<'_, D> {
 
 impl<const D: usize> ProjectedOperator for ReducedJacobian<'_, D> {
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        self.multiply(x, y)?;
+        self.matrix.multiply_direction(x, y)?;
+        self.add_derivatives(x, y)?;
         self.reduce(y)
     }
 

@@ -25,6 +25,7 @@ mod newton;
 mod obstacle_motions;
 mod outcome;
 mod problem;
+mod reduced_factor;
 mod resistance;
 mod solver;
 mod springs;
