@@ -71,7 +71,7 @@ pub struct DenseFactor {
 }
 
 #[derive(Debug)]
-pub(super) enum Numbers {
+enum Numbers {
     Double(Vec<f64>),
     Single(Vec<f32>),
 }

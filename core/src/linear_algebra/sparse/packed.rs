@@ -1,6 +1,6 @@
 //! Dense symmetric matrices that each rank has as a whole, by packed columns, and Cholesky factors of such matrices.
 
-use super::{dense_factor::Numbers, panel::Real};
+use super::panel::Real;
 use multiversion::multiversion;
 use std::ops::Range;
 
@@ -124,16 +124,19 @@ fn index(size: usize, row: usize, column: usize) -> usize {
     column * size - column * column.saturating_sub(1) / 2 + row - column
 }
 
-/// Cholesky factor of a dense matrix, for preconditioners: of large ones in single precision, where rounding errors leave them as they are.
+/// Cholesky factors of dense matrices of any size up to the largest, one after the other in the same memory, for preconditioners: those of
+/// large ones are in single precision, where rounding errors leave them as they are.
 #[derive(Debug)]
 pub struct LocalCholesky {
     size: usize,
-    /// The factor of the scaled matrix, column after column; entries above the diagonal are not used.
-    columns: Numbers,
+    /// The scaled matrix or its factor, column after column; entries above the diagonal are not used.
+    columns: Vec<f64>,
+    /// Its factor in single precision, in place of the other.
+    single: Vec<f32>,
     /// Factors of rows and columns, with which all diagonal entries are one.
     scales: Vec<f64>,
     values: Vec<f64>,
-    single: Vec<f32>,
+    single_values: Vec<f32>,
 }
 
 /// Unknowns from which reading a factor takes longer than the iterations that rounding errors may add.
@@ -142,73 +145,76 @@ const SINGLE_FROM: usize = 1024;
 const LEAST_PIVOT: f64 = 1e-4;
 
 impl LocalCholesky {
-    /// The factor of a matrix of which the columns are given from the diagonal down, each in a column of the whole matrix; `None` where it
-    /// is not positive definite.
-    pub fn new(size: usize, mut columns: Vec<f64>) -> Option<Self> {
-        let diagonal = columns.iter().step_by(size + 1);
-        let scales: Vec<f64> = diagonal.map(|entry| 1.0 / entry.sqrt()).collect();
-        for (column, factor) in columns.chunks_exact_mut(size.max(1)).zip(&scales) {
-            column.iter_mut().zip(&scales).for_each(|(entry, scale)| *entry *= factor * scale);
+    /// Memory for matrices of this size at most.
+    pub fn with_capacity(most: usize) -> Self {
+        let singles = if most < SINGLE_FROM { 0 } else { most };
+        Self {
+            size: 0,
+            columns: Vec::with_capacity(most * most),
+            single: Vec::with_capacity(singles * singles),
+            scales: Vec::with_capacity(most),
+            values: Vec::with_capacity(most),
+            single_values: Vec::with_capacity(singles),
         }
-        let single = if size >= SINGLE_FROM { in_single_precision(size, &columns) } else { None };
-        let columns = match single {
-            Some(columns) => Numbers::Single(columns),
-            None => {
-                if size > 0 {
-                    f64::factor(&mut columns, size)?;
-                }
-                Numbers::Double(columns)
+    }
+
+    /// Zeros for the entries of a matrix to be factored, column after column; those above the diagonal are not used.
+    pub fn columns_of(&mut self, size: usize) -> &mut [f64] {
+        self.size = size;
+        self.columns.clear();
+        self.columns.resize(size * size, 0.0);
+        &mut self.columns
+    }
+
+    /// Factors the matrix of these entries; `None` where it is not positive definite.
+    pub fn factor(&mut self) -> Option<()> {
+        let Self { size, columns, single, scales, .. } = self;
+        scales.clear();
+        scales.extend(columns.iter().step_by(*size + 1).map(|entry| 1.0 / entry.sqrt()));
+        for (column, factor) in columns.chunks_exact_mut((*size).max(1)).zip(&*scales) {
+            column.iter_mut().zip(&*scales).for_each(|(entry, scale)| *entry *= factor * scale);
+        }
+        single.clear();
+        if *size >= SINGLE_FROM {
+            single.extend(columns.iter().map(|entry| f32::rounded(*entry)));
+            let is_accurate = f32::factor(single, *size).is_some()
+                && single.iter().step_by(*size + 1).all(|pivot| pivot.exact().powi(2) >= LEAST_PIVOT);
+            if is_accurate {
+                return Some(());
             }
-        };
-        Some(Self { size, columns, scales, values: vec![0.0; size], single: Vec::new() })
+            single.clear();
+        }
+        if *size == 0 { Some(()) } else { f64::factor(columns, *size) }
     }
 
     /// Replaces a right-hand side by the solution.
     pub fn solve(&mut self, values: &mut [f64]) {
-        let Self { size, columns, scales, values: scaled, single } = self;
+        let Self { size, columns, single, scales, values: scaled, single_values } = self;
         assert_eq!(values.len(), *size);
-        let of = values.iter().zip(&*scales);
-        scaled.iter_mut().zip(of).for_each(|(scaled, (value, scale))| *scaled = value * scale);
-        match columns {
-            Numbers::Double(columns) if *size > 0 => {
-                f64::forward(columns, *size, scaled);
-                f64::backward(columns, *size, scaled);
-            }
-            Numbers::Double(_) => {}
-            Numbers::Single(columns) => {
-                // Right-hand sides may be smaller than the least number in single precision.
-                let largest = scaled.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-                let unit = if largest > 0.0 && largest.is_finite() { largest } else { 1.0 };
-                single.clear();
-                single.extend(scaled.iter().map(|value| f32::rounded(value / unit)));
-                f32::forward(columns, *size, single);
-                f32::backward(columns, *size, single);
-                scaled.iter_mut().zip(&*single).for_each(|(scaled, value)| *scaled = unit * value.exact());
-            }
+        scaled.clear();
+        scaled.extend(values.iter().zip(&*scales).map(|(value, scale)| value * scale));
+        if !single.is_empty() {
+            // Right-hand sides may be smaller than the least number in single precision.
+            let largest = scaled.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+            let unit = if largest > 0.0 && largest.is_finite() { largest } else { 1.0 };
+            single_values.clear();
+            single_values.extend(scaled.iter().map(|value| f32::rounded(value / unit)));
+            f32::forward(single, *size, single_values);
+            f32::backward(single, *size, single_values);
+            scaled.iter_mut().zip(&*single_values).for_each(|(scaled, value)| *scaled = unit * value.exact());
+        } else if *size > 0 {
+            f64::forward(columns, *size, scaled);
+            f64::backward(columns, *size, scaled);
         }
-        values
-            .iter_mut()
-            .zip(scaled.iter().zip(scales))
-            .for_each(|(value, (scaled, scale))| *value = *scaled * *scale);
+        let solution = scaled.iter().zip(&*scales).map(|(scaled, scale)| scaled * scale);
+        values.iter_mut().zip(solution).for_each(|(value, solution)| *value = solution);
     }
 
     /// Bytes that a solve reads.
     pub fn bytes(&self) -> u64 {
-        let entries = self.size * (self.size + 1) / 2;
-        let size = match &self.columns {
-            Numbers::Double(_) => size_of::<f64>(),
-            Numbers::Single(_) => size_of::<f32>(),
-        };
-        (2 * entries * size) as u64
+        let number = if self.single.is_empty() { size_of::<f64>() } else { size_of::<f32>() };
+        (self.size * (self.size + 1) * number) as u64
     }
-}
-
-/// The factor of a matrix with a diagonal of ones; `None` where rounding errors change it much.
-fn in_single_precision(size: usize, columns: &[f64]) -> Option<Vec<f32>> {
-    let mut single: Vec<f32> = columns.iter().map(|entry| f32::rounded(*entry)).collect();
-    f32::factor(&mut single, size)?;
-    let is_accurate = single.iter().step_by(size + 1).all(|pivot| pivot.exact().powi(2) >= LEAST_PIVOT);
-    is_accurate.then_some(single)
 }
 
 #[cfg(test)]
@@ -281,14 +287,16 @@ mod tests {
     #[test]
     fn factors_solve_in_any_units_up_to_the_rounding_of_their_precision() {
         let units = |i: usize| [1.0, 1e-40, 1e40][i % 3];
-        for (size, tolerance) in [(0, 0.0), (1, 1e-15), (100, 1e-13), (SINGLE_FROM, 1e-5)] {
+        let mut factor = LocalCholesky::with_capacity(SINGLE_FROM);
+        for (size, tolerance) in [(0, 0.0), (1, 1e-15), (100, 1e-13), (SINGLE_FROM, 1e-5), (99, 1e-13)] {
             let matrix = spread(size, units);
             let x: Vec<f64> =
                 vector(size).iter().enumerate().map(|(i, value)| value * 1e-60 / units(i)).collect();
             let mut values: Vec<f64> =
                 (0..size).map(|row| (0..size).map(|at| matrix[at * size + row] * x[at]).sum()).collect();
-            let mut factor = LocalCholesky::new(size, matrix).unwrap();
-            assert_eq!(matches!(factor.columns, Numbers::Single(_)), size >= SINGLE_FROM);
+            factor.columns_of(size).copy_from_slice(&matrix);
+            factor.factor().unwrap();
+            assert_eq!(!factor.single.is_empty(), size >= SINGLE_FROM);
             factor.solve(&mut values);
             let errors =
                 values.iter().zip(&x).enumerate().map(|(i, (value, x))| (value - x).abs() * units(i) / 3e-60);
@@ -308,10 +316,10 @@ mod tests {
                     (0.0, 0.0, 0.0, 0.0);
             }
             (matrix[0], matrix[1], matrix[size], matrix[size + 1]) = (1.0, entry, entry, 1.0);
-            LocalCholesky::new(size, matrix)
+            let mut factor = LocalCholesky::with_capacity(size);
+            factor.columns_of(size).copy_from_slice(&matrix);
+            factor.factor().map(|()| !factor.single.is_empty())
         };
-        assert!(matches!(with_pair(1.0 - 1e-9), Some(LocalCholesky { columns: Numbers::Double(_), .. })));
-        assert!(matches!(with_pair(0.5), Some(LocalCholesky { columns: Numbers::Single(_), .. })));
-        assert!(with_pair(1.0 + 1e-9).is_none());
+        assert_eq!([0.5, 1.0 - 1e-9, 1.0 + 1e-9].map(with_pair), [Some(true), Some(false), None]);
     }
 }

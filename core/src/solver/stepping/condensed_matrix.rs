@@ -104,6 +104,8 @@ pub(super) struct Subspace {
     /// `L L^T` in the order of the motions, once it was needed.
     product: Option<PackedSymmetric>,
     factor: Option<ReducedFactor>,
+    /// Whether the factor is that of these blocks and additions.
+    is_current: bool,
     is_active: bool,
     /// Factors of linearised equations, which precondition better than those on the subspace.
     linearised: Option<LocalFactor>,
@@ -120,6 +122,7 @@ impl Subspace {
             additions,
             product: None,
             factor: None,
+            is_current: false,
             is_active: false,
             linearised: None,
         }))
@@ -413,7 +416,7 @@ impl StepMatrix for CondensedMatrix {
         subspace.linearised = None;
         if !subspace.additions.is_empty() {
             subspace.additions.clear();
-            subspace.factor = None;
+            subspace.is_current = false;
         }
     }
 
@@ -455,13 +458,15 @@ impl StepMatrix for CondensedMatrix {
         };
         let removed: f64 = self.blocks_of_nodes(blocks).map(missing).sum();
         subspace.is_active = removed.round() >= MISSING_DIRECTIONS || !subspace.additions.is_empty();
-        if !subspace.is_active || (subspace.factor.is_some() && subspace.projection_blocks == *blocks) {
+        if !subspace.is_active || (subspace.is_current && subspace.projection_blocks == *blocks) {
             return Ok(false);
         }
         subspace.projection_blocks.clone_from(blocks);
-        let Subspace { product, additions, projection_blocks, factor, .. } = subspace;
-        *factor =
-            Some(ReducedFactor::new(self.product(product), &self.nodes, [additions, projection_blocks])?);
+        let Subspace { product, additions, projection_blocks, factor, is_current, .. } = subspace;
+        *is_current = false;
+        let factor = factor.get_or_insert_with(|| ReducedFactor::with_capacity(&self.nodes));
+        factor.set(self.product(product), &self.nodes, [additions, projection_blocks])?;
+        *is_current = true;
         Ok(true)
     }
 
@@ -484,7 +489,7 @@ impl StepMatrix for CondensedMatrix {
             additions.clear();
         }
         subspace.additions = additions;
-        subspace.factor = None;
+        subspace.is_current = false;
         Ok(true)
     }
 }

@@ -51,9 +51,14 @@ const REGULAR_TETRAHEDRA: f64 = 1.394;
 
 /// What the assembly of a matrix and its order of elimination need beside it, as a multiple of it.
 const ASSEMBLY: f64 = 3.0;
-/// Bytes for each entry of the dense matrix of the motions of contact nodes, which each rank has: half of it, from which it is computed, the
-/// whole, its factors on a subspace and with the forces of laws, and two copies while these are computed.
-const DENSE_ENTRY: f64 = 4.0 + 5.0 * 8.0;
+/// Bytes for each entry of the dense matrix of the motions of contact nodes, which each rank has: half of it and half of its factor, its
+/// factor on a subspace, and two copies while these are computed.
+const DENSE_ENTRY: f64 = 2.0 * 4.0 + 3.0 * 8.0;
+/// Seconds for each third power of the number of these motions: the matrix; the factors of a step, without and with friction.
+const DENSE_SET_UP: f64 = 2e-11;
+const DENSE_FACTORS: [f64; 2] = [2e-12, 1e-11];
+/// Seconds of a step for each entry of the matrix, in iterations on contact motions without and with friction.
+const DENSE_ITERATIONS: [f64; 2] = [5e-9, 3e-8];
 /// Number of motions of contact nodes whose dense matrix costs no more than the factorisation.
 const MAX_CONDENSED_MOTIONS: usize = 4_000;
 
@@ -234,7 +239,18 @@ impl ProblemSize {
             }
         };
         match preconditioner {
-            Preconditioner::Auto | Preconditioner::Cholesky => self.factor(self.factor_precision()),
+            Preconditioner::Auto | Preconditioner::Cholesky => {
+                let Cost { memory, set_up, step } = self.factor(self.factor_precision());
+                let motions = if self.is_condensed() { self.motions as f64 } else { 0.0 };
+                let friction = usize::from(self.friction);
+                let factors = DENSE_FACTORS[friction] * motions.powi(3);
+                let iterations = DENSE_ITERATIONS[friction] * motions.powi(2);
+                Cost {
+                    memory,
+                    set_up: set_up + DENSE_SET_UP * motions.powi(3),
+                    step: step + factors + iterations,
+                }
+            }
             Preconditioner::Gamg => {
                 let [set_up, cycle] = if self.order == 1 {
                     [self.by_dimension(7e-6, 22e-6), self.by_dimension(100e-9, 180e-9)]
@@ -301,7 +317,7 @@ mod tests {
             [problem.contact_bytes(preconditioner), problem.flow_bytes(preconditioner)]
         };
         assert_eq!(bytes(block, Preconditioner::Gamg), [0.0; 2]);
-        let dense = 44.0 * 1_323.0 * 1_323.0;
+        let dense = 32.0 * 1_323.0 * 1_323.0;
         assert_eq!(bytes(block, Preconditioner::Cholesky), [dense, 0.0]);
         let flowing = ProblemSize { flows: true, ..block };
         let matrix = flowing.matrix_bytes() + flowing.assembly_bytes();

@@ -14,31 +14,49 @@ pub(super) struct ReducedFactor {
     /// The number of free motions of each node.
     free: Vec<usize>,
     factor: LocalCholesky,
+    /// Amounts of the free motions.
     amounts: Vec<f64>,
+    /// A column of `(S + B) Z` from the first motion of its node on.
+    image: Vec<f64>,
 }
 
 /// Largest number of motions of a node.
 const MOST: usize = 3;
 
 impl ReducedFactor {
-    /// For a matrix `S` of the motions of these nodes, given the blocks of the additions `B`, if there are any, and of `P`, node after node
+    /// Memory for the motions of these nodes.
+    pub(super) fn with_capacity(nodes: &[Range<usize>]) -> Self {
+        let size = nodes.last().map_or(0, |last| last.end);
+        Self {
+            bases: Vec::with_capacity(nodes.iter().map(|node| node.len().pow(2)).sum()),
+            free: Vec::with_capacity(nodes.len()),
+            factor: LocalCholesky::with_capacity(size),
+            amounts: Vec::with_capacity(size),
+            image: Vec::with_capacity(size),
+        }
+    }
+
+    /// Takes a matrix `S` of the motions of these nodes, given the blocks of the additions `B`, if there are any, and of `P`, node after node
     /// and row by row.
-    pub(super) fn new(
+    pub(super) fn set(
+        &mut self,
         matrix: &PackedSymmetric,
         nodes: &[Range<usize>],
         [additions, projection]: [&[f64]; 2],
-    ) -> Result<Self> {
+    ) -> Result<()> {
+        let Self { bases, free, factor: reduced, amounts, image } = self;
         let size = nodes.last().map_or(0, |last| last.end);
-        let (mut bases, mut free) = (Vec::with_capacity(projection.len()), Vec::with_capacity(nodes.len()));
+        bases.clear();
+        free.clear();
         let mut first = 0;
         for node in nodes {
-            free.push(append_basis(&projection[first..][..node.len().pow(2)], node.len(), &mut bases));
+            free.push(append_basis(&projection[first..][..node.len().pow(2)], node.len(), bases));
             first += node.len().pow(2);
         }
         let total: usize = free.iter().sum();
-        let mut columns = vec![0.0; total * total];
-        // A column of `(S + B) Z` from the first motion of its node on.
-        let mut image = Vec::with_capacity(size);
+        amounts.clear();
+        amounts.resize(total, 0.0);
+        let columns = reduced.columns_of(total);
         let (mut at, mut base, mut block) = (0, 0, 0);
         for (number, node) in nodes.iter().enumerate() {
             let count = node.len();
@@ -75,17 +93,16 @@ impl ReducedFactor {
             base += free[number] * count;
             block += count * count;
         }
-        let factor = LocalCholesky::new(total, columns).ok_or_else(|| {
+        reduced.factor().ok_or_else(|| {
             Error::Failed(
                 "the matrix of the motions that contact leaves free is not positive definite".into(),
             )
-        })?;
-        Ok(Self { bases, free, factor, amounts: vec![0.0; total] })
+        })
     }
 
     /// Replaces forces along the motions of these nodes by velocities.
     pub(super) fn solve(&mut self, nodes: &[Range<usize>], values: &mut [f64]) {
-        let Self { bases, free, factor, amounts } = self;
+        let Self { bases, free, factor, amounts, .. } = self;
         let vectors = || {
             let mut rest = &bases[..];
             nodes.iter().zip(&*free).flat_map(move |(node, &free)| {
@@ -172,8 +189,9 @@ mod tests {
         let positive = [2.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 3.0];
         let additions = [&positive[..], &[7.0], &[1.0, 0.0, 0.0, 2.0], &positive, &positive, &[5.0]].concat();
         let full = matrix.full();
+        let mut factor = ReducedFactor::with_capacity(&nodes);
         for additions in [&[][..], &additions] {
-            let mut factor = ReducedFactor::new(&matrix, &nodes, [additions, &projection]).unwrap();
+            factor.set(&matrix, &nodes, [additions, &projection]).unwrap();
             assert_eq!(factor.free, [2, 0, 0, 1, 1, 2, 1]);
             let forces: Vec<f64> = (0..size).map(|i| (i % 5) as f64 - 1.5).collect();
             let mut velocity = forces.clone();
