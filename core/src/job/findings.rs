@@ -179,8 +179,11 @@ impl<'a> Table<'a> {
             let message = format!(
                 "\"{name}\" has facets inside the body, for example around {place}: no table can act there"
             );
-            // Meshes that are read as a whole have been split there.
-            let help = if key.starts_with("on") && self.path(key).starts_with("contact") {
+            // Meshes that are read as a whole have been split there, unless a contact has another side as well.
+            let is_contact = self.path(key).starts_with("contact");
+            let help = if is_contact && self.has("against") {
+                "a fault is split where `on` names it alone, and its two sides meet: leave out `against`"
+            } else if is_contact && key.starts_with("on") {
                 "a partitioned mesh is not split along faults: name the file of which it was made in [mesh] file"
             } else {
                 "name a boundary, or take the facets with a cell on both sides out of this physical group"

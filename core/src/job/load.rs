@@ -16,7 +16,7 @@ use super::source::{Node, parse};
 use super::validate::{self, Checked};
 use super::written::Written;
 use super::{Job, MeshSource, set, surfaces, tables};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, regular_file};
 
 /// Largest size of a file in bytes.
 const LARGEST: usize = 1 << 20;
@@ -322,7 +322,7 @@ pub fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
         _ => Error::unreadable(path, error),
     };
     let read = |file: File| file.take(LARGEST as u64 + 1).read_to_end(&mut bytes);
-    File::open(path).and_then(read).map_err(unreadable)?;
+    regular_file(path).and_then(|_| File::open(path)).and_then(read).map_err(unreadable)?;
     let extension = path.extension().is_some_and(|extension| extension != "toml");
     let by_name = if extension { by_extension(path) } else { None };
     if let Some(what) = other_file(&bytes).or(by_name) {

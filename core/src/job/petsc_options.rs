@@ -27,6 +27,9 @@ const WRITERS: [&str; 12] = [
     "vtk",
 ];
 
+/// Options that print, or write a file if their value names one; so do those that begin with `malloc`.
+const PRINTERS: [&str; 6] = ["citations", "info", "log_mpe", "log_summary", "log_trace", "memory_view"];
+
 /// What an option does beyond the run, if it does something.
 pub(super) fn reaches_beyond_the_run(name: &str, value: &str) -> Option<String> {
     let (name, value) = (name.to_ascii_lowercase(), value.trim());
@@ -40,7 +43,10 @@ pub(super) fn reaches_beyond_the_run(name: &str, value: &str) -> Option<String> 
     if FILES.iter().any(|part| name.contains(part)) {
         return Some("names a file".into());
     }
-    if matches!(name.as_str(), "info" | "log_trace" | "log_mpe") {
+    if value.contains('/') {
+        return Some(format!("names a file: {value}"));
+    }
+    if PRINTERS.contains(&name.as_str()) || name.starts_with("malloc") {
         let file = if name == "info" { value.split(':').next().unwrap_or_default() } else { value };
         let prints =
             matches!(file.to_ascii_lowercase().as_str(), "" | "true" | "yes" | "1" | "false" | "no" | "0");
@@ -83,6 +89,11 @@ mod tests {
             ("viewer_binary_filename", "b"),
             ("on_error_attach_debugger", "gdb"),
             ("mat_mumps_ooc_tmpdir", "/etc"),
+            ("log_summary", "times"),
+            ("malloc_view", "memory"),
+            ("malloc_dump", "memory"),
+            ("citations", "papers.bib"),
+            ("a_later_option", "/etc/passwd"),
         ] {
             assert!(reaches_beyond_the_run(name, value).is_some(), "{name} = {value:?}");
         }
@@ -98,6 +109,8 @@ mod tests {
             ("log_view", ""),
             ("info", ""),
             ("info", ":ksp,pc"),
+            ("malloc_debug", "true"),
+            ("citations", ""),
             ("ksp_type", "cg"),
             ("pc_gamg_threshold", "0.01,0.02"),
             ("mat_mumps_icntl_14", "50"),

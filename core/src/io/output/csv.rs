@@ -3,6 +3,7 @@
 //! Text such as the name of a boundary is quoted where it contains separators. Spreadsheets execute text that begins with one of
 //! `= + - @`; such text has an apostrophe before it in the file, which [`records`] removes.
 
+use super::checkpoint_folder::list;
 use crate::error::{Error, Result};
 use crate::parallel::agreement::pass;
 use crate::solver::stepping::without_rounding;
@@ -89,7 +90,20 @@ impl CsvFile {
     /// header is renamed and kept.
     fn resume(path: &Path, header: &str, last: f64) -> Result<Self> {
         pass()?;
-        let Ok(old) = File::open(path) else { return Self::create(path, header) };
+        let old = match File::open(path) {
+            Ok(old) => old,
+            Err(error) => {
+                // A run that is continued in another folder begins its tables there.
+                let was_here =
+                    path.parent().is_some_and(|folder| list(folder).is_ok_and(|all| !all.is_empty()));
+                let mut new = Self::create(path, header)?;
+                if error.kind() == ErrorKind::NotFound && was_here {
+                    new.faults
+                        .push("it was not there: it has no rows of the steps before this restart".into());
+                }
+                return Ok(new);
+            }
+        };
         let reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(old);
         let mut rows = reader.into_byte_records();
         let columns = header.split(',').count();
@@ -100,10 +114,8 @@ impl CsvFile {
             let aside = path.with_extension("before.csv");
             std::fs::rename(path, &aside).map_err(|e| Error::unwritable(&aside, e))?;
             let mut new = Self::create(path, header)?;
-            new.faults.push(format!(
-                "it has other columns than before; the rows so far are kept in {}",
-                aside.display()
-            ));
+            let kept = format!("what it had so far is kept in {}", aside.display());
+            new.faults.push(format!("its first line did not name the columns of this run: {kept}"));
             return Ok(new);
         }
         let part = path.with_extension("csv.part");
@@ -112,12 +124,20 @@ impl CsvFile {
         writeln!(kept, "{header}").map_err(|e| unwritable(&e))?;
         let mut kept = Writer::from_writer(kept);
         let mut faults = Faults { by_step: header.starts_with("step,"), ..Faults::default() };
+        let is_name: Vec<bool> = header.split(',').map(|column| NAMES.contains(&column)).collect();
+        let fits = |row: &StringRecord| {
+            row.len() == columns
+                && row
+                    .iter()
+                    .zip(&is_name)
+                    .all(|(cell, is_name)| *is_name || cell.is_empty() || cell.parse::<f64>().is_ok())
+        };
         for row in rows {
             let row = row.map_err(|error| Error::unreadable(path, error))?;
             let line = row.position().map_or(0, csv::Position::line);
             let row = StringRecord::from_byte_record(row).ok();
             let first = row.as_ref().and_then(|row| row.get(0)?.parse::<f64>().ok());
-            match (row.filter(|row| row.len() == columns), first) {
+            match (row.filter(fits), first) {
                 (Some(_), Some(first)) if first > last => faults.ended = true,
                 (Some(row), Some(first)) if first <= last => {
                     faults.row(first);
@@ -164,6 +184,9 @@ impl CsvFile {
     }
 }
 
+/// The columns that hold names; all others hold numbers, or are empty.
+const NAMES: [&str; 3] = ["probe", "profile", "source"];
+
 /// What a table lacks before the row after which it is continued.
 #[derive(Debug, Default)]
 struct Faults {
@@ -173,7 +196,7 @@ struct Faults {
     at: Option<f64>,
     /// The first steps that are missing: the rows before and after them.
     gap: Option<[f64; 2]>,
-    /// Rows that are not text or have too few or too many columns: the line of the first, and their number.
+    /// Rows that are not text, have too few or too many columns or a word for a number: the line of the first, and their number.
     damaged: Option<(u64, usize)>,
     /// The same without those at the end of the file, where a run that was killed leaves an incomplete row.
     damaged_inside: Option<(u64, usize)>,
@@ -277,7 +300,19 @@ mod tests {
         table.flush().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "step,time\n");
         assert_eq!(std::fs::read_to_string(folder.path().join("probes.before.csv")).unwrap(), "a,b\n1,2\n");
-        assert!(table.faults().all(|fault| fault.contains("other columns")) && table.faults().count() == 1);
+        assert!(table.faults().all(|fault| fault.contains("did not name the columns")));
+        assert_eq!(table.faults().count(), 1);
+    }
+
+    #[test]
+    fn a_table_that_is_gone_is_told_where_the_run_was_before() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("history.csv");
+        let faults = || CsvFile::resume(&path, "step,time", 2.0).unwrap().faults().count();
+        assert_eq!(faults(), 0, "a run that is continued in another folder");
+        std::fs::remove_file(&path).unwrap();
+        std::fs::write(folder.path().join("checkpoint-2.h5"), "").unwrap();
+        assert_eq!(faults(), 1);
     }
 
     #[test]
@@ -296,6 +331,8 @@ mod tests {
         let damaged = told(b"step,time\n1,1\n2,\xff\xfe\n3,3\n", 3.0);
         assert!(damaged.contains("1 damaged rows, the first in line 3"), "{damaged}");
         assert!(damaged.contains("the steps 2 to 2 are missing"), "{damaged}");
+        let words = told(b"step,time\n1,1\n2,abc\n3,\n", 3.0);
+        assert!(words.contains("1 damaged rows, the first in line 3"), "{words}");
     }
 
     #[test]
