@@ -529,7 +529,13 @@ mod tests {
                 let Some(found) = shape.triangles().and_then(|s| s.along(&place, &direction, 2.5e-7)) else { continue };
                 clear += 1;
                 let Search { length: wanted, .. } = shape.search(&place, &direction, [2.0, 0.0]);
-                prop_assert!(found == wanted || (found - wanted).abs() < 1e-11, "{} for {}", found, wanted);
+                // The search may step over an edge that the ray grazes.
+                let is_first = found.abs() <= wanted.abs() + 1e-11 && (found < 0.0) == (wanted < 0.0);
+                prop_assert!(is_first, "{} for {}", found, wanted);
+                if found.is_finite() {
+                    let there = shape.distance_at(&add_scaled(&place, found, &direction));
+                    prop_assert!(there.abs() < 1e-11, "{} off the surface", there);
+                }
             }
             prop_assert!(clear >= 3, "only {} of eight are clear", clear);
         }
