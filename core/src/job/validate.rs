@@ -229,7 +229,8 @@ impl Walk<'_> {
             Fault::new(child.key.clone(), format!("unknown key `{key}` {place}"), "not a key here");
         if let Some(near) = near {
             fault = fault.help(format!("did you mean `{near}`?"));
-        } else if let Some(place) = describe::place_of(self.kind, key) {
+        }
+        if let Some(place) = describe::place_of(self.kind, key) {
             fault = fault.help(format!("`{key}` is {place}"));
         }
         self.checked.faults.push(fault.help(format!("allowed: {}", list(known))));
