@@ -389,6 +389,60 @@ fn an_obstacle_that_comes_and_goes_within_a_step_fails() {
 }
 
 #[test]
+fn an_obstacle_that_runs_along_the_boundary_and_past_it_within_a_step_fails() {
+    // 20 mm deep along the whole boundary, and 0.2 m beside it at the ends of the step.
+    for shape in ["sphere = {radius = 0.05", "shape = {distance = 'sqrt(x^2 + y^2) - 0.05'"] {
+        for (ranks, sliding) in [(1, "small"), (2, "finite")] {
+            let past = |way: &str| {
+                under(&format!("{{{shape}, centre = ['-0.2 + {way}', 0.53]}}}}"))
+                    .set("contact.0.sliding", &format!("'{sliding}'"))
+                    .set("time", "{end = 0.05, step = 0.025, scheme = 'implicit_euler'}")
+            };
+            past("96*t").run_with(ranks, &["--force"]).expect(1).says("comes and goes within the step");
+            past("t").run_with(ranks, &["--force"]).expect(0);
+        }
+    }
+}
+
+#[test]
+fn a_gap_that_closes_and_opens_within_a_step_fails() {
+    let gap = "gap = '0.01 - 0.03*sin(pi*t/0.02)'";
+    let blocks = "[{name = 'lower', size = [1.0, 0.2], cells = [6, 2]}, \
+                   {name = 'upper', corner = [0.3, 0.2], size = [0.3, 0.1], cells = [3, 1]}]";
+    let block = "{size = [1.0, 0.2], cells = [6, 2]}";
+    for (law, mesh, faces, ranks) in [
+        ("unilateral = {", block, "on = ['top']", 1),
+        ("compliance = {stiffness = 1e6, ", block, "on = ['top']", 2),
+        ("unilateral = {", blocks, "on = ['lower.top'], against = ['upper.bottom']", 2),
+    ] {
+        let held = if mesh == block { "['bottom']" } else { "['lower.bottom', 'upper.top']" };
+        let run = |time: &str| {
+            Case::written_as(
+                "material = {hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}}",
+            )
+            .set("mesh.rectangle", mesh)
+            .set("support", &format!("[{{on = {held}, fix = 'all'}}]"))
+            .set("contact", &format!("[{{{faces}, normal.{law}{gap}}}}}]"))
+            .set("time", &format!("{{end = 0.04, scheme = 'implicit_euler', {time}}}"))
+        };
+        run("step = 0.02")
+            .run_with(ranks, &[])
+            .expect(1)
+            .says("contact.0: the step to t = 2.000000e-2 s")
+            .says("closes and opens within the step")
+            .says("take a smaller [time] step");
+        // The remedy, and steps that the solver controls.
+        let adaptive = "adaptive = {tolerance = 0.02, smallest_step = 1e-6, largest_step = 0.02}";
+        for time in ["step = 0.002", &format!("step = 0.02, {adaptive}")] {
+            let case = run(time);
+            case.run_with(ranks, &[]).expect(0);
+            let energy = case.results().table("history.csv").numbers("elastic_energy");
+            assert!(energy.iter().any(|energy| *energy > 1e-6), "{mesh}, {time}");
+        }
+    }
+}
+
+#[test]
 fn a_contact_that_never_touched_is_warned_of_after_the_last_step() {
     let words = "contact.0: the boundary top never touched its obstacle";
     let plane = |height: &str| format!("{{plane = {{point = [0, '{height}'], normal = [0, -1]}}}}");

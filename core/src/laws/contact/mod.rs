@@ -33,7 +33,7 @@ pub use memory::Memory;
 pub use normal_law::{NodeContext, NormalParameters, Resolved, Response};
 pub use obstacle_load::ObstacleLoad;
 pub use obstacle_motion::{ObstacleMotion, Rate};
-pub use obstacle_sweep::Sweep;
+pub use obstacle_sweep::{GivenGap, Sweep};
 pub use obstacles::{Gap, Plane, Shape, Sphere};
 pub use polyline::Polyline;
 pub use steepness::{Decrease, LawsOfContact};

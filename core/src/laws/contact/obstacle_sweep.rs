@@ -6,15 +6,19 @@
 //! that faces the same way as the boundary: then the obstacle is on the body's side. Where the point leaves through any other surface,
 //! the obstacle was lifted, or has moved sideways.
 //!
-//! The prescribed motion of an obstacle is known at all times. Where it is not uniform within a step, the depth of the point is taken at
-//! [`SAMPLES`] times inside of the step, too. The obstacle has come and gone if the point is outside of it at both ends and inside at one
-//! of these times, deeper than in the obstacle at rest, and than the depths at the ends of this step and of its neighbours differ from each
-//! other: then the steps do not resolve the motion. An obstacle that jumps as the step begins takes a point with it that it touches at the end: its depth right after the jump, less and less
-//! until the end of the step, is none of these depths. A motion that they resolve may touch between their ends, with an error that is that of the scheme.
+//! The prescribed motion of an obstacle is known at all times, as is a gap given by a formula. Where it is not uniform within a step, the
+//! depth of the point is taken at [`SAMPLES`] times inside of the step, too, and where the obstacle moves far between them, so that it may
+//! be deeper there, at times between those. The obstacle has come and gone if the point is outside of it at both ends and inside at one
+//! of these times, unless it came through a surface that faces the same way as the boundary, or the steps resolve the motion: the depths at
+//! the ends of the step and of a neighbour show this depth, up to a share of their differences. A motion that they resolve may touch between
+//! their ends, with an error that is that of the scheme. A point that touches at an end is not missed there; it must be deeper than in the
+//! obstacle at rest, and than these depths differ. An obstacle that jumps as the step begins takes a point with it that it touches at the
+//! end: its depth right after the jump, less and less until the end of the step, is none of these depths.
 
 use super::obstacles::Gap;
 use crate::{
     error::Result,
+    laws::expression::Scalar,
     linear_algebra::tensor::{Vector, add_scaled, larger, norm},
 };
 
@@ -22,9 +26,17 @@ use crate::{
 const BEHIND: f64 = 0.05;
 /// Lengths of this share of the way or of the coordinates are rounding.
 const ROUNDING: f64 = 1e-9;
-/// Times inside of a step at which the prescribed motion of an obstacle is looked at. Obstacles that come and go in less than a 32nd of a
-/// step may be missed.
+/// Times inside of a step at which a prescribed motion is looked at. Gaps and planes that come and go in less than a 32nd of a step may be
+/// missed.
 const SAMPLES: usize = 31;
+/// How often the time between two of them is halved where an obstacle moves far.
+const MOST_HALVINGS: usize = 4;
+/// How often the time before that at which a point is inside is halved to find when it enters.
+const HALVINGS_TO_ENTRY: usize = 30;
+/// The way of the obstacle between two times from which on it is far, as a share of the spacing of the points.
+const FAR: f64 = 0.25;
+/// The share of the differences of depths at the ends of steps up to which they show the depth between them: four steps in a period do.
+const RESOLVED: f64 = 0.1;
 /// Share of a step within which an obstacle that has moved to a point has jumped there.
 const EARLY: f64 = 0.01;
 /// The half-width for derivatives of the distance, as a share of the coordinates.
@@ -37,10 +49,12 @@ pub struct Sweep<const D: usize> {
     pub times: [f64; 2],
     /// Places at these times in m, without what a force has moved the obstacle.
     pub places: [Vector<D>; 2],
-    /// Outward unit normal of the boundary.
+    /// The unit normal along which the boundary sees the obstacle at the end.
     pub normal: Vector<D>,
-    /// Size of the body in m, through which an obstacle passes that jumps farther.
-    pub body_size: f64,
+    /// Its outward unit normal, which differs on edges and where it slides along the obstacle.
+    pub outward: Vector<D>,
+    /// Size of the body in m, through which an obstacle passes that jumps farther, and the distance to the next points.
+    pub sizes: [f64; 2],
     /// Whether the gap is finite at the start and infinite at the end.
     pub loses_obstacle: bool,
 }
@@ -84,54 +98,197 @@ impl Gap {
     /// Whether the prescribed motion takes the obstacle to a point and away again, unseen at the ends of the step, at the second of which
     /// the point has this depth in m, and of its neighbours.
     fn comes_and_goes<const D: usize>(&self, sweep: &Sweep<D>, depth_at_end: f64) -> bool {
-        let Sweep { times: [start, end], places: [before, after], .. } = sweep;
+        let Sweep { times: [start, end], places: [before, after], sizes: [body_size, spacing], .. } = *sweep;
         if !self.is_driven() {
             return false;
         }
+        let length = end - start;
         let place = |share: f64| std::array::from_fn(|i| before[i] + share * (after[i] - before[i]));
         let depth_at =
             |time: f64, share: f64| self.depth::<D>(time, &place(share)).unwrap_or(f64::NEG_INFINITY);
-        let ends = [depth_at(*start, 0.0), depth_at_end];
+        let ends = [depth_at(start, 0.0), depth_at_end];
         // Coordinates of one point may all be zero.
-        let centres: [Vector<D>; 2] = [*start, *end].map(|time| self.centre(time));
-        let places = [before, after].into_iter().chain(&centres).flatten();
-        let rounding = ROUNDING * places.fold(sweep.body_size, |most, x| larger(most, x.abs()));
+        let centres: [Vector<D>; 2] = [start, end].map(|time| self.centre(time));
+        let places = [before, after].into_iter().chain(centres).flatten();
+        let rounding = ROUNDING * places.fold(body_size, |most, x| larger(most, x.abs()));
+        // Without a turn, depths change by at most the way of the point as seen from the obstacle: most points stay outside.
+        let offset = |share: f64| add_scaled(&place(share), -1.0, &self.centre(start + share * length));
+        let way = |from: &Vector<D>, to: f64| norm(&add_scaled(&offset(to), -1.0, from));
+        let (has_other_side, at_start) = (self.has_other_side(), offset(0.0));
+        Course {
+            depth: &|share| {
+                let most = if has_other_side { ends[0] + way(&at_start, share) } else { f64::INFINITY };
+                if most <= 0.0 { most } else { depth_at(start + share * length, share) }
+            },
+            way: &|[from, to]| if has_other_side { way(&offset(from), to) } else { 0.0 },
+            ends,
+            around: &|on| [depth_at(start - length, -on), depth_at(end + length, 1.0 + on)],
+            // The straight way between two places at a round obstacle lies inside of it even where it rests, wherever it is in the step.
+            at_rest: &|| {
+                let at = |time: f64| inner_times().map(|share| depth_at(time, share)).fold(0.0, f64::max);
+                at(start).min(at(end))
+            },
+            is_in_front: &|share| {
+                let at = offset(share).iter().fold(0.0, |most, x| larger(most, x.abs()));
+                let depth = |along: f64| {
+                    let place = add_scaled(&place(share), along, &sweep.outward);
+                    self.depth::<D>(start + share * length, &place).unwrap_or_default()
+                };
+                let width = WIDTH * at;
+                depth(width) - depth(-width) > -2.0 * BEHIND * width
+            },
+            rounding,
+            sizes: [body_size, spacing],
+        }
+        .comes_and_goes()
+    }
+}
+
+/// A point in a step whose gap is given by a formula.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GivenGap<const D: usize> {
+    /// Start and end of the step in s.
+    pub times: [f64; 2],
+    /// Where the formula is evaluated, in m.
+    pub place: Vector<D>,
+    /// The value of the formula in m at which the gap of the point is closed, at these times.
+    pub closed: [f64; 2],
+    /// Size of the body in m.
+    pub body_size: f64,
+}
+
+impl<const D: usize> GivenGap<D> {
+    /// Whether the gap of the point closes and opens again within the step, unseen at the ends of the step and of its neighbours.
+    pub fn comes_and_goes(&self, gap: &Scalar) -> bool {
+        let Self { times: [start, end], place, closed: [before, after], body_size } = self;
+        let least = || gap.enclose_during(self.times, place).low;
+        if !gap.depends_on_time() || least() > larger(*before, *after) {
+            return false;
+        }
+        let length = end - start;
+        let depth_at = |time: f64, share: f64| {
+            let depth = before + share * (after - before) - gap.evaluate(time, place);
+            if depth.is_nan() { f64::NEG_INFINITY } else { depth }
+        };
+        Course {
+            depth: &|share| depth_at(start + share * length, share),
+            way: &|_| 0.0,
+            ends: [depth_at(*start, 0.0), depth_at(*end, 1.0)],
+            around: &|on| [depth_at(start - length, -on), depth_at(end + length, 1.0 + on)],
+            at_rest: &|| 0.0,
+            is_in_front: &|_| true,
+            rounding: ROUNDING * larger(*body_size, larger(before.abs(), after.abs())),
+            sizes: [*body_size, f64::INFINITY],
+        }
+        .comes_and_goes()
+    }
+}
+
+/// The shares of a step that have passed at the times inside of it.
+fn inner_times() -> impl Iterator<Item = f64> {
+    (1..=SAMPLES).map(|at| at as f64 / (SAMPLES + 1) as f64)
+}
+
+/// The depth of a point in a step, in m, as a function of the share of the step that has passed.
+struct Course<'a> {
+    /// Inside of the step; where it is negative an upper bound suffices.
+    depth: &'a dyn Fn(f64) -> f64,
+    /// By how much it may change in between.
+    way: &'a dyn Fn([f64; 2]) -> f64,
+    ends: [f64; 2],
+    /// At the start of the step before and at the end of the step after, as if both were as long, where the point went on by this share.
+    around: &'a dyn Fn(f64) -> [f64; 2],
+    /// Largest depth on the way of the point if the obstacle rests.
+    at_rest: &'a dyn Fn() -> f64,
+    /// Whether the surface that the point meets there is not one behind it, through which the obstacle leaves the body's side.
+    is_in_front: &'a dyn Fn(f64) -> bool,
+    /// Depths that are rounding.
+    rounding: f64,
+    /// As those of a sweep.
+    sizes: [f64; 2],
+}
+
+impl Course<'_> {
+    fn comes_and_goes(&self) -> bool {
+        let Self { ends, rounding, .. } = *self;
         if ends.iter().any(|end| *end > rounding) {
             return false;
         }
-        // Without a turn, depths change by at most the way of the point as seen from the obstacle: most points stay outside.
-        let offset =
-            |share: f64| add_scaled(&place(share), -1.0, &self.centre(start + share * (end - start)));
-        let at_start = offset(0.0);
-        let depth = |share: f64| {
-            let way = || norm(&add_scaled(&offset(share), -1.0, &at_start));
-            let stays_outside = self.has_other_side() && ends[0] + way() <= 0.0;
-            if stays_outside { ends[0] } else { depth_at(start + share * (end - start), share) }
-        };
-        // An obstacle that jumps as the step begins takes a point with it that it touches at the end.
-        let jump = depth(EARLY) / (1.0 - EARLY);
-        let takes_along = ends[1] >= -rounding && jump < sweep.body_size;
-        let jump = if takes_along { jump.max(0.0) } else { 0.0 };
-        let inside = (1..=SAMPLES).map(|at| at as f64 / (SAMPLES + 1) as f64);
-        let depths = inside.clone().map(|share| depth(share) - (1.0 - share) * jump);
-        let deepest = depths.fold(f64::NEG_INFINITY, f64::max);
+        let touches = ends.iter().any(|end| *end >= -rounding);
+        let [share, deepest] = self.deepest(touches);
         if deepest <= rounding {
             return false;
         }
-        // The straight way between two places at a round obstacle lies inside of it even where it rests, wherever it is in the step.
-        let at_rest = |time: f64| inside.clone().map(|share| depth_at(time, share)).fold(0.0, f64::max);
-        let at_rest = at_rest(*start).min(at_rest(*end));
-        // The place of the point in the neighbouring steps is not known; that of the obstacle is. A depth that is no number is ignored.
-        let length = end - start;
-        let around = [
-            self.depth(start - length, before).unwrap_or(f64::NAN),
-            self.depth(end + length, after).unwrap_or(f64::NAN),
-        ];
-        let known = ends.into_iter().chain(around);
-        let [least, most] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], depth| {
-            [least.min(depth), most.max(depth)]
-        });
-        deepest > rounding + (most - least) + at_rest
+        // How the point goes on after it has touched is not known.
+        let around = (self.around)(if touches { 0.0 } else { 1.0 });
+        let beyond = deepest - rounding - (self.at_rest)();
+        // A depth that is no number is ignored.
+        let spread = |depths: &[f64]| {
+            let most = depths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            most - depths.iter().copied().fold(f64::INFINITY, f64::min)
+        };
+        if touches {
+            return beyond > spread(&[around[0], ends[0], ends[1], around[1]]);
+        }
+        // Where one neighbour has a jump, the other one shows the course.
+        let sides = [([around[0], ends[0], ends[1]], share), ([around[1], ends[1], ends[0]], 1.0 - share)];
+        let known = sides.iter().filter(|(depths, _)| depths.iter().all(|depth| depth.is_finite()));
+        let least = known.clone().map(|(depths, _)| spread(depths)).fold(f64::INFINITY, f64::min);
+        let error = |([a, b, c], s): &([f64; 3], f64)| {
+            let shown = 0.5 * s * (s - 1.0) * a + (1.0 - s * s) * b + 0.5 * s * (s + 1.0) * c;
+            (beyond - shown).max(shown - deepest)
+        };
+        !known.map(error).any(|error| error <= RESOLVED * least) && (self.is_in_front)(self.entry(share))
+    }
+
+    /// A time at which the point enters the obstacle before it is inside at this one.
+    fn entry(&self, inside: f64) -> f64 {
+        let [mut before, mut after] = [0.0, inside];
+        for _ in 0..HALVINGS_TO_ENTRY {
+            let middle = 0.5 * (before + after);
+            if (self.depth)(middle) > 0.0 {
+                after = middle;
+            } else {
+                before = middle;
+            }
+        }
+        after
+    }
+
+    /// The largest depth inside of the step and its time, without that of a jump at its start.
+    fn deepest(&self, touches: bool) -> [f64; 2] {
+        let Self { ends, rounding, sizes: [body_size, _], .. } = *self;
+        let jump = if ends[1] >= -rounding { (self.depth)(EARLY) / (1.0 - EARLY) } else { 0.0 };
+        let jump = if jump < body_size { jump.max(0.0) } else { 0.0 };
+        let (mut best, mut last) = ([0.0, f64::NEG_INFINITY], [0.0, ends[0]]);
+        for share in inner_times() {
+            let next = [share, (self.depth)(share) - (1.0 - share) * jump];
+            if !touches {
+                best = self.deeper([last, next], best, MOST_HALVINGS);
+            }
+            if next[1] > best[1] {
+                best = next;
+            }
+            last = next;
+        }
+        if touches { best } else { self.deeper([last, [1.0, ends[1]]], best, MOST_HALVINGS) }
+    }
+
+    /// The deepest of this time and those between two times where the obstacle moves far and may be deeper.
+    fn deeper(&self, [from, to]: [[f64; 2]; 2], mut best: [f64; 2], halvings: usize) -> [f64; 2] {
+        let way = (self.way)([from[0], to[0]]);
+        let may_be = 0.5 * (from[1] + to[1] + way) > larger(best[1], self.rounding);
+        let is_far = way > FAR * self.sizes[1];
+        if halvings == 0 || !may_be || !is_far {
+            return best;
+        }
+        let share = 0.5 * (from[0] + to[0]);
+        let middle = [share, (self.depth)(share)];
+        if middle[1] > best[1] {
+            best = middle;
+        }
+        let best = self.deeper([from, middle], best, halvings - 1);
+        self.deeper([middle, to], best, halvings - 1)
     }
 }
 
@@ -163,8 +320,15 @@ mod tests {
         let [before, after] =
             [0, 1].map(|i| gap.of_moved(i as f64, &places[0], &DOWN, places[0][1] - places[i][1]));
         let loses_obstacle = before.unwrap().is_finite() && after.unwrap() == f64::INFINITY;
-        gap.passes(&Sweep { times: [0.0, 1.0], places, normal: DOWN, body_size: 1.0, loses_obstacle })
-            .unwrap()
+        gap.passes(&Sweep {
+            times: [0.0, 1.0],
+            places,
+            normal: DOWN,
+            outward: DOWN,
+            sizes: [1.0, 0.1],
+            loses_obstacle,
+        })
+        .unwrap()
     }
 
     #[test]
@@ -184,7 +348,20 @@ mod tests {
             assert!(!passes(&disc, rest(0.0)), "lifted: {disc:?}");
         }
         for disc in discs(0.2, [-1.0, -0.15], [3.0, 0.0]) {
-            assert!(!passes(&disc, rest(0.0)), "it rolls past: {disc:?}");
+            assert!(passes(&disc, rest(0.0)), "it runs past, 0.05 m deep: {disc:?}");
+            assert!(!passes(&disc, [[0.0, 0.1]; 2]), "it runs past below: {disc:?}");
+        }
+        for disc in discs(0.2, [-1.0, -0.2], [3.0, 0.0]) {
+            assert!(!passes(&disc, rest(0.0)), "it runs past and touches: {disc:?}");
+        }
+        for disc in discs(0.02, [-1.0, -0.01], [3.0, 0.0]) {
+            assert!(passes(&disc, rest(-0.015)), "for a 90th of the step: {disc:?}");
+        }
+        for disc in discs(0.2, [-0.025, -0.1995], [0.05, 0.0]) {
+            assert!(
+                !passes(&disc, rest(0.0)),
+                "steps that resolve its motion touch between their ends: {disc:?}"
+            );
         }
         for disc in discs(0.2, [0.0, 0.5], [0.0, -2.0]) {
             assert!(!passes(&disc, rest(0.0)), "back to the right side: {disc:?}");
@@ -278,5 +455,33 @@ mod tests {
         }
         let given = Gap::Distance(expression("1/t"));
         assert_eq!(given.of_moved(0.0, &[0.0, 0.0], &DOWN, -1.0).unwrap(), f64::INFINITY);
+    }
+    #[test]
+    fn a_given_gap_that_closes_and_opens_within_a_step_is_missed() {
+        let closes = |gap: &str, closed: [f64; 2]| {
+            let point = GivenGap { times: [0.0, 1.0], place: [0.5, 0.0], closed, body_size: 1.0 };
+            point.comes_and_goes(&expression(gap))
+        };
+        assert!(closes("0.01 - 0.03*sin(pi*t)", [0.0; 2]), "20 mm deep, open by 10 mm at the ends");
+        assert!(closes("0.01 - 0.03*sin(pi*t) + step(t - 1.5)", [0.0; 2]), "a jump in the step after it");
+        assert!(
+            closes("0.01 - 0.06*x*exp(-(20*(t - 0.43))^2)", [0.0; 2]),
+            "20 mm deep for a tenth of the step"
+        );
+        assert!(!closes("0.01 - 0.03*sin(pi*t)", [-0.03; 2]), "the point is out of its reach");
+        assert!(!closes("0.01 - 0.03*sin(pi*t/2)", [0.0; 2]), "it is closed at the end, which shows this");
+        assert!(!closes("0.01 - 0.03*sin(pi*t)", [-0.02, 0.02]), "the point goes inside");
+        assert!(
+            !closes("-0.001 + 0.01*(2*t - 1)^2", [0.0; 2]),
+            "steps that resolve its motion touch between their ends"
+        );
+        assert!(!closes("0.001 - 0.01*cos(pi*(t - 0.5)/2)", [-0.0085; 2]), "four steps in a period");
+        assert!(
+            closes("0.001 - 0.01*cos(pi*(t - 0.5)/1.2)", [-0.0085; 2]),
+            "less than three steps in a period"
+        );
+        assert!(
+            !closes("0.01 - x", [0.4; 2]) && !closes("1/t", [0.0; 2]) && !closes("sqrt(t - 2)", [0.0; 2])
+        );
     }
 }

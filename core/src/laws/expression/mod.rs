@@ -62,6 +62,18 @@ impl Scalar {
         }
     }
 
+    /// Contains its values at `point` between two times.
+    pub fn enclose_during(&self, [start, end]: [f64; 2], point: &[f64]) -> Interval {
+        match self {
+            Self::Number(number) => Interval::from(*number),
+            Self::Expression(expression) => {
+                let mut ranges = arguments(start, point).map(Interval::from);
+                ranges[Variable::T as usize] = Interval::new(start, end);
+                expression.program.enclose(&ranges, Variable::T).value
+            }
+        }
+    }
+
     /// Whether it contains t.
     pub fn depends_on_time(&self) -> bool {
         self.uses(Variable::T)

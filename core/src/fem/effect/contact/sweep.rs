@@ -10,7 +10,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{effect::Step, pairs::PairedNode, space::Held},
-    laws::contact::{Gap, Sweep},
+    laws::contact::{Gap, GivenGap, Sweep},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     parallel::session::Session,
 };
@@ -111,7 +111,12 @@ impl<const D: usize> Contact<D> {
     /// Fails where the obstacle has passed a point in the step just solved, from displacements at its start and velocities at its end
     /// (with ghosts), and where it is beyond points that should have stopped it.
     pub fn refuse_passage(&self, step: Step, displacement: &[f64], velocity: &[f64]) -> Result<()> {
-        if !self.normal.law.depends_on_displacement() || matches!(self.obstacle.gap, Gap::Distance(_)) {
+        let given = match &self.obstacle.gap {
+            Gap::Distance(gap) if !gap.depends_on_time() => return Ok(()),
+            Gap::Distance(gap) => Some(gap),
+            _ => None,
+        };
+        if !self.normal.law.depends_on_displacement() {
             return Ok(());
         }
         let times = [step.start(), step.time];
@@ -130,16 +135,32 @@ impl<const D: usize> Contact<D> {
             let [worn, worn_before] = point.worn;
             let along = point.normal_component(Body, displacement);
             let moved = along + point.blend_offset + point.advance(Body, velocity);
+            let moved = [along - worn_before, moved - worn];
+            if let Some(gap) = given.filter(|_| point.carries(&self.normal.law)) {
+                let closed = moved.map(|moved| (moved - point.distance) / point.stretch);
+                let point = GivenGap { times, place: point.place, closed, body_size: self.normal.body_size };
+                if point.comes_and_goes(gap) {
+                    return Err(Error::Failed(format!(
+                        "the step to t = {:.6e} s (length {:.3e} s) failed: its gap at {:?} m closes and opens within the step; take a \
+                         smaller [time] step, which resolves the formula of the gap, or correct the formula",
+                        step.time, step.length, point.place
+                    )));
+                }
+            }
+            if given.is_some() {
+                continue;
+            }
             let [before, after] =
                 [self.obstacle.seen_before(&point.place), self.obstacle.seen_after(&point.place)];
             let sweep = Sweep {
                 times,
                 places: [
-                    add_scaled(&before, along - worn_before, &point.normal),
-                    add_scaled(&after, moved - worn, &point.normal),
+                    add_scaled(&before, moved[0], &point.normal),
+                    add_scaled(&after, moved[1], &point.normal),
                 ],
                 normal: point.normal,
-                body_size: self.normal.body_size,
+                outward: point.edge.as_ref().map_or(point.normal, |edge| edge.whole().0),
+                sizes: [self.normal.body_size, if D == 2 { point.weight } else { point.weight.sqrt() }],
                 loses_obstacle: point.penetration_before > f64::NEG_INFINITY && !point.can_touch(),
             };
             if self.obstacle.gap.passes(&sweep)? {
