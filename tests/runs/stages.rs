@@ -534,6 +534,40 @@ fn sides_that_give_way_beside_a_contact_take_over_no_force_of_the_contact() {
 }
 
 #[test]
+fn ground_at_rest_stays_at_rest_where_an_obstacle_bears_what_a_support_has_held() {
+    let plane = "obstacle.plane = { point = [0, 0], normal = [0, 1] }";
+    let sticks = "normal.unilateral = {}, friction.coulomb.coefficient = 2.0";
+    let below = format!("{plane}, {sticks}");
+    let far = "obstacle.plane = { point = [0, -1e-3], normal = [0, 1] }, normal.unilateral = {}";
+    let soft = "normal.compliance = { stiffness = 1e9 }";
+    let up = "{ acceleration = [0, 9.0] }";
+    let down = "{ acceleration = [0, -9.0] }";
+    for (gravity, scheme, law, is_balanced) in [
+        (down, "implicit_euler", sticks, true),
+        (down, "bdf2", &*below, true),
+        (down, "bdf2", "normal.unilateral = { bound = 'velocity' }, friction.tresca.bound = 1e6", true),
+        (down, "implicit_euler", "normal.unilateral = {}", false),
+        (down, "implicit_euler", "normal.unilateral = {}, friction.coulomb.coefficient = 0.01", false),
+        (down, "implicit_euler", far, false),
+        (down, "implicit_euler", soft, false),
+        (up, "implicit_euler", sticks, false),
+    ] {
+        let first = settled(GROUND, "fix = ['x']")
+            .set("support", "[{ on = ['bottom'], fix = 'all' }]")
+            .set("gravity", gravity)
+            .run_and_keep(2);
+        let second = released(&first, "fix = ['x']", scheme)
+            .without("support")
+            .set("contact", &format!("[{{ on = ['bottom'], {law} }}]"))
+            .set("gravity", gravity);
+        second.run_with(2, &[]).expect(0);
+        assert_eq!(!is_out_of_balance(&second), is_balanced, "{gravity}, {law}");
+        let way = moved(&first, &second);
+        assert_eq!(way < 1e-7 * SETTLEMENT, is_balanced, "{gravity}, {law}: {way:e} m");
+    }
+}
+
+#[test]
 fn a_column_at_rest_in_space_stays_at_rest_when_its_sides_give_way() {
     let column = |sides: &str| {
         Case::cube(3)

@@ -106,10 +106,12 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     state: &State,
     (acceleration, length): (&DistributedVector, f64),
 ) -> Result<Option<String>> {
-    let sum = |field: &DistributedVector, part: &dyn Fn(usize, &Vector<D>) -> Vector<D>| -> Result<f64> {
-        let values = field.owned()?;
+    let sum_of = |values: &[f64], part: &dyn Fn(usize, &Vector<D>) -> Vector<D>| -> f64 {
         let (nodes, _) = values.as_chunks::<D>();
-        Ok(nodes.iter().enumerate().map(|(node, force)| norm(&part(node, force))).sum())
+        nodes.iter().enumerate().map(|(node, force)| norm(&part(node, force))).sum()
+    };
+    let sum = |field: &DistributedVector, part: &dyn Fn(usize, &Vector<D>) -> Vector<D>| -> Result<f64> {
+        Ok(sum_of(&field.owned()?, part))
     };
     let of_form = |form: Form, of: &dyn Fn(usize) -> f64| -> Result<DistributedVector> {
         let mut forces = session.agree(state.velocity.like())?;
@@ -150,9 +152,14 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     let whole = |_: usize, force: &Vector<D>| *force;
     let free = |node: usize, force: &Vector<D>| body.held.free_part(node, force);
     let held = |node: usize, force: &Vector<D>| add_scaled(force, -1.0, &body.held.free_part(node, force));
+    let left_over = |field: &DistributedVector| -> Result<f64> {
+        let mut forces = field.owned()?.to_vec();
+        bear(body, &displacement, &mut forces);
+        Ok(sum_of(&forces, &free))
+    };
     let sums = [
-        sum(&open, &free),
-        sum(&beyond_inertia, &free),
+        left_over(&open),
+        left_over(&beyond_inertia),
         sum(&loads, &whole),
         sum(&open, &held),
         sum(&change, &free),
@@ -175,6 +182,17 @@ pub(super) fn imbalance<const D: usize, const S: usize>(
     let share = if kinetic > 0.0 { (kinetic / (kinetic + stored)).sqrt() } else { 0.0 };
     let moving = change + MOVING * share * forces + ROUNDING * cells;
     Ok(Balance { open, forces, moving }.warning(body.has_form(Form::Mass)))
+}
+
+/// Takes from nodal forces on the body, at its owned nodes, what obstacles bear that it touches at the start, in the directions that
+/// supports leave free; displacements have ghosts.
+fn bear<const D: usize, const S: usize>(body: &Body<D, S>, displacement: &[f64], forces: &mut [f64]) {
+    for (node, force) in forces.chunks_exact_mut(D).enumerate() {
+        let free = body.held.free_part(node, &std::array::from_fn(|i| force[i]));
+        force.copy_from_slice(&free);
+    }
+    let seen = body.seen_by_contacts(displacement);
+    body.contacts.iter().for_each(|contact| contact.bear(0.0, &seen, forces));
 }
 
 /// Lets elastic supports take over the forces at the start state of what the job with the keys `earlier` had in their place: the
@@ -210,7 +228,7 @@ pub(super) fn take_over<const D: usize, const S: usize>(
     let gives_way: BTreeSet<u32> = body.elastic_support.points.iter().map(|at| at.point.node).collect();
     let held = &body.held;
     let mut reactions = vec![0.0; body.mesh.owned * D];
-    let (mut taken, mut released, mut is_changed) = (0.0, 0.0, false);
+    let (mut taken, mut dropped, mut is_changed) = (0.0, reactions.clone(), false);
     for (node, reaction) in reactions.chunks_exact_mut(D).enumerate() {
         let at = |values: &[f64]| -> Vector<D> { std::array::from_fn(|i| values[node * D + i]) };
         let free = held.free_part(node, &at(&residual));
@@ -230,9 +248,11 @@ pub(super) fn take_over<const D: usize, const S: usize>(
             reaction.copy_from_slice(&force);
             taken += norm(&force);
         } else {
-            released += norm(&force);
+            dropped[node * D..][..D].copy_from_slice(&force.map(|x| -x));
         }
     }
+    bear(body, &displacement, &mut dropped);
+    let released: f64 = dropped.as_chunks::<D>().0.iter().map(norm).sum();
     let size = loads.chunks_exact(D).map(|load| load.iter().map(|x| x * x).sum::<f64>().sqrt()).sum::<f64>();
     let [taken, released, loads] = session.sum([taken, released, size]);
     if session.total(usize::from(is_changed)) > 0 {

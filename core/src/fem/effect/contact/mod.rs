@@ -27,6 +27,7 @@
 //! vertical parts.
 
 mod approach;
+mod bearing;
 mod boundary;
 mod bounds;
 mod closeness;
