@@ -592,3 +592,68 @@ fn bodies_that_move_along_inclined_obstacles_or_turn_are_warned_of() {
     let above = || turning(0.5).set("contact", plane);
     assert!(warns(above(), 1, "moments of contact forces"), "by 0.05 rad above a plane");
 }
+
+/// A block that is held at its top, above a plane or with this gap, in these steps.
+fn block_beside(contact: &str, time: &str) -> Case {
+    Case::written_as(&format!(
+        "material.hypothesis = 'plane_strain'\nmaterial.density = 1e3\nmesh.rectangle = {{ size = [0.3, 0.1], cells = [12, 4] }}\n\
+         material.elasticity = {{ youngs_modulus = 1e7, poisson_ratio = 0.3 }}\nmaterial.damping.stiffness = 1e-3\n\
+         [[support]]\non = ['top']\nfix = 'all'\n[[contact]]\non = ['bottom']\n{contact}\n\
+         [time]\nscheme = 'implicit_euler'\nend = 0.02\nstep = 1e-3\n{time}\n"
+    ))
+}
+
+const SHORT_STEPS: &str = "adaptive = { smallest_step = 1e-8, largest_step = 5e-3 }";
+
+#[test]
+fn a_body_that_starts_inside_its_obstacle_is_warned_of_by_the_strain_of_its_ejection() {
+    let inside = "obstacle.plane = { point = [0, 1e-6], normal = [0, 1] }\n";
+    let rigid = format!("{inside}normal.unilateral = {{}}");
+    // Compression waves of 116 m/s.
+    let ejected = "starts up to 1.000e-6 m inside its obstacle: a step of 0.00000001 s ejects it at 100 m/s, which \
+                   strains the body by 0.86";
+    let massless = format!("{rigid}\nredistribute_mass = true");
+    let soft = format!("{inside}normal.compliance.stiffness = 1e9");
+    let long = "adaptive = { smallest_step = 5e-4, largest_step = 5e-3 }";
+    let most_kinetic = |case: &Case| {
+        case.results().table("history.csv").numbers("kinetic_energy").into_iter().fold(0.0, f64::max)
+    };
+    for (contact, time, is_warned) in [
+        (&rigid, SHORT_STEPS, true),
+        (&rigid, "", false),
+        (&rigid, long, false),
+        (&massless, SHORT_STEPS, false),
+        (&soft, SHORT_STEPS, false),
+    ] {
+        let case = block_beside(contact, time);
+        let checked = launch::run_alone(&["check".as_ref(), case.written().as_os_str()]);
+        let says = launch::unwrapped(&checked.stdout);
+        assert_eq!(says.contains(ejected), is_warned, "{contact}, {time}\n{says}");
+        let leaves = "points with negative gaps start inside the obstacle, which a step of 0.001 s leaves at up to 0.001 m/s";
+        assert_eq!(says.contains(leaves), contact == &rigid && time.is_empty(), "{says}");
+        let outcome = case.run_with(1, &[]).expect(0);
+        assert_eq!(warns_of(&outcome, &case, ejected), is_warned);
+        assert!(!warns_of(&outcome, &case, "its obstacle leapt"));
+        let energy = most_kinetic(&case);
+        assert_eq!(energy > 1e3, is_warned, "{contact}, {time}: {energy}");
+        assert!(is_warned || energy < 1e-3, "{contact}, {time}: {energy}");
+    }
+}
+
+#[test]
+fn a_gap_that_leaps_closed_is_warned_of_on_any_number_of_ranks() {
+    let words = "in the step to t = 0.01";
+    let leapt = "s its obstacle leapt 1.000e-5 m into the boundary bottom, and ejected it within this step, which strains the body by";
+    let gap = |gap: &str| format!("normal.unilateral.gap = \"{gap}\"");
+    for (gap, ranks, is_warned) in [
+        (gap("2e-5*(t<0.01) - 1e-5"), 1, true),
+        (gap("2e-5*(t<0.01) - 1e-5"), 2, true),
+        (gap("2e-5*max(0, min(1, (0.012-t)/0.002)) - 1e-5"), 1, false),
+    ] {
+        let case = block_beside(&gap, SHORT_STEPS);
+        let outcome = case.run_with(ranks, &[]).expect(0);
+        for words in [words, leapt] {
+            assert_eq!(warns_of(&outcome, &case, words), is_warned, "{gap}\n{}", outcome.stdout);
+        }
+    }
+}
