@@ -590,7 +590,43 @@ fn bodies_that_move_along_inclined_obstacles_or_turn_are_warned_of() {
     assert!(!warns(turning(0.5), 1, turned), "by 0.05 rad");
     let plane = "[{on = ['bottom'], sliding = 'finite', normal.unilateral = {}, obstacle.plane = {point = [0, 0, -1], normal = [0, 0, 1]}}]";
     let above = || turning(0.5).set("contact", plane);
-    assert!(warns(above(), 1, "moments of contact forces"), "by 0.05 rad above a plane");
+    let back = "contact forces turn it back with a moment of";
+    assert!(!warns(above(), 1, back), "by 0.05 rad above a plane that it does not touch");
+    assert!([1, 2].iter().all(|ranks| warns(disc_on_a_plane(0.02), *ranks, back)), "that rolls by 0.02 rad");
+    assert!(!warns(disc_on_a_plane(0.0), 1, back), "that rests");
+    let rolls = disc_on_a_plane(0.02).set("checkpoint.at", "[0.12]");
+    let straight = rolls.run(1).summary();
+    let checkpoint = rolls.folder().join("out/checkpoint-60.h5");
+    rolls.run_with(1, &["--restart", &checkpoint.display().to_string()]).expect(0);
+    assert_eq!(rolls.results().summary()["warnings"], straight["warnings"], "after a restart");
+}
+
+/// A disc of 0.1 m on a plane under its weight, which begins to roll at this speed.
+fn disc_on_a_plane(speed: f64) -> Case {
+    const RIM: usize = 96;
+    let at = |k: usize| std::f64::consts::TAU * k as f64 / RIM as f64;
+    let rim = (0..RIM).map(|k| format!("{} {} {} 0\n", k + 2, 0.1 * at(k).sin(), 0.1 - 0.1 * at(k).cos()));
+    let nodes = format!("{}\n1 0 0.1 0\n{}", RIM + 1, rim.collect::<String>());
+    let next = |k: usize| (k + 1) % RIM + 2;
+    let lines = (0..RIM).map(|k| format!("{} 1 2 1 1 {} {}\n", k + 1, k + 2, next(k)));
+    let cells = (0..RIM).map(|k| format!("{} 2 2 2 2 1 {} {}\n", RIM + k + 1, k + 2, next(k)));
+    let elements: String = lines.chain(cells).collect();
+    let case = Case::written_as(&format!(
+        "
+        mesh.file = 'disc.msh'
+        material = {{hypothesis = 'plane_strain', density = 1000.0, elasticity = {{youngs_modulus = 5e6, poisson_ratio = 0.3}}, damping.stiffness = 1e-3}}
+        gravity.acceleration = [0, -9.81]
+        initial.velocity = ['{speed}*y/0.1', '-{speed}*x/0.1']
+        contact = [{{on = ['rim'], sliding = 'finite', normal.unilateral = {{}}, friction.coulomb.coefficient = 0.5, obstacle.plane = {{point = [0, 0], normal = [0, 1]}}}}]
+        time = {{scheme = 'bdf2', end = 0.2, step = 0.002}}"
+    ));
+    let mesh = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n1 1 \"rim\"\n2 2 \"disc\"\n$EndPhysicalNames\n$Nodes\n{nodes}$EndNodes\n\
+         $Elements\n{}\n{elements}$EndElements\n",
+        2 * RIM
+    );
+    std::fs::write(case.folder().join("disc.msh"), mesh).expect("written");
+    case
 }
 
 /// A block that is held at its top, above a plane or with this gap, in these steps.
