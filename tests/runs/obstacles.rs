@@ -693,3 +693,48 @@ fn a_gap_that_leaps_closed_is_warned_of_on_any_number_of_ranks() {
         }
     }
 }
+
+#[test]
+fn a_plane_that_tilts_under_a_free_block_is_warned_of_by_its_angle_as_a_share_of_that_of_friction() {
+    let block = |friction: f64, rate: f64| {
+        Case::written_as(&format!(
+            "
+            mesh.rectangle = {{corner = [-0.1, 0], size = [0.2, 0.05], cells = [8, 2]}}
+            material = {{hypothesis = 'plane_strain', density = 1000.0, elasticity = {{youngs_modulus = 1e7, poisson_ratio = 0.3}}, damping.stiffness = 1e-3}}
+            gravity.acceleration = [0, -9.81]
+            contact = [{{on = ['bottom'], normal.unilateral = {{}}, friction.coulomb.coefficient = {friction}, obstacle.plane = {{point = [0, 0], normal = ['-sin({rate}*t)', 'cos({rate}*t)']}}}}]
+            time = {{scheme = 'implicit_euler', end = 3.0, step = 0.01}}"
+        ))
+    };
+    let tilted = "is inclined to it by 1.7 degrees or more at t = 3 s";
+    let held = "[{on = ['top'], fix = ['x']}]";
+    for (case, is_warned) in [
+        (block(0.015, 0.01), true),
+        (block(0.0, 0.01), true),
+        (block(0.5, 0.01), false),
+        (block(0.015, 0.01).set("support", held), false),
+        (block(0.015, 0.01).set("contact.0.sliding", "'finite'"), false),
+    ] {
+        for ranks in [1, 2] {
+            let job = case.written();
+            let checked = launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0);
+            let says = launch::unwrapped(&checked.stdout);
+            assert_eq!(says.contains(tilted), is_warned, "{says}");
+        }
+    }
+    let checked = launch::run_alone(&["check".as_ref(), block(0.015, 0.01).written().as_os_str()]);
+    checked.says("2 times what friction can hold; use sliding = \"finite\"");
+    let speed = |case: Case| {
+        let case = case.set("output.probe", "[{name = 'middle', point = [0, 0.025]}]");
+        case.run(1).table("probes.csv").last("velocity_x")
+    };
+    // It slides from t = 1.5 s on: g ((sin a - mu cos a) t) integrated, by hand.
+    let (rate, friction, gravity) = (0.01_f64, 0.015_f64, 9.81);
+    let from = friction.atan() / rate;
+    let integral = |t: f64| -((rate * t).cos() + friction * (rate * t).sin()) / rate;
+    let right = -gravity * (integral(3.0) - integral(from));
+    let found = speed(block(friction, rate).set("contact.0.sliding", "'finite'"));
+    assert!((found / right - 1.0).abs() < 0.02, "{found} for {right}");
+    let missing = speed(block(friction, rate));
+    assert!(missing.abs() < 0.1 * right.abs(), "{missing} for {right}");
+}

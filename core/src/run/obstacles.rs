@@ -9,14 +9,14 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{ASTRAY, Closeness, Contact, EJECTED, Ejection, Gaps, OVERRUN},
+        effect::{ASTRAY, Closeness, Contact, EJECTED, Ejection, Friction, Gaps, OVERRUN, tangents},
         pairs::pair_of,
         space::{longest_side, surface_means},
         state::State,
     },
     job::{self, Job, Sliding},
     laws::{contact::Gap, digits::Digits},
-    linear_algebra::tensor::{Vector, larger, norm},
+    linear_algebra::tensor::{Vector, add_scaled, larger, norm},
     mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
@@ -25,6 +25,8 @@ use std::collections::BTreeSet;
 
 /// A length of the free part of a normal below this is a rounding error.
 const FREE: f64 = 1e-9;
+/// A support holds a direction of which it takes more than this share.
+const HELD_ALONG: f64 = 1e-3;
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
 
@@ -35,8 +37,13 @@ const LARGEST_SLIP: f64 = 0.5;
 const LARGEST_SHIFT: f64 = 0.1;
 const LARGEST_INCLINATION: f64 = 0.01;
 /// The angle in rad between a boundary and a plane above which a warning is given: the tangential force of a frictionless plane is then
-/// missing, more than 3 % of the pressure.
+/// missing, more than 3 % of the pressure. Of a body that only friction holds along the boundary, it is this share of the angle of friction,
+/// and without friction rounding.
 const TILTED: f64 = 2.0 * std::f64::consts::PI / 180.0;
+const TILTED_BESIDE_FRICTION: f64 = 0.1;
+const LEAST_TILT: f64 = 1e-3;
+/// Times of a run at which planes are compared with the boundary.
+const TIMES: u32 = 16;
 /// The angle in rad between facets and their mean at a corner from which on a boundary turns there, and the inverse of the share of such
 /// nodes from which on it is meant to be round: at nodes on edges facets do not turn.
 const TURNING: f64 = 1e-3;
@@ -104,7 +111,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             continue;
         }
         if !contact.follows_surface {
-            out.extend(warning_of_tilt(session, (number, contact), &on, job.time.end));
+            out.extend(warning_of_tilt(session, job, body, number)?);
         }
         out.extend(warning_of_moved_nodes(session, body, (number, contact), &on));
         out.extend(warning_of_straight_edges(session, &body.mesh, (number, contact), &on)?);
@@ -202,31 +209,69 @@ fn rounded(number: f64) -> String {
     Digits(format!("{number:.1e}").parse().unwrap_or(number)).to_string()
 }
 
-/// A warning about a plane to which no part of the boundary is parallel, at the start, the end or in the middle of a run to this time in
-/// s: all of it is inclined to one side. On a round boundary the smallest angle may be that of the nodes next to the place that is
-/// parallel to the plane. Collective.
-fn warning_of_tilt<const D: usize>(
+/// A warning about a plane to which no part of the boundary is parallel at some time of a run: all of it is inclined to one side. On a round
+/// boundary the smallest angle may be that of the nodes next to the place that is parallel to the plane. Collective.
+fn warning_of_tilt<const D: usize, const S: usize>(
     session: &Session,
-    (number, contact): (usize, &Contact<D>),
-    on: &str,
-    end: f64,
-) -> Option<String> {
-    let [angle, time] = [0.0, 0.5 * end, end]
-        .map(|time| {
+    job: &Job,
+    body: &Body<D, S>,
+    number: usize,
+) -> Result<Option<String>, Agreed> {
+    let contact = &body.contacts[number];
+    let [angle, time] = (0..=TIMES)
+        .map(|at| {
+            let time = job.time.end * f64::from(at) / f64::from(TIMES);
             let [least, most] = contact.tilts(time);
             let [least, most] = session.largest([-least, most]);
             [if most + least < -2.0 * least { -least } else { 0.0 }, time]
         })
-        .into_iter()
         .fold([0.0; 2], |most, found| if found[0].is_finite() && found[0] > most[0] { found } else { most });
-    (angle > TILTED).then(|| {
+    // Equal on all ranks.
+    if angle <= LEAST_TILT {
+        return Ok(None);
+    }
+    let friction = contact.friction.as_ref().map_or(0.0, Friction::coefficient_at_rest);
+    let slides = slides_freely(session, body, number)?;
+    let limit = if slides { (TILTED_BESIDE_FRICTION * friction).clamp(LEAST_TILT, TILTED) } else { TILTED };
+    let beside = match slides && friction > 0.0 && friction.is_finite() {
+        true => format!(", {} times what friction can hold", rounded(angle.tan() / friction)),
+        false => String::new(),
+    };
+    Ok((angle > limit).then(|| {
+        let degrees = angle.to_degrees();
         format!(
-            "contact.{number}: the plane in front of the boundary {on} is inclined to it by {:.1} degrees or more at t = {time} s: contact \
-             acts along the normals of the undeformed body, so that no force pushes the body down this slope; use sliding = \"finite\", or \
-             incline the body and [gravity] instead of the plane",
-            angle.to_degrees()
+            "contact.{number}: the plane in front of the boundary {} is inclined to it by {degrees:.*} degrees or more at t = {time} s: contact \
+             acts along the normals of the undeformed body, so that no force pushes the body down this slope{beside}; use sliding = \
+             \"finite\", or incline the body and [gravity] instead of the plane",
+            job.contact[number].on.join(", "),
+            if degrees < 1.0 { 2 } else { 1 }
         )
-    })
+    }))
+}
+
+/// Whether neither supports nor other contacts hold the body along a boundary with a contact. Collective.
+fn slides_freely<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    number: usize,
+) -> Result<bool, Agreed> {
+    let contact = &body.contacts[number];
+    let own: BTreeSet<usize> = nodes_of_bodies(session, body, contact)?.into_iter().collect();
+    let springs = body.elastic_support.points.iter().map(|elastic| elastic.point.node as usize);
+    let others = body.contacts.iter().enumerate().filter(|(at, _)| *at != number);
+    let others = others.flat_map(|(_, other)| other.normal.nodes());
+    let beside = springs.chain(others).filter(|node| own.contains(node)).count();
+    let mut normal = [0.0; 3];
+    for point in contact.normal.boundary().surface_points() {
+        (0..D).for_each(|i| normal[i] += point.weight * point.normal[i]);
+    }
+    let normal = session.sum(normal);
+    let along: Vec<Vector<D>> = tangents(&std::array::from_fn(|i| normal[i] / norm(&normal))).collect();
+    let is_held = |node: &&usize| {
+        let taken = |tangent: &Vector<D>| add_scaled(tangent, -1.0, &body.held.free_part(**node, tangent));
+        along.iter().any(|tangent| norm(&taken(tangent)) > HELD_ALONG)
+    };
+    Ok(session.total(beside + own.iter().filter(is_held).count()) == 0)
 }
 
 /// A warning about quadratic cells with straight edges along a boundary that is meant to be round, before an obstacle that is round: nodes

@@ -55,7 +55,7 @@ pub use contact::{
     ASTRAY, CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
     EJECTED, Ejection, Freedom, Friction, Gaps, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
     OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, SLIP_BETWEEN_PAIRINGS,
-    STORED_IN_CONTACT, Touch, choose_unknowns, contact_nodes, set_walls,
+    STORED_IN_CONTACT, Touch, choose_unknowns, contact_nodes, set_walls, tangents,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

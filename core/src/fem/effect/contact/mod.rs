@@ -78,7 +78,7 @@ pub use loaded_obstacle::{Freedom, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUME
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use sweep::{ASTRAY, EJECTED, OVERRUN, SLIP_BETWEEN_PAIRINGS, Touch};
-pub(super) use tangential_point::tangents;
+pub use tangential_point::tangents;
 pub use unknowns::{choose_unknowns, set_walls};
 
 /// The law along the normal of a contact boundary, and its points.
