@@ -644,5 +644,151 @@ fn bodies_that_move_along_inclined_obstacles_or_turn_are_warned_of() {
     assert!(!warns(turning(0.5), 1, turned), "by 0.05 rad");
     let plane = "[{on = ['bottom'], sliding = 'finite', normal.unilateral = {}, obstacle.plane = {point = [0, 0, -1], normal = [0, 0, 1]}}]";
     let above = || turning(0.5).set("contact", plane);
-    assert!(warns(above(), 1, "moments of contact forces"), "by 0.05 rad above a plane");
+    let back = "contact forces turn it back with a moment of";
+    assert!(!warns(above(), 1, back), "by 0.05 rad above a plane that it does not touch");
+    assert!([1, 2].iter().all(|ranks| warns(disc_on_a_plane(0.02), *ranks, back)), "that rolls by 0.02 rad");
+    assert!(!warns(disc_on_a_plane(0.0), 1, back), "that rests");
+    let rolls = disc_on_a_plane(0.02).set("checkpoint.at", "[0.12]");
+    let straight = rolls.run(1).summary();
+    let checkpoint = rolls.folder().join("out/checkpoint-60.h5");
+    rolls.run_with(1, &["--restart", &checkpoint.display().to_string()]).expect(0);
+    assert_eq!(rolls.results().summary()["warnings"], straight["warnings"], "after a restart");
+}
+
+/// A disc of 0.1 m on a plane under its weight, which begins to roll at this speed.
+fn disc_on_a_plane(speed: f64) -> Case {
+    const RIM: usize = 96;
+    let at = |k: usize| std::f64::consts::TAU * k as f64 / RIM as f64;
+    let rim = (0..RIM).map(|k| format!("{} {} {} 0\n", k + 2, 0.1 * at(k).sin(), 0.1 - 0.1 * at(k).cos()));
+    let nodes = format!("{}\n1 0 0.1 0\n{}", RIM + 1, rim.collect::<String>());
+    let next = |k: usize| (k + 1) % RIM + 2;
+    let lines = (0..RIM).map(|k| format!("{} 1 2 1 1 {} {}\n", k + 1, k + 2, next(k)));
+    let cells = (0..RIM).map(|k| format!("{} 2 2 2 2 1 {} {}\n", RIM + k + 1, k + 2, next(k)));
+    let elements: String = lines.chain(cells).collect();
+    let case = Case::written_as(&format!(
+        "
+        mesh.file = 'disc.msh'
+        material = {{hypothesis = 'plane_strain', density = 1000.0, elasticity = {{youngs_modulus = 5e6, poisson_ratio = 0.3}}, damping.stiffness = 1e-3}}
+        gravity.acceleration = [0, -9.81]
+        initial.velocity = ['{speed}*y/0.1', '-{speed}*x/0.1']
+        contact = [{{on = ['rim'], sliding = 'finite', normal.unilateral = {{}}, friction.coulomb.coefficient = 0.5, obstacle.plane = {{point = [0, 0], normal = [0, 1]}}}}]
+        time = {{scheme = 'bdf2', end = 0.2, step = 0.002}}"
+    ));
+    let mesh = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n1 1 \"rim\"\n2 2 \"disc\"\n$EndPhysicalNames\n$Nodes\n{nodes}$EndNodes\n\
+         $Elements\n{}\n{elements}$EndElements\n",
+        2 * RIM
+    );
+    std::fs::write(case.folder().join("disc.msh"), mesh).expect("written");
+    case
+}
+
+/// A block that is held at its top, above a plane or with this gap, in these steps.
+fn block_beside(contact: &str, time: &str) -> Case {
+    Case::written_as(&format!(
+        "material.hypothesis = 'plane_strain'\nmaterial.density = 1e3\nmesh.rectangle = {{ size = [0.3, 0.1], cells = [12, 4] }}\n\
+         material.elasticity = {{ youngs_modulus = 1e7, poisson_ratio = 0.3 }}\nmaterial.damping.stiffness = 1e-3\n\
+         [[support]]\non = ['top']\nfix = 'all'\n[[contact]]\non = ['bottom']\n{contact}\n\
+         [time]\nscheme = 'implicit_euler'\nend = 0.02\nstep = 1e-3\n{time}\n"
+    ))
+}
+
+const SHORT_STEPS: &str = "adaptive = { smallest_step = 1e-8, largest_step = 5e-3 }";
+
+#[test]
+fn a_body_that_starts_inside_its_obstacle_is_warned_of_by_the_strain_of_its_ejection() {
+    let inside = "obstacle.plane = { point = [0, 1e-6], normal = [0, 1] }\n";
+    let rigid = format!("{inside}normal.unilateral = {{}}");
+    // Compression waves of 116 m/s.
+    let ejected = "starts up to 1.000e-6 m inside its obstacle: a step of 0.00000001 s ejects it at 100 m/s, which \
+                   strains the body by 0.86";
+    let massless = format!("{rigid}\nredistribute_mass = true");
+    let soft = format!("{inside}normal.compliance.stiffness = 1e9");
+    let long = "adaptive = { smallest_step = 5e-4, largest_step = 5e-3 }";
+    let most_kinetic = |case: &Case| {
+        case.results().table("history.csv").numbers("kinetic_energy").into_iter().fold(0.0, f64::max)
+    };
+    for (contact, time, is_warned) in [
+        (&rigid, SHORT_STEPS, true),
+        (&rigid, "", false),
+        (&rigid, long, false),
+        (&massless, SHORT_STEPS, false),
+        (&soft, SHORT_STEPS, false),
+    ] {
+        let case = block_beside(contact, time);
+        let checked = launch::run_alone(&["check".as_ref(), case.written().as_os_str()]);
+        let says = launch::unwrapped(&checked.stdout);
+        assert_eq!(says.contains(ejected), is_warned, "{contact}, {time}\n{says}");
+        let leaves = "points with negative gaps start inside the obstacle, which a step of 0.001 s leaves at up to 0.001 m/s";
+        assert_eq!(says.contains(leaves), contact == &rigid && time.is_empty(), "{says}");
+        let outcome = case.run_with(1, &[]).expect(0);
+        assert_eq!(warns_of(&outcome, &case, ejected), is_warned);
+        assert!(!warns_of(&outcome, &case, "its obstacle leapt"));
+        let energy = most_kinetic(&case);
+        assert_eq!(energy > 1e3, is_warned, "{contact}, {time}: {energy}");
+        assert!(is_warned || energy < 1e-3, "{contact}, {time}: {energy}");
+    }
+}
+
+#[test]
+fn a_gap_that_leaps_closed_is_warned_of_on_any_number_of_ranks() {
+    let words = "in the step to t = 0.01";
+    let leapt = "s its obstacle leapt 1.000e-5 m into the boundary bottom, and ejected it within this step, which strains the body by";
+    let gap = |gap: &str| format!("normal.unilateral.gap = \"{gap}\"");
+    for (gap, ranks, is_warned) in [
+        (gap("2e-5*(t<0.01) - 1e-5"), 1, true),
+        (gap("2e-5*(t<0.01) - 1e-5"), 2, true),
+        (gap("2e-5*max(0, min(1, (0.012-t)/0.002)) - 1e-5"), 1, false),
+    ] {
+        let case = block_beside(&gap, SHORT_STEPS);
+        let outcome = case.run_with(ranks, &[]).expect(0);
+        for words in [words, leapt] {
+            assert_eq!(warns_of(&outcome, &case, words), is_warned, "{gap}\n{}", outcome.stdout);
+        }
+    }
+}
+
+#[test]
+fn a_plane_that_tilts_under_a_free_block_is_warned_of_by_its_angle_as_a_share_of_that_of_friction() {
+    let block = |friction: f64, rate: f64| {
+        Case::written_as(&format!(
+            "
+            mesh.rectangle = {{corner = [-0.1, 0], size = [0.2, 0.05], cells = [8, 2]}}
+            material = {{hypothesis = 'plane_strain', density = 1000.0, elasticity = {{youngs_modulus = 1e7, poisson_ratio = 0.3}}, damping.stiffness = 1e-3}}
+            gravity.acceleration = [0, -9.81]
+            contact = [{{on = ['bottom'], normal.unilateral = {{}}, friction.coulomb.coefficient = {friction}, obstacle.plane = {{point = [0, 0], normal = ['-sin({rate}*t)', 'cos({rate}*t)']}}}}]
+            time = {{scheme = 'implicit_euler', end = 3.0, step = 0.01}}"
+        ))
+    };
+    let tilted = "is inclined to it by 1.7 degrees or more at t = 3 s";
+    let held = "[{on = ['top'], fix = ['x']}]";
+    for (case, is_warned) in [
+        (block(0.015, 0.01), true),
+        (block(0.0, 0.01), true),
+        (block(0.5, 0.01), false),
+        (block(0.015, 0.01).set("support", held), false),
+        (block(0.015, 0.01).set("contact.0.sliding", "'finite'"), false),
+    ] {
+        for ranks in [1, 2] {
+            let job = case.written();
+            let checked = launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0);
+            let says = launch::unwrapped(&checked.stdout);
+            assert_eq!(says.contains(tilted), is_warned, "{says}");
+        }
+    }
+    let checked = launch::run_alone(&["check".as_ref(), block(0.015, 0.01).written().as_os_str()]);
+    checked.says("2 times what friction can hold; use sliding = \"finite\"");
+    let speed = |case: Case| {
+        let case = case.set("output.probe", "[{name = 'middle', point = [0, 0.025]}]");
+        case.run(1).table("probes.csv").last("velocity_x")
+    };
+    // It slides from t = 1.5 s on: g ((sin a - mu cos a) t) integrated, by hand.
+    let (rate, friction, gravity) = (0.01_f64, 0.015_f64, 9.81);
+    let from = friction.atan() / rate;
+    let integral = |t: f64| -((rate * t).cos() + friction * (rate * t).sin()) / rate;
+    let right = -gravity * (integral(3.0) - integral(from));
+    let found = speed(block(friction, rate).set("contact.0.sliding", "'finite'"));
+    assert!((found / right - 1.0).abs() < 0.02, "{found} for {right}");
+    let missing = speed(block(friction, rate));
+    assert!(missing.abs() < 0.1 * right.abs(), "{missing} for {right}");
 }

@@ -7,3 +7,4 @@ pub mod pairs;
 pub mod effect;
 pub mod body;
 pub mod resultants;
+pub mod turning;

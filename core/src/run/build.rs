@@ -1,7 +1,7 @@
 //! Builds a body from the tables of a job. A table that is absent creates nothing.
 
 use super::{
-    materials::Materials,
+    materials::{Materials, wave_speed},
     pairs::{coupling, refuse_conflicts},
     parts::{centre_of, part_of},
 };
@@ -23,7 +23,7 @@ use crate::{
         contact::{Gap, NormalResponse, Quadrature},
         material::{ByMaterial, Comparison, Hypothesis, Material},
     },
-    linear_algebra::tensor::{Mandel, Vector, component, norm},
+    linear_algebra::tensor::{Mandel, Vector, component, larger, norm},
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
     solver::stepping::evaluation,
@@ -92,6 +92,17 @@ pub(super) fn body<const D: usize, const S: usize>(
     }
     if job.contact.iter().any(|contact| contact.redistribute_mass) {
         redistribute_mass(session, job, &mut body, &parts, &state)?;
+    }
+    let Body { mesh, geometry, contacts, .. } = &mut body;
+    for (contact, _) in contacts.iter_mut().zip(&job.contact).filter(|(_, table)| !table.redistribute_mass) {
+        let touches: BTreeSet<usize> = contact.normal.nodes().collect();
+        let cells = geometry.cells().enumerate();
+        let touching =
+            cells.filter(|(cell, _)| mesh.cell_nodes(*cell).any(|node| touches.contains(&(node as usize))));
+        let speeds = touching
+            .filter_map(|(_, cell)| wave_speed(&materials.all[cell.material()], job.material.hypothesis));
+        let [slowest] = session.largest([speeds.map(|speed| -speed).fold(f64::NEG_INFINITY, larger)]);
+        contact.wave_speed = slowest.is_finite().then_some(-slowest);
     }
     if job.output.asks_for_slip() {
         body.contacts.iter_mut().flat_map(|contact| &mut contact.friction).for_each(Friction::keep_slip);

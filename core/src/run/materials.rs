@@ -3,7 +3,7 @@
 use crate::{
     error::Error,
     job::{self, Job},
-    laws::material::Material,
+    laws::material::{Hypothesis, Material},
     mesh::{Mesh, shape::centroid},
     parallel::{agreement::Agreed, session::Session},
 };
@@ -24,6 +24,16 @@ pub(super) struct Materials {
     of_region: Vec<usize>,
     /// The material of each cell of this rank; empty if no property varies.
     of_cells: Vec<u32>,
+}
+
+/// The speed in m/s of compression waves in a material, if it has density and elasticity.
+pub(super) fn wave_speed(material: &Material<f64>, hypothesis: Option<Hypothesis>) -> Option<f64> {
+    let (density, elasticity) = (material.density?, material.elasticity.as_ref()?);
+    let tensor = elasticity.tensor(hypothesis.unwrap_or(Hypothesis::Space));
+    // A formula of the shear modulus leaves the bulk modulus as it is.
+    let factor = elasticity.expression.as_ref().map_or(1.0, |formula| formula.at_rest());
+    let modulus = tensor.volumetric + tensor.shear + (factor - 1.0) * tensor.shear * 2.0 / 3.0;
+    (density > 0.0).then(|| (modulus / density).sqrt())
 }
 
 impl Materials {

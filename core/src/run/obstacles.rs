@@ -1,19 +1,22 @@
 //! The position of a body relative to its obstacles: warnings about that at the start and about contacts that are not as they seem, and
 //! the gaps of all contacts.
 
-use super::side_words::{EDGE, pressed_by_edge};
+use super::{
+    side_words::{EDGE, pressed_by_edge},
+    steps::shortest_step,
+};
 use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{ASTRAY, Closeness, Contact, Gaps, OVERRUN},
+        effect::{ASTRAY, Closeness, Contact, EJECTED, Ejection, Friction, Gaps, OVERRUN, tangents},
         pairs::pair_of,
         space::{longest_side, surface_means},
         state::State,
     },
-    job::{Job, Sliding},
-    laws::contact::Gap,
-    linear_algebra::tensor::{Vector, larger, norm},
+    job::{self, Job, Sliding},
+    laws::{contact::Gap, digits::Digits},
+    linear_algebra::tensor::{Vector, add_scaled, larger, norm},
     mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
@@ -22,6 +25,8 @@ use std::collections::BTreeSet;
 
 /// A length of the free part of a normal below this is a rounding error.
 const FREE: f64 = 1e-9;
+/// A support holds a direction of which it takes more than this share.
+const HELD_ALONG: f64 = 1e-3;
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
 
@@ -32,8 +37,13 @@ const LARGEST_SLIP: f64 = 0.5;
 const LARGEST_SHIFT: f64 = 0.1;
 const LARGEST_INCLINATION: f64 = 0.01;
 /// The angle in rad between a boundary and a plane above which a warning is given: the tangential force of a frictionless plane is then
-/// missing, more than 3 % of the pressure.
+/// missing, more than 3 % of the pressure. Of a body that only friction holds along the boundary, it is this share of the angle of friction,
+/// and without friction rounding.
 const TILTED: f64 = 2.0 * std::f64::consts::PI / 180.0;
+const TILTED_BESIDE_FRICTION: f64 = 0.1;
+const LEAST_TILT: f64 = 1e-3;
+/// Times of a run at which planes are compared with the boundary.
+const TIMES: u32 = 16;
 /// The angle in rad between facets and their mean at a corner from which on a boundary turns there, and the inverse of the share of such
 /// nodes from which on it is meant to be round: at nodes on edges facets do not turn.
 const TURNING: f64 = 1e-3;
@@ -101,14 +111,24 @@ pub(super) fn warnings<const D: usize, const S: usize>(
             continue;
         }
         if !contact.follows_surface {
-            out.extend(warning_of_tilt(session, (number, contact), &on, job.time.end));
+            out.extend(warning_of_tilt(session, job, body, number)?);
         }
         out.extend(warning_of_moved_nodes(session, body, (number, contact), &on));
         out.extend(warning_of_straight_edges(session, &body.mesh, (number, contact), &on)?);
-        if deepest > TOO_DEEP * size {
+        let ejected = Ejected::of(job, contact, deepest).filter(|ejected| ejected.strain > EJECTED);
+        let is_deep = deepest > TOO_DEEP * size;
+        if ejected.is_some() || is_deep {
+            let share = format!(", {:.1} % of the body's size", 100.0 * deepest / size);
+            let ejects = ejected.map_or_else(
+                || {
+                    "the first steps will eject the body; correct the gap, the obstacle or [initial] displacement"
+                        .into()
+                },
+                |ejected| ejected.words(job),
+            );
             out.push(format!(
-                "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject the body; correct the gap, the obstacle or [initial] displacement",
-                100.0 * deepest / size
+                "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle{}: {ejects}",
+                if is_deep { share } else { String::new() }
             ));
         }
         let all = body.mesh.nodes.iter();
@@ -145,31 +165,113 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     Ok(out)
 }
 
-/// A warning about a plane to which no part of the boundary is parallel, at the start, the end or in the middle of a run to this time in
-/// s: all of it is inclined to one side. On a round boundary the smallest angle may be that of the nodes next to the place that is
-/// parallel to the plane. Collective.
-fn warning_of_tilt<const D: usize>(
+/// What the first step does to a boundary that starts inside of its obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ejected {
+    /// The shortest step of the run in s.
+    step: f64,
+    /// The velocity in m/s at which this step takes it out.
+    speed: f64,
+    /// The strain of the body by that.
+    strain: f64,
+}
+
+impl Ejected {
+    /// That of a boundary that starts this deep in m inside of its obstacle, if its constraint ejects it.
+    fn of<const D: usize>(job: &Job, contact: &Contact<D>, overlap: f64) -> Option<Self> {
+        let wave_speed = contact.wave_speed.filter(|_| contact.ejects() && overlap > 0.0)?;
+        let step = shortest_step(job);
+        let speed = overlap / step;
+        Some(Self { step, speed, strain: speed / wave_speed })
+    }
+
+    /// What it does and what helps.
+    fn words(self, job: &Job) -> String {
+        let Self { step, speed, strain } = self;
+        let key = if job.time.adaptive.is_some() { "[time.adaptive] smallest_step" } else { "[time] step" };
+        let from = match job.initial.as_ref().is_some_and(|initial| initial.from.is_some()) {
+            true => "the law of the run before let it in, this one does not; keep that law, or ",
+            false => "",
+        };
+        format!(
+            "a step of {step} s ejects it at {} m/s, which strains the body by {} and adds energy that grows as the square of this speed; \
+             {from}correct the gap, the obstacle or [initial] displacement, or take redistribute_mass = true, normal.compliance, or a {key} of {} s \
+             or more",
+            rounded(speed),
+            rounded(strain),
+            rounded(step * strain / EJECTED)
+        )
+    }
+}
+
+/// A number with two digits.
+fn rounded(number: f64) -> String {
+    Digits(format!("{number:.1e}").parse().unwrap_or(number)).to_string()
+}
+
+/// A warning about a plane to which no part of the boundary is parallel at some time of a run: all of it is inclined to one side. On a round
+/// boundary the smallest angle may be that of the nodes next to the place that is parallel to the plane. Collective.
+fn warning_of_tilt<const D: usize, const S: usize>(
     session: &Session,
-    (number, contact): (usize, &Contact<D>),
-    on: &str,
-    end: f64,
-) -> Option<String> {
-    let [angle, time] = [0.0, 0.5 * end, end]
-        .map(|time| {
+    job: &Job,
+    body: &Body<D, S>,
+    number: usize,
+) -> Result<Option<String>, Agreed> {
+    let contact = &body.contacts[number];
+    let [angle, time] = (0..=TIMES)
+        .map(|at| {
+            let time = job.time.end * f64::from(at) / f64::from(TIMES);
             let [least, most] = contact.tilts(time);
             let [least, most] = session.largest([-least, most]);
             [if most + least < -2.0 * least { -least } else { 0.0 }, time]
         })
-        .into_iter()
         .fold([0.0; 2], |most, found| if found[0].is_finite() && found[0] > most[0] { found } else { most });
-    (angle > TILTED).then(|| {
+    // Equal on all ranks.
+    if angle <= LEAST_TILT {
+        return Ok(None);
+    }
+    let friction = contact.friction.as_ref().map_or(0.0, Friction::coefficient_at_rest);
+    let slides = slides_freely(session, body, number)?;
+    let limit = if slides { (TILTED_BESIDE_FRICTION * friction).clamp(LEAST_TILT, TILTED) } else { TILTED };
+    let beside = match slides && friction > 0.0 && friction.is_finite() {
+        true => format!(", {} times what friction can hold", rounded(angle.tan() / friction)),
+        false => String::new(),
+    };
+    Ok((angle > limit).then(|| {
+        let degrees = angle.to_degrees();
         format!(
-            "contact.{number}: the plane in front of the boundary {on} is inclined to it by {:.1} degrees or more at t = {time} s: contact \
-             acts along the normals of the undeformed body, so that no force pushes the body down this slope; use sliding = \"finite\", or \
-             incline the body and [gravity] instead of the plane",
-            angle.to_degrees()
+            "contact.{number}: the plane in front of the boundary {} is inclined to it by {degrees:.*} degrees or more at t = {time} s: contact \
+             acts along the normals of the undeformed body, so that no force pushes the body down this slope{beside}; use sliding = \
+             \"finite\", or incline the body and [gravity] instead of the plane",
+            job.contact[number].on.join(", "),
+            if degrees < 1.0 { 2 } else { 1 }
         )
-    })
+    }))
+}
+
+/// Whether neither supports nor other contacts hold the body along a boundary with a contact. Collective.
+fn slides_freely<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    number: usize,
+) -> Result<bool, Agreed> {
+    let contact = &body.contacts[number];
+    let own: BTreeSet<usize> = nodes_of_bodies(session, body, contact)?.into_iter().collect();
+    let springs = body.elastic_support.points.iter().map(|elastic| elastic.point.node as usize);
+    let others = body.contacts.iter().enumerate().filter(|(at, _)| *at != number);
+    let others = others.flat_map(|(_, other)| other.normal.nodes());
+    let beside = springs.chain(others).filter(|node| own.contains(node)).count();
+    let mut normal = [0.0; 3];
+    for point in contact.normal.boundary().surface_points() {
+        (0..D).for_each(|i| normal[i] += point.weight * point.normal[i]);
+    }
+    let normal = session.sum(normal);
+    let along: Vec<Vector<D>> = tangents(&std::array::from_fn(|i| normal[i] / norm(&normal))).collect();
+    let is_held = |node: &&usize| {
+        let taken = |tangent: &Vector<D>| add_scaled(tangent, -1.0, &body.held.free_part(**node, tangent));
+        along.iter().any(|tangent| norm(&taken(tangent)) > HELD_ALONG)
+    };
+    Ok(session.total(beside + own.iter().filter(is_held).count()) == 0)
 }
 
 /// A warning about quadratic cells with straight edges along a boundary that is meant to be round, before an obstacle that is round: nodes
@@ -213,6 +315,9 @@ pub(super) struct ContactGaps {
     on: Vec<String>,
     /// Smallest and largest gap in m; absent if the normal of no point meets the obstacle.
     range: Option<[f64; 2]>,
+    /// What the first step does to points that start inside.
+    #[serde(skip)]
+    ejected: Option<Ejected>,
     /// All points, and those whose normal does not meet the obstacle.
     points: usize,
     points_without_obstacle: usize,
@@ -229,7 +334,13 @@ impl ContactGaps {
             0 => String::new(),
             count => format!("; no obstacle along the normals of {count} of {} points", self.points),
         };
-        format!("gap        {on}: {smallest:.4e} m to {largest:.4e} m{without}")
+        let inside = self.ejected.map_or_else(String::new, |Ejected { step, speed, .. }| {
+            format!(
+                "; points with negative gaps start inside the obstacle, which a step of {step} s leaves at up to {} m/s",
+                rounded(speed)
+            )
+        });
+        format!("gap        {on}: {smallest:.4e} m to {largest:.4e} m{without}{inside}")
     }
 }
 
@@ -242,6 +353,7 @@ pub(super) fn gaps<const D: usize, const S: usize>(
 ) -> Result<Vec<ContactGaps>> {
     let displacement = session.agree(state.displacement.local())?;
     let displacement = body.seen_by_contacts(&displacement);
+    let size = longest_side(session, &body.mesh.nodes);
     let contacts = body.contacts.iter().zip(&job.contact);
     let gaps = contacts.filter(|(contact, _)| contact.normal.law.depends_on_displacement()).map(
         |(contact, table)| {
@@ -250,6 +362,7 @@ pub(super) fn gaps<const D: usize, const S: usize>(
             ContactGaps {
                 on: table.on.clone(),
                 range: (smallest <= largest).then_some([smallest, largest]),
+                ejected: Ejected::of(job, contact, -smallest).filter(|_| -smallest > ROUNDING * size),
                 points: session.total(contact.normal.boundary().count()),
                 points_without_obstacle: without,
             }
@@ -294,6 +407,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             shift,
             shift_to_spread,
             inclination,
+            ejection,
         } = contact.closeness.of_all(session);
         let on = table.on.join(", ");
         if slip > LARGEST_SLIP && table.sliding == Sliding::Small {
@@ -332,6 +446,16 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                 }
             ));
         }
+        let Ejection { strain, overlap, time } = ejection;
+        if strain > EJECTED {
+            out.push(format!(
+                "contact.{number}: in the step to t = {time} s {} leapt {overlap:.3e} m into the boundary {on}, and ejected it within \
+                 this step, which strains the body by {} and adds energy that grows as the square of the overlap over the step; let the \
+                 gap close in a time that steps resolve, or take redistribute_mass = true, normal.compliance, or longer steps",
+                faced(table),
+                rounded(strain)
+            ));
+        }
         if leap > size {
             out.push(format!(
                 "contact.{number}: the obstacle that a force moves leapt by {leap:.3e} m in one step, more than the size of the body, \
@@ -348,22 +472,27 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                 }
                 most => format!("the smallest gap after any step was {:.3e} m", -most),
             };
-            let what = match table.against.join(", ") {
-                none if none.is_empty() => "its obstacle".into(),
-                other => other,
-            };
             let last = if smallest.is_finite() {
                 format!(", at the end it is {smallest:.3e} m")
             } else {
                 String::new()
             };
             out.push(format!(
-                "contact.{number}: the boundary {on} never touched {what}: {nearest}{last}; if it should have, check position, size \
-                 and motion of both, and their units"
+                "contact.{number}: the boundary {on} never touched {}: {nearest}{last}; if it should have, check position, size \
+                 and motion of both, and their units",
+                faced(table)
             ));
         }
     }
     Ok(out)
+}
+
+/// What the boundary of a contact faces.
+fn faced(table: &job::Contact) -> String {
+    match table.against.join(", ") {
+        none if none.is_empty() => "its obstacle".into(),
+        other => other,
+    }
 }
 
 /// The nodes on this rank of the bodies that have a contact, ascending. Collective.

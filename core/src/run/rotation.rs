@@ -2,23 +2,23 @@
 
 use crate::{
     error::Result,
-    fem::{body::Body, space::Simplex, state::State},
+    fem::{body::Body, space::Simplex, state::State, turning::Turn},
     linear_algebra::tensor::{larger, norm},
     parallel::session::Session,
 };
 
 /// Rotation in rad above which a warning is given: lengths are then wrong by half a per cent, directions of forces by ten.
 const LARGEST_ROTATION: f64 = 0.1;
-/// The same where boundaries slide any distance along obstacles: contact forces act where the body has turned to, and their moments are those
-/// at its undeformed places.
-const LARGEST_ROTATION_ALONG_OBSTACLES: f64 = 0.02;
+/// The moment by the growth of a body that turns, as a share of the moments of its contact forces, above which a warning is given.
+const LARGEST_SHARE: f64 = 0.1;
 
-/// A warning where a cell has turned too far since the start. Collective.
-pub(super) fn warning<const D: usize, const S: usize>(
+/// Warnings where a cell has turned too far since the start, or a body too far for its contact forces. Collective.
+pub(super) fn warnings<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
     state: &State,
-) -> Result<Option<String>> {
+    turn: Option<Turn>,
+) -> Result<Vec<String>> {
     let turned = || -> Result<f64> {
         let displacement = state.displacement.local()?;
         let of_node = |node: &u32| std::array::from_fn(|i| displacement[*node as usize * D + i]);
@@ -30,20 +30,22 @@ pub(super) fn warning<const D: usize, const S: usize>(
         Ok((0..body.mesh.cell_count()).map(of_cell).fold(0.0, larger))
     };
     let [most] = session.largest([session.agree(turned())?]);
-    let follows = body.contacts.iter().any(|contact| contact.follows_surface);
-    let (limit, wrong) = match follows {
-        false => (LARGEST_ROTATION, "lengths and the directions of contact forces"),
-        true => (
-            LARGEST_ROTATION_ALONG_OBSTACLES,
-            "lengths and the moments of contact forces (sliding = \"finite\")",
-        ),
-    };
-    Ok((most > limit).then(|| {
+    let of_cells = (most > LARGEST_ROTATION).then(|| {
         format!(
-            "parts of the body have turned by up to {most:.3} rad, more than {limit}: the equations assume small rotations, so \
-             that {wrong} are wrong; let the body turn less, or take a shorter run"
+            "parts of the body have turned by up to {most:.3} rad, more than {LARGEST_ROTATION}: the equations assume small rotations, so \
+             that lengths and the directions of contact forces are wrong; let the body turn less, or take a shorter run"
         )
-    }))
+    });
+    let of_body = turn.filter(|turn| turn.share > LARGEST_SHARE).map(|Turn { share, angle, time }| {
+        let percent = 100.0 * share;
+        format!(
+            "a body with contact had turned by {angle:.4} rad at t = {time:.4e} s: the equations assume small rotations, by which bodies grow, \
+             so that contact forces turn it back with a moment of {percent:.0} % of those that they have about its centre: a body that spins or \
+             tips is wrong by such a share, one that rolls freely slows down and turns back; let it turn less, take a shorter run, or let a \
+             rigid obstacle roll in its place ([contact.obstacle_load])"
+        )
+    });
+    Ok(of_cells.into_iter().chain(of_body).collect())
 }
 
 /// The angle in rad of the rotation in a gradient of small displacements.

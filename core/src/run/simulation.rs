@@ -12,6 +12,7 @@ use crate::{
         body::Body,
         effect::{Form, OBSTACLE_KINETIC, Step},
         state::State,
+        turning::Turning,
     },
     io::output::history::Totals,
     job::{Job, Loaded, Scheme},
@@ -42,6 +43,8 @@ pub struct Simulation<const D: usize, const S: usize> {
     pub(super) landings: Landings,
     /// The step size control, if steps are adaptive.
     pub(super) adaptive: Option<Adaptive<D>>,
+    /// How far its bodies turn, if they have contacts.
+    turning: Option<Turning<D>>,
 }
 
 /// A body with its state and the solver of its steps.
@@ -77,6 +80,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             Some(totals) => totals,
             None => totals_at_start(session, &body, &state)?,
         };
+        let turning = Turning::new(session, &body, &state)?;
         let mut adaptive = steps::adaptive(job);
         if let (Some(adaptive), Some(level)) = (&mut adaptive, totals.step_level) {
             adaptive.step_level = level;
@@ -85,12 +89,12 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if totals.single_precision_failed {
             scheme.solver.use_double_precision();
         }
-        Ok(Self { body, state, scheme, totals, landings: steps::landings(job), adaptive })
+        Ok(Self { body, state, scheme, totals, landings: steps::landings(job), adaptive, turning })
     }
 
     /// Takes the next step, shortened to land on required times, and adds it to the totals; `None` at the end time. Collective.
     pub fn advance(&mut self, session: &Session) -> Result<Option<StepOutcome>, Agreed> {
-        let Self { body, state, scheme, totals, landings, adaptive } = self;
+        let Self { body, state, scheme, totals, landings, adaptive, turning } = self;
         if state.time >= landings.end {
             return Ok(None);
         }
@@ -135,6 +139,11 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if let Some(mine) = session.agree(body.range_share(state))? {
             let [most] = session.largest([mine]);
             totals.max_rate_share = Some(totals.max_rate_share.map_or(most, |max| larger(max, most)));
+        }
+        if let Some(turning) = turning
+            && let Some(turn) = turning.after_step(session, body, state)?
+        {
+            totals.turn = Some(turn.or(totals.turn));
         }
         Ok(Some(outcome))
     }

@@ -233,7 +233,7 @@ fn switch(value: &Scalar, time: f64, largest: f64, name: &'static str) -> Breakp
 }
 
 /// The length of fixed steps or of the shortest adaptive steps of a job.
-fn shortest_step(job: &Job) -> f64 {
+pub(super) fn shortest_step(job: &Job) -> f64 {
     job.time.adaptive.as_ref().map_or(job.time.step, |adaptive| adaptive.smallest_step)
 }
 

@@ -447,11 +447,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             let written = self.session.agree(written);
             self.keep_first(&mut result, written);
         }
-        let Simulation { body, state, .. } = &self.simulation;
+        let Simulation { body, state, totals, .. } = &self.simulation;
         let warnings =
             obstacles::warnings_of_run(self.session, self.job, body, state, result == Ok(Exit::Done));
         let warnings = warnings.and_then(|mut warnings| {
-            warnings.extend(rotation::warning(self.session, body, state)?);
+            warnings.extend(rotation::warnings(self.session, body, state, totals.turn)?);
             Ok(warnings)
         });
         let warnings = self.session.agree(warnings).map(|warnings| {

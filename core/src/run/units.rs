@@ -1,11 +1,14 @@
 //! Sizes by which wrong units of a job are seen: of each body its extent, mass, waves and loads.
 
-use super::{materials::Materials, parts::area_of};
+use super::{
+    materials::{Materials, wave_speed},
+    parts::area_of,
+};
 use crate::{
     error::Result,
     fem::body::Body,
     job::Job,
-    laws::{digits::Digits, material::Hypothesis},
+    laws::digits::Digits,
     linear_algebra::tensor::{larger, norm},
     parallel::{agreement::Agreed, session::Session},
 };
@@ -88,17 +91,8 @@ pub(super) fn bodies<const D: usize, const S: usize>(
         sum.volume += volume;
         sum.mass += volume * density;
         let modulus = material.elasticity.as_ref().map_or(0.0, |elasticity| elasticity.youngs_modulus);
-        let waves = material.elasticity.as_ref().map_or(0.0, |elasticity| {
-            let mut strain = [0.0; S];
-            strain[0] = 1.0;
-            let hypothesis = job.material.hypothesis.unwrap_or(Hypothesis::Space);
-            let tensor = elasticity.tensor(hypothesis);
-            // A formula of the shear modulus leaves the bulk modulus as it is.
-            let factor = elasticity.expression.as_ref().map_or(1.0, |formula| formula.at_rest());
-            tensor.apply(&strain)[0] + (factor - 1.0) * tensor.shear * 2.0 / 3.0
-        });
-        let speed = if density > 0.0 { (waves / density).sqrt() } else { 0.0 };
-        let most = [density, modulus, speed];
+        let speed = wave_speed(material, job.material.hypothesis);
+        let most = [density, modulus, speed.unwrap_or(0.0)];
         sum.most = std::array::from_fn(|i| sum.most[i].max(most[i]));
     }
     for facet in body.load.tractions.iter().flat_map(|traction| &traction.facets) {

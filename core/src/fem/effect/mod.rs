@@ -53,9 +53,9 @@ pub use crate::laws::step::{Blend, Evaluation, Moment, Quantity, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
     ASTRAY, CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
-    Freedom, Friction, Gaps, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK, OVERRUN,
-    PointCount, PointState, Quadrature, ReferenceValues, SLIP_BETWEEN_PAIRINGS, STORED_IN_CONTACT, Touch,
-    choose_unknowns, contact_nodes, set_walls,
+    EJECTED, Ejection, Freedom, Friction, Gaps, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
+    OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, SLIP_BETWEEN_PAIRINGS,
+    STORED_IN_CONTACT, Touch, choose_unknowns, contact_nodes, set_walls, tangents,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

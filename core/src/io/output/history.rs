@@ -9,6 +9,7 @@ use crate::{
     fem::{
         effect::{CONTACT, DAMAGE, DEBONDING, ENERGIES, Energy, FIRST_OF_HEAT, Peaks, Role},
         state::State,
+        turning::Turn,
     },
     linear_algebra::tensor::larger,
     solver::stepping::{StepLevel, StepOutcome, StepRange, Work},
@@ -171,6 +172,9 @@ pub struct Totals {
     /// Number of steps that were parts of fixed ones, without the last part of each.
     #[serde(skip_serializing_if = "is_no_part")]
     pub parts: u64,
+    /// The worst rotation of a body beside its contact forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn: Option<Turn>,
     /// The level of adaptive steps.
     #[serde(default)]
     #[serde(rename = "pace")]

@@ -96,12 +96,13 @@ pub(super) fn keep_closeness<const D: usize, const S: usize>(
     session: &Session,
     body: &mut Body<D, S>,
     state: &State,
+    step: Step,
 ) -> Result<()> {
     let [velocity, displacement] = [&state.velocity, &state.displacement].map(DistributedVector::local);
     let (velocity, displacement) = (velocity?, displacement?);
     let [velocity, displacement] = [&velocity, &displacement].map(|values| body.seen_by_contacts(values));
     for contact in &mut body.contacts {
-        contact.keep_closeness(&velocity);
+        contact.keep_closeness(step, &velocity)?;
         contact.keep_slip([&displacement, &velocity]);
         contact.keep_shift(session, [&displacement, &velocity])?;
     }

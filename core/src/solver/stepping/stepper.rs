@@ -546,7 +546,7 @@ impl Stepper {
         self.integrator.commit(state, &self.trial, step)?;
         state.fallback = outcome.fallback;
         commit_tractions(body, state)?;
-        keep_closeness(session, body, state)?;
+        keep_closeness(session, body, state, step)?;
         body.commit();
         drop(stage);
         let balancing = Instant::now();

@@ -1,6 +1,6 @@
 //! Distances of a body from an obstacle.
 
-use crate::parallel::session::Session;
+use crate::{linear_algebra::tensor::larger, parallel::session::Session};
 
 /// How near a body and its obstacle have come in any step so far; minus infinity where they never could touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,10 +23,43 @@ pub struct Closeness {
     pub shift_to_spread: f64,
     /// Largest inclination in rad of the resultant of the pressures to the obstacle where such changes are not negligible.
     pub inclination: f64,
+    /// The hardest ejection of a point in one step.
+    pub ejection: Ejection,
+}
+
+/// How an obstacle ejects a point with mass that is inside of it at the start of a step, or into which its gap leaps: a constraint moves the
+/// point out within this step, however short.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ejection {
+    /// The strain of the body by it: its speed as a share of that of compression waves.
+    pub strain: f64,
+    /// The overlap in m.
+    pub overlap: f64,
+    /// The end of the step in s.
+    pub time: f64,
+}
+
+impl Ejection {
+    /// None so far.
+    const NONE: Self =
+        Self { strain: f64::NEG_INFINITY, overlap: f64::NEG_INFINITY, time: f64::NEG_INFINITY };
+
+    /// The harder one of two.
+    pub(super) fn or(self, other: Self) -> Self {
+        if larger(self.strain, other.strain) > self.strain { other } else { self }
+    }
+
+    /// The hardest one over all ranks. Collective.
+    fn of_all(self, session: &Session) -> Self {
+        let [strain] = session.largest([self.strain]);
+        let mine = if self.strain.to_bits() == strain.to_bits() { self } else { Self::NONE };
+        let [overlap, time] = session.largest([mine.overlap, mine.time]);
+        Self { strain, overlap, time }
+    }
 }
 
 /// How many numbers these are.
-const COUNT: usize = 9;
+const COUNT: usize = 12;
 
 impl Default for Closeness {
     fn default() -> Self {
@@ -42,21 +75,35 @@ impl Closeness {
 
     /// All of them.
     fn numbers(self) -> [f64; COUNT] {
-        let Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination } =
-            self;
-        [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination]
+        let Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, .. } = self;
+        let Self { inclination, ejection: Ejection { strain, overlap, time }, .. } = self;
+        let ejected = [inclination, strain, overlap, time];
+        let before = [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread];
+        std::array::from_fn(|at| if at < before.len() { before[at] } else { ejected[at - before.len()] })
     }
 
     /// The one over all ranks. Collective.
     pub fn of_all(self, session: &Session) -> Self {
-        Self::of(session.largest(self.numbers()))
+        Self { ejection: self.ejection.of_all(session), ..Self::of(session.largest(self.numbers())) }
     }
 
     /// The one with these numbers.
-    fn of(
-        [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination]: [f64; COUNT],
-    ) -> Self {
-        Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, inclination }
+    fn of(numbers: [f64; COUNT]) -> Self {
+        let [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, ..] = numbers;
+        let [.., inclination, strain, overlap, time] = numbers;
+        let ejection = Ejection { strain, overlap, time };
+        Self {
+            penetration,
+            held,
+            slip,
+            sharpness,
+            leap,
+            moved,
+            shift,
+            shift_to_spread,
+            inclination,
+            ejection,
+        }
     }
 
     /// From the numbers of a checkpoint.
@@ -74,4 +121,25 @@ pub struct Gaps {
     pub largest: f64,
     /// Points from which no obstacle lies along the normal.
     pub without: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_checkpoint_keeps_is_restored() {
+        let ejection = Ejection { strain: 0.5, overlap: 1e-6, time: 0.25 };
+        let kept = Closeness { slip: 2.0, leap: 3.0, inclination: 4.0, ejection, ..Closeness::default() };
+        assert_eq!(Closeness::restored(&kept.saved()), kept);
+        let earlier = Closeness { ejection: Ejection::NONE, ..kept };
+        assert_eq!(Closeness::restored(&kept.saved()[..9]), earlier);
+    }
+
+    #[test]
+    fn the_hardest_ejection_is_kept_whole() {
+        let soft = Ejection { strain: 0.1, overlap: 2.0, time: 1.0 };
+        let hard = Ejection { strain: 0.2, overlap: 1.0, time: 2.0 };
+        assert_eq!([Ejection::NONE.or(soft), soft.or(hard), hard.or(soft)], [soft, hard, hard]);
+    }
 }

@@ -71,6 +71,16 @@ pub(super) enum FrictionStatus {
 }
 
 impl<const D: usize> Friction<D> {
+    /// The coefficient of friction at rest at the start of the run, or that of a law that rises with the speed, at 1 m/s; infinite where
+    /// friction does not need a pressure.
+    pub fn coefficient_at_rest(&self) -> f64 {
+        let bound = |speed: f64, pressure: f64| self.law.bound(speed, pressure, self.context);
+        if [0.0, 1.0].iter().any(|speed| bound(*speed, 0.0) > 0.0) {
+            return f64::INFINITY;
+        }
+        larger(bound(0.0, 1.0), bound(1.0, 1.0))
+    }
+
     /// Applies the law to the points of a contact; refuses supports that leave no unique tangent, and missing pressure.
     pub(super) fn new(
         law: FrictionLaw,

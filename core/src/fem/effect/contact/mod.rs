@@ -70,7 +70,7 @@ use point::{Point, Vectors::Body, gauss_points};
 use std::collections::BTreeSet;
 
 pub use crate::laws::contact::Quadrature;
-pub use closeness::{Closeness, Gaps};
+pub use closeness::{Closeness, Ejection, Gaps};
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, ContactEnergy, STORED_IN_CONTACT};
@@ -78,8 +78,8 @@ pub use friction::Friction;
 pub use loaded_obstacle::{Freedom, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK};
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
-pub use sweep::{ASTRAY, OVERRUN, SLIP_BETWEEN_PAIRINGS, Touch};
-pub(super) use tangential_point::tangents;
+pub use sweep::{ASTRAY, EJECTED, OVERRUN, SLIP_BETWEEN_PAIRINGS, Touch};
+pub use tangential_point::tangents;
 pub use unknowns::{choose_unknowns, set_walls};
 
 /// The law along the normal of a contact boundary, and its points.
@@ -108,6 +108,8 @@ pub struct Contact<const D: usize> {
     pub shares_of_heat: [f64; 2],
     /// How near body and obstacle have come in the steps so far, on this rank.
     pub closeness: Closeness,
+    /// The speed in m/s of compression waves, of the slowest material at its points; none where they have no mass.
+    pub wave_speed: Option<f64>,
     /// The blend of earlier states from which the current step starts.
     blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
@@ -176,6 +178,7 @@ impl<const D: usize> Contact<D> {
             wear: None,
             shares_of_heat: [1.0, 0.0],
             closeness: Closeness::default(),
+            wave_speed: None,
             blend: Blend::euler(0.0),
             reference,
             facets: facets.to_vec(),

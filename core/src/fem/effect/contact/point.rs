@@ -126,6 +126,8 @@ pub(super) struct Point<const D: usize> {
     pub continued_wear: f64,
     /// Growth of the gap in the step by the motion of the obstacle, in m.
     pub growth: f64,
+    /// Velocity in m/s with which it leaves the obstacle at the start of the step, at least 0.
+    pub leaves: f64,
     /// Contribution of the blend of a two-step scheme to the penetration, in m.
     pub blend_offset: f64,
     /// Pressure in Pa before the step, where the point stores its pressure.
@@ -177,6 +179,7 @@ impl<const D: usize> Point<D> {
             worn: [0.0; 2],
             continued_wear: 0.0,
             growth: 0.0,
+            leaves: 0.0,
             blend_offset: 0.0,
             pressure_before: 0.0,
             pressure: 0.0,

@@ -44,6 +44,7 @@ impl<const D: usize> Contact<D> {
             let point = &mut self.normal.points[at];
             point.reach = gap;
             point.moved = along - worn;
+            point.leaves = (-point.normal_component(Body, velocity)).max(0.0);
             point.penetration_before = along_before - before - worn;
             point.weight_before = weight_before;
             [point.blend_offset, point.continued_wear] = if blend.earlier == 0.0 {

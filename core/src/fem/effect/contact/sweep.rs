@@ -2,7 +2,7 @@
 
 use super::{
     Contact,
-    closeness::{Closeness, Gaps},
+    closeness::{Closeness, Ejection, Gaps},
     normal::NormalContact,
     point::{Point, Unknown, Vectors::Body},
     tangential_point::tangents,
@@ -10,7 +10,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{effect::Step, pairs::PairedNode, space::Held},
-    laws::contact::{Gap, GivenGap, Sweep},
+    laws::contact::{Gap, GivenGap, NodeContext, Sweep},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     parallel::session::Session,
 };
@@ -27,6 +27,11 @@ pub const OVERRUN: f64 = 1e-6;
 
 /// The slip between bodies, as a share of the size of a facet, after which what they face is found anew.
 pub const SLIP_BETWEEN_PAIRINGS: f64 = 0.25;
+
+/// The strain by the ejection of points from an obstacle above which a warning is given: that of a hard blow.
+pub const EJECTED: f64 = 1e-4;
+/// Halvings of a step after which the change of a gap that is left is a leap.
+const HALVINGS: usize = 20;
 
 /// The gap, as a share of the size of a facet, up to which a point touches another body along which it slides.
 const TOUCHING: f64 = 1e-6;
@@ -177,11 +182,49 @@ impl<const D: usize> Contact<D> {
         Ok(())
     }
 
-    /// Keeps how near the obstacle has come in the step just solved, at its velocities with ghosts.
-    pub fn keep_closeness(&mut self, velocity: &[f64]) {
-        if !self.normal.law.depends_on_displacement() {
-            return;
+    /// Whether points with mass that are inside of the obstacle are out of it at the end of a step, however short.
+    pub fn ejects(&self) -> bool {
+        self.wave_speed.is_some() && self.normal.law.velocity_bound(NodeContext::AT_THE_GAP).is_some()
+    }
+
+    /// How the obstacle ejects a point in the step just solved. What overlaps before the first step is known before it.
+    fn ejection(&self, point: &Point<D>, step: Step) -> Result<Ejection> {
+        let way = point.context.step_length;
+        let before = if step.previous_length > 0.0 { larger(point.penetration_before, 0.0) } else { 0.0 };
+        let strain = |overlap: f64| {
+            let speed = overlap / way - point.leaves;
+            self.wave_speed.map_or(f64::NEG_INFINITY, |wave_speed| speed / wave_speed)
+        };
+        let inside = point.moved - point.reach;
+        let mut overlap = inside.min(before - point.growth.min(0.0));
+        if strain(overlap) > EJECTED && point.growth < 0.0 {
+            overlap = inside.min(before + self.leap(point, step)?);
         }
+        Ok(Ejection { strain: strain(overlap), overlap, time: step.time })
+    }
+
+    /// By how much the gap of a point falls at one moment of a step, in m, by the given motion of the obstacle.
+    fn leap(&self, point: &Point<D>, step: Step) -> Result<f64> {
+        let seen = self.obstacle.seen_before(&point.place);
+        let gap = |time: f64| self.obstacle.gap_of(point, time, &seen, point.moved);
+        let mut times = [step.start(), step.time];
+        let mut gaps = [gap(times[0])?, gap(times[1])?];
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (times[0] + times[1]);
+            let between = gap(middle)?;
+            let later = usize::from(gaps[0] - between > between - gaps[1]);
+            (times[later], gaps[later]) = (middle, between);
+        }
+        let fall = gaps[0] - gaps[1];
+        Ok(if fall.is_finite() { larger(fall, 0.0) } else { 0.0 })
+    }
+
+    /// Keeps how near the obstacle has come in the step just solved, at its velocities with ghosts.
+    pub fn keep_closeness(&mut self, step: Step, velocity: &[f64]) -> Result<()> {
+        if !self.normal.law.depends_on_displacement() {
+            return Ok(());
+        }
+        let ejects = self.ejects();
         let mut closeness = self.closeness;
         if let [Some(motion), _] = &self.obstacle.motions {
             closeness.leap = larger(closeness.leap, motion.way());
@@ -192,11 +235,18 @@ impl<const D: usize> Contact<D> {
                 let presses = point.pressure_at(&self.normal.law, Body, velocity) != 0.0;
                 closeness.penetration =
                     larger(closeness.penetration, if presses { larger(after, 0.0) } else { after });
+                if ejects && presses && point.can_touch() {
+                    let ejection = self.ejection(point, step)?;
+                    if ejection.strain > EJECTED {
+                        closeness.ejection = closeness.ejection.or(ejection);
+                    }
+                }
             } else {
                 closeness.held = larger(closeness.held, after);
             }
         }
         self.closeness = closeness;
+        Ok(())
     }
 
     /// Keeps how far points with pressure have slid along another body in the step just committed, at displacements and velocities that

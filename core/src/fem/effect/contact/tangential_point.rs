@@ -279,9 +279,7 @@ fn part<const D: usize>(vectors: &[Vector<D>], vector: &Vector<D>) -> Vector<D> 
 }
 
 /// Orthonormal directions along a surface with this unit normal.
-pub(in crate::fem::effect) fn tangents<const D: usize>(
-    normal: &Vector<D>,
-) -> impl Iterator<Item = Vector<D>> {
+pub fn tangents<const D: usize>(normal: &Vector<D>) -> impl Iterator<Item = Vector<D>> {
     let axes: [Vector<D>; D] = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
     let (basis, count) = span_without(&axes, &[*normal]);
     basis.into_iter().take(count)
