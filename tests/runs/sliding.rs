@@ -3,6 +3,7 @@
 use super::pairs::{falling_on_a_corner, forces_of, write_triangles};
 use crate::{
     case::Case,
+    launch,
     results::{Results, relative_difference},
 };
 
@@ -30,7 +31,7 @@ fn a_corner_carries_the_law_whichever_side_the_job_names_first_and_however_fine_
     let outcome = stated.run_with(2, &["--force"]).expect(0);
     outcome
         .says("corners or edges of skin lie on faces of top, whose nodes carry the law")
-        .says("delete `side`");
+        .says("state side = \"against\"");
     let outcome = stated.run_with(1, &["--force"]).expect(0);
     outcome.says("corners or edges of skin pressed on faces of top");
 }
@@ -203,4 +204,66 @@ fn adaptive_steps_make_no_peaks_of_the_force_of_a_corner_that_slides_without_mas
     // That of fixed steps is 2.4e4 N.
     let [peak, steady] = [largest(&with_mass), largest(&without)];
     assert!(steady > 2e4 && steady < 4e4 && peak > 10.0 * steady, "{peak} N, without mass {steady} N");
+}
+
+/// A flat pad that is pressed with 0.1 MPa and drawn along a longer flat rail, whose mesh is much finer, with this contact.
+fn drawn_pad(sides: &str) -> Case {
+    Case::written_as(&format!(
+        "mesh.rectangle = [{{ name = 'rail', size = [0.6, 0.05], cells = [60, 2] }},
+            {{ name = 'pad', corner = [0.1, 0.05], size = [0.2, 0.05], cells = [7, 3] }}]
+         material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.3 }} }}
+         support = [{{ on = ['rail.bottom'], fix = 'all' }}, {{ on = ['pad.top'], fix = ['x'], velocity = ['0.2'] }}]
+         traction = [{{ on = ['pad.top'], value = [0.0, -1e5] }}]
+         contact = [{{ {sides}, sliding = 'finite', normal.unilateral = {{}}, friction.coulomb.coefficient = 0.3, wear.coefficient = 1e-9 }}]
+         time = {{ end = 0.5, step = 0.01, scheme = 'implicit_euler' }}"
+    ))
+}
+
+/// Nodes of the rail that the pad has just reached would bear more than ten times the mean pressure.
+#[test]
+fn a_pad_whose_ends_slide_on_a_rail_carries_the_law_however_fine_the_mesh_of_the_rail_is() {
+    for (on, against, ranks) in [("pad.bottom", "rail.top", 1), ("rail.top", "pad.bottom", 2)] {
+        let case = drawn_pad(&format!("on = ['{on}'], against = ['{against}']"));
+        let outcome = case.run_with(ranks, &[]).expect(0);
+        let text = launch::unwrapped(&outcome.stdout);
+        assert!(!text.contains("lie over faces"), "{text}");
+        if on == "rail.top" {
+            outcome.says("nodes of pad.bottom carry the law, because its corners or edges lie over rail.top");
+        }
+        let table = case.results().table("resultants.csv").only("source", &format!("contact {on}"));
+        for pressure in table.numbers("largest_pressure") {
+            assert!(pressure > 9e4 && pressure < 3e5, "{on}: {pressure} Pa");
+        }
+    }
+    let case = drawn_pad("on = ['pad.bottom'], against = ['rail.top'], side = 'against'");
+    case.run_with(2, &[])
+        .expect(0)
+        .says("ends of pad.bottom lie over faces of rail.top, whose nodes carry the law")
+        .says("and the worn volume is wrong; state side = \"on\"");
+    // Searches that start from where one before has gone astray leave no more of the forces.
+    let left = case.results().number("max_residual");
+    assert!(left <= 1e-10, "{left}");
+}
+
+#[test]
+fn a_box_whose_edges_slide_on_a_plate_carries_the_law_and_of_two_that_cross_neither_is_better() {
+    let boxes = |size: &str| {
+        Case::written_as(&format!(
+            "mesh.box = [{{ name = 'plate', size = [1.0, 0.6, 0.1], cells = [12, 8, 1] }},
+                {{ name = 'box', corner = [0.2, 0.1, 0.1], size = {size}, cells = [2, 2, 1] }}]
+             material.elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.3 }}
+             support = [{{ on = ['plate.bottom'], fix = 'all' }}, {{ on = ['box.top'], fix = ['x', 'y'], velocity = ['0.1', 0.0] }}]
+             traction = [{{ on = ['box.top'], value = [0.0, 0.0, -1e5] }}]
+             contact = [{{ on = ['plate.top'], against = ['box.bottom'], sliding = 'finite', normal.unilateral = {{}} }}]
+             time = {{ end = 0.1, step = 0.1, scheme = 'implicit_euler' }}"
+        ))
+    };
+    for ranks in [1, 2] {
+        let chosen = boxes("[0.4, 0.4, 0.1]").run_with(ranks, &["--force"]).expect(0);
+        chosen.says("nodes of box.bottom carry the law, because its corners or edges lie over plate.top");
+        let crossed = boxes("[0.4, 0.8, 0.1]").run_with(ranks, &["--force"]).expect(0);
+        crossed
+            .says("ends of box.bottom lie over faces of plate.top, whose nodes carry the law")
+            .says("round those of box.bottom");
+    }
 }

@@ -85,6 +85,18 @@ fn a_pad_that_its_friction_carries_along_wears_with_the_order_of_the_scheme_and_
 }
 
 #[test]
+fn a_pad_that_a_belt_touches_in_a_single_step_wears_for_the_whole_step() {
+    // At 0.5 s alone: w = a (d - w) with d = 10 um and a = coefficient (0.1 s) (2 m/s) E / h = 0.2.
+    let exact = INTERFERENCE * 0.2 / 1.2;
+    for scheme in ["implicit_euler", "bdf2"] {
+        let case =
+            pad(scheme, 0.1, 1.0).set("contact.0.obstacle.plane.point", "['2*t', '1e-5 - 4e-3*(t - 0.5)^2']");
+        let depth = deepest(&case.run(1));
+        assert!((depth / exact - 1.0).abs() < 1e-9, "{scheme}: {depth} m for {exact} m");
+    }
+}
+
+#[test]
 fn a_pad_never_wears_off_more_than_it_overlaps_its_belt_in_steps_of_any_length() {
     for scheme in ["implicit_euler", "bdf2"] {
         for step in [0.7, 1.9, 4.0, 300.0] {

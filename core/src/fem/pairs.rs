@@ -42,6 +42,8 @@ pub struct PairedNode<const D: usize> {
     /// The angle in rad of the edges of the other side over the part of the surface for which it stands: by how much the undeformed other
     /// side turns there, on either side of its mean, or is inclined to the own side where it ends.
     pub sharpness: f64,
+    /// Whether the other side ends over the facets around it.
+    pub meets_end: bool,
     /// How curved the own side is there: by how much its normal at a corner of a facet around it differs from that of the facet at most, as the
     /// length of the difference of these unit vectors.
     pub curvature: f64,
@@ -114,6 +116,15 @@ pub enum Exchange {
     Faced,
     /// All nodes of the side `on` belong to other contacts, too.
     Shared,
+}
+
+/// What of the other side lies over the faces of the side that carries a law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edges {
+    /// The largest angle in rad of its edges.
+    pub sharpness: f64,
+    /// Whether it ends there.
+    pub ends: bool,
 }
 
 /// A contact that shares facets of its slave side with another one, with the facets of this rank on both sides.
@@ -260,6 +271,7 @@ impl<const D: usize> Pair<D> {
                 neighbours: Vec::new(),
                 stretch,
                 sharpness: 0.0,
+                meets_end: false,
                 curvature: f64::INFINITY,
             })
         });
@@ -267,9 +279,9 @@ impl<const D: usize> Pair<D> {
         Ok(())
     }
 
-    /// The largest angle in rad of edges of the other side where the undeformed surfaces are nearest to each other, up to one facet farther.
+    /// What lies over the faces of the slave side where the undeformed surfaces are nearest to each other, up to one facet farther.
     /// Collective.
-    pub fn sharpness(&self, session: &Session, mesh: &Mesh<D>) -> f64 {
+    pub fn edges(&self, session: &Session, mesh: &Mesh<D>) -> Edges {
         let facing = || self.nodes.iter().filter(|node| !node.masters.is_empty());
         let nearest = facing().map(|node| node.distance).fold(f64::INFINITY, f64::min);
         let side = |facet: &u32| {
@@ -277,9 +289,11 @@ impl<const D: usize> Pair<D> {
             norm(&add_scaled(&corners[1], -1.0, &corners[0]))
         };
         let [least, size] = session.largest([-nearest, self.on.iter().map(side).fold(0.0, larger)]);
-        let near = facing().filter(|node| node.distance <= size - least);
-        let [most] = session.largest([near.map(|node| node.sharpness).fold(0.0, larger)]);
-        most
+        let near = || facing().filter(|node| node.distance <= size - least);
+        let ends = near().any(|node| node.meets_end);
+        let sharpness = near().map(|node| node.sharpness).fold(0.0, larger);
+        let [sharpness, ends] = session.largest([sharpness, f64::from(u8::from(ends))]);
+        Edges { sharpness, ends: ends > 0.0 }
     }
 
     /// The nodes that carry the law, and those on which their velocities depend or may depend as bodies slide, by global numbers on all
@@ -335,6 +349,7 @@ impl<const D: usize> Pair<D> {
                     neighbours,
                     stretch,
                     sharpness,
+                    meets_end: false,
                     curvature,
                 }
             })
@@ -815,7 +830,7 @@ fn paired<const D: usize>(
                     .map(|(master, share)| (share, add_scaled(&places[master], -1.0, &places[&node])));
                 distance = ways.map(|(share, way)| share * dot(&way, &normal)).sum();
             }
-            let sharpness = sum.sharpness(distance);
+            let (sharpness, meets_end) = (sum.sharpness(distance), sum.weight < COVERED * sum.whole);
             PairedNode {
                 node: mesh.owned_node(node) as u32,
                 normal,
@@ -825,6 +840,7 @@ fn paired<const D: usize>(
                 neighbours: sum.neighbours.into_iter().collect(),
                 stretch: 1.0 + sum.passed / sum.weight,
                 sharpness,
+                meets_end,
                 curvature: curvatures[&node],
             }
         })
@@ -966,6 +982,7 @@ mod tests {
             neighbours: Vec::new(),
             stretch: 1.0,
             sharpness: 0.0,
+            meets_end: false,
             curvature,
         };
         for count in [3, 7, 40] {

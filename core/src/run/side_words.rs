@@ -1,8 +1,8 @@
 //! What users read about the sides of contact between bodies: the lines of the log, and warnings.
 
-use super::sides::{STIFFER, is_blunter};
+use super::sides::{STIFFER, is_smoother};
 use crate::{
-    fem::pairs::{Exchange, Pair},
+    fem::pairs::{Edges, Exchange, Pair},
     job::{self, Job, Side},
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -58,7 +58,8 @@ pub(super) fn warnings_of_changes<const D: usize>(
     changed.map(words).collect()
 }
 
-/// Warnings about corners and edges that lie over faces whose nodes carry the law. Collective, with the same warnings on all ranks.
+/// Warnings about corners, edges and ends of surfaces that lie over faces whose nodes carry the law. Collective, with the same warnings on all
+/// ranks.
 pub(super) fn warnings_of_edges<const D: usize>(
     session: &Session,
     job: &Job,
@@ -67,20 +68,22 @@ pub(super) fn warnings_of_edges<const D: usize>(
 ) -> Result<Vec<String>, Agreed> {
     let mut out = Vec::new();
     for pair in pairs.iter().filter(|pair| pair.slides) {
-        let sharpness = pair.sharpness(session, mesh);
-        if sharpness <= EDGE {
+        let Edges { sharpness, ends } = pair.edges(session, mesh);
+        if sharpness <= EDGE && !ends {
             continue;
         }
         let mut other = pair.clone().exchanged(Exchange::Requested);
         other.form(session, mesh, &mesh.nodes)?;
-        let remedy = match (is_blunter((session, mesh), &other, sharpness), job.contact[pair.contact].side) {
+        let remedy = match (is_smoother((session, mesh), [&other, pair]), job.contact[pair.contact].side) {
             (false, _) => None,
             (true, Side::Auto) => {
                 Some("let no support and no other contact hold their nodes, so that these carry the law")
             }
-            (true, _) => Some("delete `side`"),
+            (true, Side::On) => Some("state side = \"against\""),
+            (true, Side::Against) => Some("state side = \"on\""),
         };
-        out.push(words_of_edges(job, pair, ("lie", remedy)));
+        let words = if sharpness > EDGE { words_of_edges } else { words_of_ends };
+        out.push(words(job, pair, ("lie", remedy)));
     }
     Ok(out)
 }
@@ -141,6 +144,21 @@ fn words_of_edges<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&st
     format!(
         "contact.{}: corners or edges of {other} {lie} on faces of {own}, whose nodes carry the law: as they slide, forces along these faces may \
          be wrong by a part of the pressure; {remedy}",
+        pair.contact
+    )
+}
+
+/// A warning about the ends of a surface over faces, with what to do about it.
+fn words_of_ends<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<&str>)) -> String {
+    let [own, other] = names_of_sides(job, pair);
+    let worn = if job.contact[pair.contact].wear.is_some() { ", and the worn volume is wrong" } else { "" };
+    let remedy = remedy.map_or_else(
+        || format!("round those of {other} with a radius of more than two facets of {own}"),
+        Into::into,
+    );
+    format!(
+        "contact.{}: ends of {other} {lie} over faces of {own}, whose nodes carry the law: as they slide, pressures of nodes near these ends may \
+         be many times too large{worn}; {remedy}",
         pair.contact
     )
 }

@@ -6,7 +6,7 @@ use crate::{
     fem::{
         coupling::{HELD_TOGETHER, Inclined, held_share, is_held},
         effect::Supports,
-        pairs::{Exchange, Pair, PairedNode},
+        pairs::{Edges, Exchange, Pair, PairedNode},
         space::{Held, facets},
     },
     job::{self, Job, Side},
@@ -122,10 +122,12 @@ impl<'a, const D: usize> Sides<'a, D> {
         if earlier.is_some() {
             return Ok(first);
         }
-        let sharpness = first.sharpness(session, mesh);
-        if first.slides && sharpness > SHARP {
+        if first.slides {
             let other = formed(first.clone().exchanged(Exchange::Sharper))?;
-            if !is_held(&other) && is_blunter((session, mesh), &other, sharpness) {
+            if is_smoother((session, mesh), [&first, &other]) {
+                return Ok(first);
+            }
+            if !is_held(&other) && is_smoother((session, mesh), [&other, &first]) {
                 return Ok(other);
             }
         }
@@ -141,9 +143,7 @@ impl<'a, const D: usize> Sides<'a, D> {
             && !self.meets_another(&first)?
         {
             let other = formed(first.clone().exchanged(reason))?;
-            let is_sharp =
-                || first.slides && is_blunter((session, mesh), &first, other.sharpness(session, mesh));
-            return Ok(if is_held(&other) || is_sharp() { first } else { other });
+            return Ok(if is_held(&other) { first } else { other });
         }
         Ok(first)
     }
@@ -361,15 +361,18 @@ pub(super) fn conflict<const D: usize>(
     })
 }
 
-/// Whether nodes of a pair face the other side, and edges that are less than half as sharp as these, given by their angle in rad.
+/// Whether the first of a pair and its exchange is the better choice where bodies slide: its nodes face the other side, and no edges that are
+/// half as sharp as those over the faces of the second one; or, where neither has sharper ones, no end of the other side, and the second does.
 /// Collective.
-pub(super) fn is_blunter<const D: usize>(
+pub(super) fn is_smoother<const D: usize>(
     (session, mesh): (&Session, &Mesh<D>),
-    pair: &Pair<D>,
-    sharpness: f64,
+    pairs: [&Pair<D>; 2],
 ) -> bool {
-    let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty()).count();
-    session.total(facing) > 0 && sharpness > SHARP && 2.0 * pair.sharpness(session, mesh) < sharpness
+    let facing = pairs[0].nodes.iter().filter(|node| !node.masters.is_empty()).count();
+    let [own, other] = pairs.map(|pair| pair.edges(session, mesh));
+    let is_sharper = |one: Edges, than: Edges| one.sharpness > SHARP && 2.0 * than.sharpness < one.sharpness;
+    let ends_less = other.ends && !own.ends && !is_sharper(own, other);
+    session.total(facing) > 0 && (is_sharper(other, own) || ends_less)
 }
 
 /// Whether the nodes of a pair face more than twice as many nodes as they are, in space more than four times as many. Collective.
@@ -413,6 +416,7 @@ mod tests {
             neighbours: Vec::new(),
             stretch: 1.0,
             sharpness: 0.0,
+            meets_end: false,
             curvature: if is_curved { 1.0 } else { 0.0 },
         };
         conflict(&node, &held, rubs, |direction| vec![(1.0, norm(&held.free_part(1, direction)))])

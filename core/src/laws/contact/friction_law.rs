@@ -240,9 +240,9 @@ pub trait FrictionBound {
 }
 
 /// The accumulated slip distance in m after a step that starts from this blend of those after the last step and before it, at this sliding
-/// velocity in m/s at its end. Where a point comes to rest its slip ends, whatever the blend of a two-step scheme continues.
+/// velocity in m/s at its end. A two-step scheme moves a point that sticks on by a share of its last motion: its slip is what it has moved.
 pub fn slip_after([recent, earlier]: [f64; 2], blend: Blend, speed: f64) -> f64 {
-    if speed == 0.0 { recent } else { blend.of(recent, earlier) + blend.length * speed }
+    blend.of(recent, earlier) + blend.length * speed
 }
 
 /// The accumulated slip distance.

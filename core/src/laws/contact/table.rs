@@ -35,7 +35,7 @@ pub enum Sliding {
     Small,
     /// Any distance: what nodes face is found anew from the displacements, whenever some node has slid by a quarter of a facet since the
     /// last time, and so is the direction of the pressure: at right angles to a flat surface on which a corner or a rounded edge slides, and to both of two edges.
-    /// Corners and edges must be on the side that carries the law (`side`). Along an obstacle: the gap is that from where the boundary is at
+    /// Corners, edges and ends, as of a pad on a longer rail, must be on the side that carries the law (`side`). Along an obstacle: the gap is that from where the boundary is at
     /// the start of each step, and the pressure acts at right angles to the obstacle there, except at nodes that other contacts share. An inner
     /// corner of an obstacle should be made of two contacts, each with one of its sides, at boundaries that meet at an edge of the body.
     /// Requires a normal law with a gap, without adhesion and memory.
@@ -53,10 +53,10 @@ impl Sliding {
 #[serde(rename_all = "snake_case")]
 pub enum Side {
     /// Those in `on`, unless supports hold nodes there and not what they face, or the law of another contact acts at what they face, or all
-    /// their nodes belong to other contacts, too, or, with `sliding = "finite"`, corners or edges of `against` lie
-    /// over them where the bodies are nearest to each other, or their body is more than 100 times as stiff, or, of bodies that are not,
-    /// their mesh is clearly coarser: they face more than twice as many nodes of `against` as they have themselves, in 3D more than four
-    /// times as many. Then those in `against`, if supports do not hold nodes there in the same way and, for a stiffer body or a coarser
+    /// their nodes belong to other contacts, too, or, with `sliding = "finite"`, corners, edges or ends of `against` lie
+    /// over them where the bodies are nearest to each other, and theirs not over `against`; or else their body is more than 100 times as
+    /// stiff, or, of bodies that are not, their mesh is clearly coarser: they face more than twice as many nodes of `against` as they have
+    /// themselves, in 3D more than four times as many. Then those in `against`, if supports do not hold nodes there in the same way and, for a stiffer body or a coarser
     /// mesh, no other contact has nodes of either side. The log names the choice. A run that starts from another one (`[initial] from`)
     /// prefers the choice of that run.
     #[default]

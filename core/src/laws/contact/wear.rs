@@ -14,14 +14,16 @@
 //! the wear that it causes.
 //!
 //! The blend of a two-step scheme continues the wear of the last step by a depth `b`. Where the pressure ends, so does the wear: the
-//! depth grows only as far as the surface would penetrate without it, at most by `b` ([`Wear::depth`]).
+//! depth grows only as far as the surface would penetrate without it, at most by `b` ([`Wear::depth`]). Therefore the first step that
+//! wears a point off is one of implicit Euler, with the whole length of the step for `k` ([`Wear::continued`]): the formula would leave a
+//! third of its wear to the steps after it.
 
 use super::{
     interface::Interface,
     laws::NormalResponse,
     normal_law::{NodeContext, Resolved},
 };
-use crate::laws::law::LawFault;
+use crate::laws::{law::LawFault, step::Blend};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -72,6 +74,16 @@ impl Wear {
     /// Depth of wear in m per contact pressure in Pa on a way of this length in m.
     pub fn erosion(&self, way: f64) -> f64 {
         self.coefficient * way
+    }
+
+    /// The depth in m by which this blend continues the wear of the last step, given as a depth in m, and the length in s for which the rate
+    /// of wear at the end of the step counts, of a step of `length` in s.
+    pub fn continued(blend: Blend, length: f64, last: f64) -> [f64; 2] {
+        if blend.earlier == 0.0 || last == 0.0 {
+            [0.0, length]
+        } else {
+            [-blend.earlier * last, blend.length]
+        }
     }
 
     /// Depth in m that is worn off in a step at this pressure in Pa and this erosion in m/Pa, where the blend of the scheme continues the
@@ -142,6 +154,32 @@ mod tests {
         // Without pressure the wear of the last step continues only until the surfaces separate.
         assert_eq!([-1.0, 0.2, 7.0].map(|d| Wear::depth(0.0, erosion, [0.5, d])), [0.0, 0.2, 0.5]);
         assert_eq!(Wear::depth(0.0, erosion, [0.0, f64::NEG_INFINITY]), 0.0);
+    }
+
+    #[test]
+    fn points_under_pressure_for_any_number_of_steps_wear_for_their_whole_length_under_a_formula_of_two_steps()
+     {
+        // Steps of any lengths; a slope of 2 m/s while a point is under pressure.
+        let lengths = [0.1, 0.2, 0.15, 0.15, 0.3];
+        let blend_of = |previous: f64, length: f64| {
+            let ratio = length / previous;
+            let below = 1.0 + 2.0 * ratio;
+            let earlier = -ratio * ratio / below;
+            Blend { recent: 1.0 - earlier, earlier, ..Blend::euler(length * (1.0 + ratio) / below) }
+        };
+        for (first, last) in [(1, 1), (3, 3), (1, 2), (2, 4), (1, 4)] {
+            let (mut worn, mut change) = (0.0, 0.0);
+            for step in 1..lengths.len() {
+                let blend = blend_of(lengths[step - 1], lengths[step]);
+                let [continued, length] = Wear::continued(blend, lengths[step], change);
+                let pressure = if (first..=last).contains(&step) { 2.0 } else { 0.0 };
+                change = Wear::depth(pressure, length, [continued, -1.0]);
+                worn += change;
+            }
+            let exact = 2.0 * lengths[first..=last].iter().sum::<f64>();
+            assert!((worn - exact).abs() < 1e-14, "{first} to {last}: {worn} m for {exact} m");
+        }
+        assert_eq!(Wear::continued(Blend::midpoint(0.5), 0.5, 3.0), [0.0, 0.5], "one step, to its end");
     }
 
     #[test]

@@ -417,9 +417,10 @@ impl Newton {
             self.snes.search_along_steps(!search.follows_branches())?;
         }
         // A tolerance relative to the first residual of the step suffices: the right-hand side is almost zero where only an obstacle
-        // moves the body.
-        let absolute = sharpness * system.tolerance.max(self.settings.tolerance * self.counts.first);
-        let tolerances = (absolute, self.settings.tolerance);
+        // moves the body. Later searches may start from where one before has gone astray.
+        let first = self.counts.first;
+        let absolute = sharpness * system.tolerance.max(self.settings.tolerance * first);
+        let tolerances = (absolute, if first == 0.0 { self.settings.tolerance } else { 0.0 });
         let limit = self.settings.max_newton_iterations as usize;
         let most = DIRECTIONS_PER_ITERATION * limit;
         let directions = match search {

@@ -124,6 +124,8 @@ pub(super) struct Point<const D: usize> {
     pub worn: [f64; 2],
     /// Depth in m by which the blend of a two-step scheme continues the wear of the last step.
     pub continued_wear: f64,
+    /// Length in s for which the rate of wear at the end of the step counts.
+    pub wear_length: f64,
     /// Growth of the gap in the step by the motion of the obstacle, in m.
     pub growth: f64,
     /// Velocity in m/s with which it leaves the obstacle at the start of the step, at least 0.
@@ -178,6 +180,7 @@ impl<const D: usize> Point<D> {
             penetration_before: 0.0,
             worn: [0.0; 2],
             continued_wear: 0.0,
+            wear_length: 0.0,
             growth: 0.0,
             leaves: 0.0,
             blend_offset: 0.0,

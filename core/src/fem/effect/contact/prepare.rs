@@ -4,7 +4,7 @@ use super::{Contact, point::Vectors::Body, tangential_point::ROUNDING};
 use crate::{
     error::{Error, Result},
     fem::effect::{Blend, Step},
-    laws::contact::{NodeContext, Rate},
+    laws::contact::{NodeContext, Rate, Wear},
     linear_algebra::tensor::{add_scaled, dot, norm},
 };
 
@@ -47,11 +47,10 @@ impl<const D: usize> Contact<D> {
             point.leaves = (-point.normal_component(Body, velocity)).max(0.0);
             point.penetration_before = along_before - before - worn;
             point.weight_before = weight_before;
-            [point.blend_offset, point.continued_wear] = if blend.earlier == 0.0 {
-                [0.0; 2]
-            } else {
-                [point.normal_component(Body, start) - along, -blend.earlier * (worn - worn_before)]
-            };
+            let shifts = blend.earlier != 0.0;
+            point.blend_offset = if shifts { point.normal_component(Body, start) - along } else { 0.0 };
+            [point.continued_wear, point.wear_length] =
+                Wear::continued(blend, step.length, worn - worn_before);
             let means = blend.extrapolates() && point.penetration_before.is_finite() && gap.is_finite();
             point.context = NodeContext {
                 penetration: along - gap - worn + (point.blend_offset - point.continued_wear),

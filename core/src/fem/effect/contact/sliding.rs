@@ -98,7 +98,7 @@ impl<const D: usize> Contact<D> {
                 let at = sliding.context.beside(held);
                 let free = friction.law.resolve_beside(parameter, friction.scale, pressure, at).speed;
                 let speed = if held == 0.0 { free } else { free.hypot(held) };
-                let erosion = wear.erosion(point.context.step_length * speed);
+                let erosion = wear.erosion(point.wear_length * speed);
                 let change = erosion - point.context.erosion;
                 point.context.erosion = erosion;
                 if change.abs() <= f64::EPSILON * erosion {
@@ -180,10 +180,9 @@ const EROSION_ITERATIONS: usize = 50;
 
 /// The depth of wear in m of a point at the end of the step just solved, at its velocities with ghosts and this sliding velocity in m/s.
 fn worn_after<const D: usize>(point: &Point<D>, wear: Wear, (velocity, speed): (&[f64], f64)) -> f64 {
-    let continued = point.continued_wear;
-    let NodeContext { penetration, step_length, .. } = point.context;
+    let (continued, NodeContext { penetration, step_length, .. }) = (point.continued_wear, point.context);
     let unworn = penetration + continued + step_length * point.normal_component(Body, velocity);
-    point.worn[0] + Wear::depth(point.pressure, wear.erosion(step_length * speed), [continued, unworn])
+    point.worn[0] + Wear::depth(point.pressure, wear.erosion(point.wear_length * speed), [continued, unworn])
 }
 
 /// A change of a friction history, in its measure, that matters for no result.

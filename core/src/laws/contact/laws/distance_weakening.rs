@@ -136,13 +136,20 @@ mod tests {
     }
 
     #[test]
-    fn a_two_step_scheme_continues_the_slip_until_a_point_comes_to_rest() {
+    fn the_slip_of_a_two_step_scheme_is_the_way_of_the_point_also_where_it_slides_in_a_single_step() {
         let blend = Blend { recent: 4.0 / 3.0, earlier: -1.0 / 3.0, ..Blend::euler(0.2) };
         let law = law(Decay::Linear);
         // 0.35 m + 0.2 s 0.5 m/s = 0.45 m of 0.5 m.
         assert!((law.coefficient(0.5, law.context([0.3, 0.15], blend)) - 0.24).abs() < 1e-14);
         assert!((law.history_after([0.3, 0.15], blend, 0.5) - 0.45).abs() < 1e-14);
-        assert_eq!(law.history_after([0.3, 0.15], blend, 0.0), 0.3);
+        // 0.3 s at 2 m/s, then rest: the displacement 4/3 u_(n-1) - 1/3 u_(n-2) + 0.2 s v grows by 0.4 m, and on until 0.6 m.
+        let mut slips = [law.history_after([0.1, 0.1], blend, 2.0), 0.1];
+        assert!((slips[0] - 0.5).abs() < 1e-15);
+        for _ in 0..40 {
+            slips = [law.history_after(slips, blend, 0.0), slips[0]];
+        }
+        assert!((slips[0] - 0.7).abs() < 1e-14, "{slips:?}");
+        assert_eq!(law.history_after([0.7, 0.3], Blend::euler(0.3), 0.0), 0.7);
     }
 
     proptest! {
