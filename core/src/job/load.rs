@@ -363,5 +363,7 @@ mod tests {
         assert!(missing.contains("cannot read") && missing.contains("there is no job file"), "{missing}");
         let directory = Job::load(folder.path(), &[]).expect_err("a folder").to_string();
         assert!(directory.contains("it is a folder, not a job file"), "{directory}");
+        let device = Job::load(Path::new("/dev/null"), &[]).expect_err("a device").to_string();
+        assert!(device.contains("it is a device or a pipe"), "{device}");
     }
 }
