@@ -72,7 +72,7 @@ fn a_signal_to_one_rank_stops_all_of_them() {
 fn a_signal_ends_a_step_of_many_iterations() {
     let case = Case::written_as(
         "
-        mesh.rectangle = {size = [100.0, 0.5], cells = [800, 2]}
+        mesh.rectangle = {size = [100.0, 0.5], cells = [1600, 2]}
         material = {hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1e9, poisson_ratio = 0.3}}
         support = [{on = ['left'], fix = 'all'}]
         traction = [{on = ['top'], value = [0.0, '-1e4 * x']}]

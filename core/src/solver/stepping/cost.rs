@@ -54,11 +54,6 @@ const ASSEMBLY: f64 = 3.0;
 /// Bytes for each entry of the dense matrix of the motions of contact nodes, which each rank has: half of it and half of its factor, its
 /// factor on a subspace, and two copies while these are computed.
 const DENSE_ENTRY: f64 = 2.0 * 4.0 + 3.0 * 8.0;
-/// Seconds for each third power of the number of these motions: the matrix; the factors of a step, without and with friction.
-const DENSE_SET_UP: f64 = 2e-11;
-const DENSE_FACTORS: [f64; 2] = [2e-12, 1e-11];
-/// Seconds of a step for each entry of the matrix, in iterations on contact motions without and with friction.
-const DENSE_ITERATIONS: [f64; 2] = [5e-9, 3e-8];
 /// Number of motions of contact nodes whose dense matrix costs no more than the factorisation.
 const MAX_CONDENSED_MOTIONS: usize = 4_000;
 
@@ -239,18 +234,7 @@ impl ProblemSize {
             }
         };
         match preconditioner {
-            Preconditioner::Auto | Preconditioner::Cholesky => {
-                let Cost { memory, set_up, step } = self.factor(self.factor_precision());
-                let motions = if self.is_condensed() { self.motions as f64 } else { 0.0 };
-                let friction = usize::from(self.friction);
-                let factors = DENSE_FACTORS[friction] * motions.powi(3);
-                let iterations = DENSE_ITERATIONS[friction] * motions.powi(2);
-                Cost {
-                    memory,
-                    set_up: set_up + DENSE_SET_UP * motions.powi(3),
-                    step: step + factors + iterations,
-                }
-            }
+            Preconditioner::Auto | Preconditioner::Cholesky => self.factor(self.factor_precision()),
             Preconditioner::Gamg => {
                 let [set_up, cycle] = if self.order == 1 {
                     [self.by_dimension(7e-6, 22e-6), self.by_dimension(100e-9, 180e-9)]
