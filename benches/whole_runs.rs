@@ -390,8 +390,8 @@ const BLOCKS: [Case; 6] = [
     case(2, 256, 32, "cholesky", true),
     case(3, 16, 32, "cholesky", true),
     case(3, 32, 8, "cholesky", false),
-    case(2, 256, 16, "gamg", false),
-    case(3, 32, 4, "gamg", false),
+    case(2, 128, 8, "gamg", false),
+    case(3, 16, 8, "gamg", false),
 ];
 /// Cells along the edges of two plates of which the set-up is measured.
 const PLATES: [usize; 2] = [56, 112];
