@@ -193,19 +193,16 @@ fn unknown_table(kind: Kind, wanted: &str, all: &[DescribedTable]) -> Error {
 /// What a key or a table of this name is where it belongs, as text.
 pub(super) fn place_of(kind: Kind, name: &str) -> Option<String> {
     let all = tables(kind);
-    let header = |table: &DescribedTable| {
-        if table.several { format!("[[{}]]", table.path) } else { format!("[{}]", table.path) }
-    };
     let is_inner = |inner: &DescribedTable, outer: &DescribedTable| {
         inner.path.rsplit_once('.') == Some((outer.path.as_str(), name))
     };
     let has = |table: &&DescribedTable| {
         table.keys.iter().any(|key| key.name == name) || all.iter().any(|inner| is_inner(inner, table))
     };
-    let found: Vec<String> = all.iter().filter(has).map(header).collect();
+    let found: Vec<String> = all.iter().filter(has).map(DescribedTable::title).collect();
     let key = (!found.is_empty()).then(|| format!("a key of {}", found.join(", ")));
     let own = all.iter().find(|table| table.path == name);
-    let own = own.map(|table| format!("a table of its own, {}", header(table)));
+    let own = own.map(|table| format!("a table of its own, {}", table.title()));
     let places: Vec<String> = own.into_iter().chain(key).collect();
     (!places.is_empty()).then(|| places.join(", and "))
 }

@@ -20,7 +20,7 @@ use crate::{
     },
     job::{self, Job, Sliding},
     laws::{
-        contact::{Gap, NormalResponse, Quadrature},
+        contact::{Gap, NodeContext, NormalResponse, Quadrature},
         material::{ByMaterial, Comparison, Hypothesis, Material},
     },
     linear_algebra::tensor::{Mandel, Vector, component, larger, norm},
@@ -94,7 +94,10 @@ pub(super) fn body<const D: usize, const S: usize>(
         redistribute_mass(session, job, &mut body, &parts, &state)?;
     }
     let Body { mesh, geometry, contacts, .. } = &mut body;
-    for (contact, _) in contacts.iter_mut().zip(&job.contact).filter(|(_, table)| !table.redistribute_mass) {
+    for (contact, table) in contacts.iter_mut().zip(&job.contact) {
+        if table.redistribute_mass || contact.normal.law.velocity_bound(NodeContext::AT_THE_GAP).is_none() {
+            continue;
+        }
         let touches: BTreeSet<usize> = contact.normal.nodes().collect();
         let cells = geometry.cells().enumerate();
         let touching =

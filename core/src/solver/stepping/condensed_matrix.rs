@@ -97,15 +97,14 @@ impl Workspace {
 /// Data of the current subspace.
 pub(super) struct Subspace {
     work_vector: DistributedVector,
-    /// The blocks of the projection for which the factor was computed, node after node of all ranks.
+    /// The blocks of the projection for which the factor was computed, node after node of all ranks; none where there is no factor with
+    /// these additions.
     projection_blocks: Vec<f64>,
     /// The same of symmetric, positive forces in addition to `S`; empty if there are none.
     additions: Vec<f64>,
     /// `L L^T` in the order of the motions, once it was needed.
     product: Option<PackedSymmetric>,
     factor: Option<ReducedFactor>,
-    /// Whether the factor is that of these blocks and additions.
-    is_current: bool,
     is_active: bool,
     /// Factors of linearised equations, which precondition better than those on the subspace.
     linearised: Option<LocalFactor>,
@@ -122,7 +121,6 @@ impl Subspace {
             additions,
             product: None,
             factor: None,
-            is_current: false,
             is_active: false,
             linearised: None,
         }))
@@ -416,7 +414,7 @@ impl StepMatrix for CondensedMatrix {
         subspace.linearised = None;
         if !subspace.additions.is_empty() {
             subspace.additions.clear();
-            subspace.is_current = false;
+            subspace.projection_blocks.clear();
         }
     }
 
@@ -458,15 +456,14 @@ impl StepMatrix for CondensedMatrix {
         };
         let removed: f64 = self.blocks_of_nodes(blocks).map(missing).sum();
         subspace.is_active = removed.round() >= MISSING_DIRECTIONS || !subspace.additions.is_empty();
-        if !subspace.is_active || (subspace.is_current && subspace.projection_blocks == *blocks) {
+        if !subspace.is_active || subspace.projection_blocks == *blocks {
             return Ok(false);
         }
-        subspace.projection_blocks.clone_from(blocks);
-        let Subspace { product, additions, projection_blocks, factor, is_current, .. } = subspace;
-        *is_current = false;
+        let Subspace { product, additions, projection_blocks, factor, .. } = subspace;
+        projection_blocks.clear();
         let factor = factor.get_or_insert_with(|| ReducedFactor::with_capacity(&self.nodes));
-        factor.set(self.product(product), &self.nodes, [additions, projection_blocks])?;
-        *is_current = true;
+        factor.set(self.product(product), &self.nodes, [additions, blocks])?;
+        projection_blocks.clone_from(blocks);
         Ok(true)
     }
 
@@ -489,7 +486,7 @@ impl StepMatrix for CondensedMatrix {
             additions.clear();
         }
         subspace.additions = additions;
-        subspace.is_current = false;
+        subspace.projection_blocks.clear();
         Ok(true)
     }
 }

@@ -77,9 +77,20 @@ impl Closeness {
     fn numbers(self) -> [f64; COUNT] {
         let Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, .. } = self;
         let Self { inclination, ejection: Ejection { strain, overlap, time }, .. } = self;
-        let ejected = [inclination, strain, overlap, time];
-        let before = [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread];
-        std::array::from_fn(|at| if at < before.len() { before[at] } else { ejected[at - before.len()] })
+        [
+            penetration,
+            held,
+            slip,
+            sharpness,
+            leap,
+            moved,
+            shift,
+            shift_to_spread,
+            inclination,
+            strain,
+            overlap,
+            time,
+        ]
     }
 
     /// The one over all ranks. Collective.

@@ -108,7 +108,7 @@ pub struct Contact<const D: usize> {
     pub shares_of_heat: [f64; 2],
     /// How near body and obstacle have come in the steps so far, on this rank.
     pub closeness: Closeness,
-    /// The speed in m/s of compression waves, of the slowest material at its points; none where they have no mass.
+    /// The speed in m/s of compression waves, of the slowest material at its points; none where they have no mass, or the law is no bound.
     pub wave_speed: Option<f64>,
     /// The blend of earlier states from which the current step starts.
     blend: Blend,

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{effect::Step, pairs::PairedNode, space::Held},
-    laws::contact::{Gap, GivenGap, NodeContext, Sweep},
+    laws::contact::{Gap, GivenGap, Sweep},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     parallel::session::Session,
 };
@@ -184,7 +184,7 @@ impl<const D: usize> Contact<D> {
 
     /// Whether points with mass that are inside of the obstacle are out of it at the end of a step, however short.
     pub fn ejects(&self) -> bool {
-        self.wave_speed.is_some() && self.normal.law.velocity_bound(NodeContext::AT_THE_GAP).is_some()
+        self.wave_speed.is_some()
     }
 
     /// How the obstacle ejects a point in the step just solved. What overlaps before the first step is known before it.
