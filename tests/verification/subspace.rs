@@ -1,4 +1,4 @@
-//! A preconditioner that is built for the subspace of a solve.
+//! Preconditioners on the subspace of a solve: one that is built for it, and multigrid that is restricted to it.
 
 use super::run_on;
 use super::scenes::{body, brick, crossed, noise, set_nodal};
@@ -14,10 +14,10 @@ use clarke::{
     parallel::session::Session,
 };
 
-/// A matrix without the motion of some nodes along a direction.
+/// A matrix without the motions of nodes along several directions.
 struct Without<'a> {
     matrix: &'a Matrix,
-    directions: Vec<f64>,
+    directions: Vec<Vec<f64>>,
     block: usize,
 }
 
@@ -28,14 +28,18 @@ impl ProjectedOperator for Without<'_> {
     }
 
     fn project(&mut self, x: &mut DistributedVector) -> Result<()> {
-        let mut values = x.owned_mut()?;
-        let nodes = values.chunks_exact_mut(self.block).zip(self.directions.chunks_exact(self.block));
-        for (value, direction) in nodes {
-            let along: f64 = value.iter().zip(direction).map(|(v, d)| v * d).sum();
-            value.iter_mut().zip(direction).for_each(|(v, d)| *v -= along * d);
-        }
-        Ok(())
+        self.directions.iter().try_for_each(|directions| remove(x, directions, self.block))
     }
+}
+
+/// Removes the part of each node along its direction, a unit vector or zero.
+fn remove(x: &mut DistributedVector, directions: &[f64], block: usize) -> Result<()> {
+    let mut values = x.owned_mut()?;
+    for (value, direction) in values.chunks_exact_mut(block).zip(directions.chunks_exact(block)) {
+        let along: f64 = value.iter().zip(direction).map(|(v, d)| v * d).sum();
+        value.iter_mut().zip(direction).for_each(|(v, d)| *v -= along * d);
+    }
+    Ok(())
 }
 
 fn solves<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
@@ -66,7 +70,7 @@ fn solves<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<
             let length = raw.iter().map(|x| x * x).sum::<f64>().sqrt();
             if id % period == 1 { raw.map(|x| x / length) } else { [0.0; D] }
         });
-        let directions = directions.owned().expect("values").to_vec();
+        let directions = vec![directions.owned().expect("values").to_vec()];
         let mut without = Without { matrix: &matrix, directions, block: D };
         let (mut load, mut expected, mut found) = (vector(), vector(), vector());
         set_nodal(&body.mesh, &mut load, |id, _| std::array::from_fn(|i| noise((id * D + i) as u64 + 7)));
@@ -94,6 +98,81 @@ fn solve(session: &Session) {
     }
     solves::<2, 3>(session, &crossed([5, 4]));
     solves::<3, 6>(session, &brick([3, 3, 2]));
+}
+
+/// Held nodes at the end of a long body, in directions of their own, some or all of them.
+fn multigrid<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
+    let effects: Vec<Box<dyn Effect<D, S>>> = vec![
+        Box::new(Inertia { density: ByMaterial::uniform(1e-3) }),
+        Box::new(ViscousStress::linear(ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }))),
+    ];
+    let (body, state) =
+        body::<D, S>(session, whole, &[("left", Fix::Keyword(FixedDirections::All))], effects);
+    let mut matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");
+    let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
+    matrix.attach_rigid_motions(D, coordinates).expect("rigid motions");
+    let vector = || state.velocity.like().expect("like");
+    let mut solver = ProjectedKsp::new("", &state.velocity, D).expect("solver");
+    solver.linear_solver().set_method("cg").expect("cg");
+    solver.linear_solver().set_preconditioner("gamg", None).expect("gamg");
+    solver.linear_solver().apply_options().expect("options");
+    solver.set_constant(&matrix).expect("matrix");
+    let mut free = 0;
+    for (name, period, directions) in [
+        ("free", usize::MAX, 1),
+        ("slide", 1, 1),
+        ("stick", 1, D),
+        ("some", 3, D),
+        ("free again", usize::MAX, 1),
+    ] {
+        let mut held = Vec::new();
+        for direction in 0..directions {
+            let mut along = vector();
+            set_nodal(&body.mesh, &mut along, |id, at| {
+                let mut unit = [0.0; D];
+                if directions == 1 {
+                    (unit[0], unit[D - 1]) = (0.28, -0.96);
+                } else {
+                    unit[direction] = 1.0;
+                }
+                let is_held =
+                    at[D - 1] == 0.0 && at[0] > 0.0 && (id as u64 + 1).is_multiple_of(period as u64);
+                if is_held { unit } else { [0.0; D] }
+            });
+            held.push(along);
+        }
+        let directions = held.iter().map(|along| along.owned().expect("values").to_vec()).collect();
+        let mut without = Without { matrix: &matrix, directions, block: D };
+        let (mut load, mut found, mut left) = (vector(), vector(), vector());
+        set_nodal(&body.mesh, &mut load, |id, _| std::array::from_fn(|i| noise((id * D + i) as u64 + 7)));
+        without.project(&mut load).expect("projected");
+        solver.set_tolerances(1e-8, 0.0, 500).expect("tolerances");
+        let outcome =
+            solver.solve(&mut without, ProjectedKind::Symmetric, &load, &mut found).expect("solved");
+        assert!(outcome.linear.converged() && !outcome.refreshed, "{name}: {outcome:?}");
+        without.apply(&found, &mut left).expect("residual");
+        left.add_scaled(-1.0, &load).expect("residual");
+        let missed = left.norm().expect("norm") / load.norm().expect("norm");
+        assert!(missed < 2e-8, "{D}D, {name}: {missed}");
+        let iterations = outcome.linear.iterations;
+        if name.starts_with("free") {
+            assert!(free == 0 || iterations == free, "{D}D, {name}: {iterations} iterations, {free} before");
+            free = iterations;
+        }
+        println!("{D}D, {name}: {iterations} iterations, {free} without");
+        assert!(5 * iterations <= 8 * free, "{D}D, {name}: {iterations} iterations, {free} without");
+    }
+}
+
+#[test]
+fn multigrid_takes_hardly_longer_with_held_nodes_than_without() {
+    run_on(&[1, 2, 3], |world| {
+        for (name, value) in [("mg_levels_ksp_type", "chebyshev"), ("mg_levels_pc_type", "jacobi")] {
+            set_default_option(name, value).expect("option");
+        }
+        multigrid::<2, 3>(&world.session, &crossed([40, 30]));
+        multigrid::<3, 6>(&world.session, &brick([12, 8, 8]));
+    });
 }
 
 #[test]

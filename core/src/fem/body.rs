@@ -230,6 +230,25 @@ impl<const D: usize, const S: usize> Body<D, S> {
         seen_by_contacts(self.coupling.as_ref(), &self.held, values)
     }
 
+    /// The rigid motions of all bodies together as unknowns on this rank, where contact between bodies makes some of these relative: zero at
+    /// slave nodes, as far as they face another body.
+    pub fn common_rigid_motions(&self) -> Option<Vec<Vec<f64>>> {
+        self.coupling.as_ref()?;
+        let translations = (0..D).map(|i| (i, None));
+        let rotations = (0..D).flat_map(|i| (i + 1..D).map(move |j| (i, Some(j))));
+        let motion = |(i, j): (usize, Option<usize>)| {
+            let mut values = vec![0.0; self.mesh.nodes.len() * D];
+            for (value, at) in values.chunks_exact_mut(D).zip(&self.mesh.nodes) {
+                match j {
+                    None => value[i] = 1.0,
+                    Some(j) => (value[i], value[j]) = (-at[j], at[i]),
+                }
+            }
+            self.seen_by_contacts(&values)[..self.mesh.owned * D].to_vec()
+        };
+        Some(translations.chain(rotations).map(motion).collect())
+    }
+
     /// Nodal values of all nodes of this rank, with ghosts, and the same as contacts see them, given those of the nodes owned here.
     /// Collective.
     pub fn absolute_and_seen(&self, owned: &[f64]) -> Result<[Vec<f64>; 2]> {

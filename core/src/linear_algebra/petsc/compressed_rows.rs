@@ -70,8 +70,11 @@ pub(super) fn own_rows<T>(
 }
 
 /// The columns of other ranks, with the exchange of their values.
+#[derive(Debug)]
 pub(super) struct Others {
     entries: Entries,
+    /// Global number of each column, ascending.
+    numbers: Vec<usize>,
     exchange: Reference<sys::_p_PetscSF>,
     /// Work space with a value for each of these columns.
     values: DistributedVector,
@@ -92,7 +95,7 @@ pub(super) fn multiply(
 }
 
 /// The rows with entries.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Entries {
     rows: Vec<u32>,
     starts: Vec<usize>,
@@ -116,6 +119,15 @@ impl Entries {
         }
         kept.starts.push(kept.columns.len());
         kept
+    }
+
+    fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> {
+        let at = self.rows.binary_search(&(row as u32)).ok();
+        let range = at.map_or(0..0, |at| self.starts[at]..self.starts[at + 1]);
+        self.columns[range.clone()]
+            .iter()
+            .map(|&column| column as usize)
+            .zip(self.values[range].iter().copied())
     }
 
     fn rows(&self) -> impl Iterator<Item = (usize, impl Iterator<Item = (usize, f64)>)> {
@@ -156,6 +168,8 @@ impl Others {
         unsafe {
             let (alone, none) = (sys::RSMPI_COMM_SELF, ptr::null_mut());
             check(sys::MatGetLocalSize(columns, &mut rows, &mut count))?;
+            let known = if count == 0 { &[][..] } else { slice::from_raw_parts(numbers, count as usize) };
+            let known = known.iter().map(|&number| number as usize).collect();
             let from = Reference::new(|raw| {
                 sys::ISCreateGeneral(alone, count, numbers, sys::PETSC_COPY_VALUES, raw)
             })?;
@@ -164,7 +178,7 @@ impl Others {
             let exchange = Reference::new(|raw| {
                 sys::VecScatterCreate(template.get(), from.get(), values.get(), none, raw)
             })?;
-            Ok(Self { entries, exchange, values: DistributedVector { raw: values } })
+            Ok(Self { entries, numbers: known, exchange, values: DistributedVector { raw: values } })
         }
     }
 
@@ -191,9 +205,19 @@ impl Others {
     /// Adds the product of the transposed columns with `x`, which has the layout of the rows, to `y` on the ranks that own the
     /// columns. Collective.
     pub(super) fn add_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        let x = x.owned()?;
+        self.add_to_owners(|values| self.entries.transposed(&x, values), y)
+    }
+
+    /// Adds a value for each of the columns to `y`, on the ranks that own them. Collective.
+    pub(super) fn add_to_owners(
+        &self,
+        write: impl FnOnce(&mut [f64]),
+        y: &mut DistributedVector,
+    ) -> Result<()> {
         // SAFETY: live vector.
         let mut values = unsafe { DistributedVector::view(self.values.raw.get())? };
-        self.entries.transposed(&x.owned()?, &mut values.owned_mut()?);
+        write(&mut values.owned_mut()?);
         let (add, reverse) = (sys::ADD_VALUES, sys::SCATTER_REVERSE);
         // SAFETY: as above.
         unsafe {
@@ -206,6 +230,16 @@ impl Others {
             ))?;
             check(sys::VecScatterEnd(self.exchange.get(), self.values.raw.get(), y.raw.get(), add, reverse))
         }
+    }
+
+    /// Global number of each column, ascending.
+    pub(super) fn numbers(&self) -> &[usize] {
+        &self.numbers
+    }
+
+    /// The columns, by their place in [`Self::numbers`], and values of a row of this rank.
+    pub(super) fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> {
+        self.entries.row(row)
     }
 
     /// Bytes of the columns.
@@ -228,5 +262,7 @@ mod tests {
         assert_eq!(y, [1.0, 303.0, 1.0, 51.0]);
         entries.transposed(&[7.0, 1.0, 7.0, 10.0], &mut z);
         assert_eq!(z, [2.0, 50.0, 3.0]);
+        assert_eq!(entries.row(1).collect::<Vec<_>>(), [(0, 2.0), (2, 3.0)]);
+        assert_eq!(entries.row(2).count(), 0);
     }
 }

@@ -6,6 +6,7 @@ use super::{
     library::communicator,
     own_preconditioner::{self, Own, OwnPreconditioner},
     reference::Reference,
+    subspace::Projections,
     sys,
 };
 use crate::error::Result;
@@ -218,6 +219,29 @@ impl Ksp {
             unsafe { coarse.reduce_precision(pc)? };
         }
         Ok(())
+    }
+
+    /// Whether the preconditioner is multigrid that [`Ksp::restrict`] can restrict, on all ranks alike.
+    pub(super) fn can_be_restricted(&self) -> bool {
+        let coarse = self.coarse.as_ref().map_or(&[][..], |coarse| &coarse.levels);
+        levels::can_be_restricted(&self.levels) && (coarse.is_empty() || levels::can_be_restricted(coarse))
+    }
+
+    /// Restricts multigrid to a subspace, for the applications during which it is [used](Ksp::use_subspace). Collective.
+    pub(super) fn restrict(&mut self, projections: Projections) -> Result<()> {
+        let coarse = levels::restrict(&mut self.levels, projections)?;
+        if let Some(levels) = self.coarse.as_mut().map(|coarse| &mut coarse.levels) {
+            levels::restrict(levels, coarse)?;
+        }
+        Ok(())
+    }
+
+    /// Lets multigrid act on the subspace that was set last, or on the whole space. On all ranks alike.
+    pub(super) fn use_subspace(&self, in_use: bool) {
+        levels::use_subspace(&self.levels, in_use);
+        if let Some(coarse) = &self.coarse {
+            levels::use_subspace(&coarse.levels, in_use);
+        }
     }
 
     /// Solves for `solution`. Collective. Non-convergence is an outcome, not an error.

@@ -2,23 +2,66 @@
 //! bandwidth, and single precision is accurate enough for them.
 
 use super::{
-    block_product::BlockProduct, block_transfer::BlockTransfer, check, reference::Reference, shell::Shell,
+    block_product::BlockProduct,
+    block_transfer::BlockTransfer,
+    check,
+    compressed_rows::Others,
+    reference::Reference,
+    shell::Shell,
+    subspace::{Fields, OnLevel, Projections},
     sys,
 };
 use crate::error::Result;
-use std::{ffi::CStr, ptr};
+use std::{ffi::CStr, ptr, rc::Rc};
 
-/// A level's matrices.
+/// A level's matrices, and the subspaces on this level and on the coarser one.
 #[derive(Debug, Default)]
 pub(super) struct Level {
     smoother: Option<Shell>,
-    transfer: Option<(Shell, Reference<sys::_p_Mat>)>,
+    transfer: Option<Interpolated>,
+    fine: Rc<OnLevel>,
+    coarse: Rc<OnLevel>,
+}
+
+/// The interpolation from the coarser level.
+#[derive(Debug)]
+struct Interpolated {
+    shell: Shell,
+    original: Reference<sys::_p_Mat>,
+    blocks: [usize; 2],
+    others: Option<Rc<Others>>,
+    /// Read at the first solve on a subspace.
+    fields: Option<Fields>,
 }
 
 impl Level {
+    /// Whether the products of this level can be those on a subspace, on all ranks alike.
+    fn can_be_restricted(&self) -> bool {
+        self.smoother.is_some() && self.transfer.is_some()
+    }
+
+    /// Sets the projection of this level, and returns that of the coarser one. Collective.
+    fn restrict(&mut self, projections: Projections) -> Result<Projections> {
+        let Some(Interpolated { original, blocks, others, fields, .. }) = &mut self.transfer else {
+            return Ok(projections);
+        };
+        let (raw, others) = (original.get(), others.as_deref());
+        let fields = match fields {
+            Some(fields) => fields,
+            none => none.insert(Fields::new(raw, *blocks, others)?),
+        };
+        let coarser = fields.coarser(raw, others, &projections)?;
+        self.fine.set(projections);
+        self.coarse.set(coarser.clone());
+        Ok(coarser)
+    }
+
     /// Bytes moved on this rank by a product of the smoother and a restriction or interpolation; `None` for PETSc's own matrices.
     pub(super) fn bytes(&self) -> [Option<u64>; 2] {
-        [self.smoother.as_ref().map(Shell::bytes), self.transfer.as_ref().map(|(shell, _)| shell.bytes())]
+        [
+            self.smoother.as_ref().map(Shell::bytes),
+            self.transfer.as_ref().map(|transfer| transfer.shell.bytes()),
+        ]
     }
 }
 
@@ -54,22 +97,25 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
     // SAFETY: live objects, which own what they show; PETSc keeps its own references to the shells.
     unsafe {
         check(sys::PCMGGetLevels(pc, &mut count))?;
+        let mut coarser: Rc<OnLevel> = Rc::default();
         for number in 1..count {
-            let mut level = Level::default();
+            let mut level = Level { coarse: coarser, ..Level::default() };
+            coarser = level.fine.clone();
             let (mut smoother, mut matrix) = (ptr::null_mut(), ptr::null_mut());
             check(sys::PCMGGetSmoother(pc, number, &mut smoother))?;
             check(sys::KSPGetOperators(smoother, ptr::null_mut(), &mut matrix))?;
-            if let Some(shell) = BlockProduct::shell::<f32>(matrix)? {
+            if let Some(shell) = BlockProduct::shell::<f32>(matrix, &level.fine)? {
                 check(sys::KSPSetOperators(smoother, shell.raw.get(), matrix))?;
                 check(sys::PCMGSetResidual(pc, number, Some(sys::PCMGResidualDefault), shell.raw.get()))?;
                 level.smoother = Some(shell);
             }
             let mut interpolation = ptr::null_mut();
             check(sys::PCMGGetInterpolation(pc, number, &mut interpolation))?;
-            if let Some(shell) = BlockTransfer::shell(interpolation)? {
+            let copy = BlockTransfer::shell(interpolation, [&level.fine, &level.coarse])?;
+            if let Some((shell, blocks, others)) = copy {
                 let original = Reference::to(interpolation)?;
                 set_interpolation(pc, number, shell.raw.get())?;
-                level.transfer = Some((shell, original));
+                level.transfer = Some(Interpolated { shell, original, blocks, others, fields: None });
             }
             levels.push(level);
         }
@@ -77,10 +123,29 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
     Ok(levels)
 }
 
+/// Whether all levels, of which there are some, can be restricted to a subspace, on all ranks alike.
+pub(super) fn can_be_restricted(levels: &[Level]) -> bool {
+    !levels.is_empty() && levels.iter().all(Level::can_be_restricted)
+}
+
+/// Restricts levels to a subspace of the finest, the last of them, for solves during which they are [used](use_subspace); returns the
+/// projection of the coarsest level, which has none of these matrices. Collective.
+pub(super) fn restrict(levels: &mut [Level], finest: Projections) -> Result<Projections> {
+    levels.iter_mut().rev().try_fold(finest, |projections, level| level.restrict(projections))
+}
+
+/// Lets products be those on the subspace, or on the whole space. On all ranks alike.
+pub(super) fn use_subspace(levels: &[Level], in_use: bool) {
+    for level in levels {
+        level.fine.set_in_use(in_use);
+        level.coarse.set_in_use(in_use);
+    }
+}
+
 /// Restores PETSc's own interpolations, from which PETSc computes coarse matrices.
 pub(super) fn restore_interpolations(pc: sys::PC, levels: &[Level]) -> Result<()> {
     for (level, number) in levels.iter().zip(1..) {
-        if let Some((_, original)) = &level.transfer {
+        if let Some(Interpolated { original, .. }) = &level.transfer {
             // SAFETY: live objects of this preconditioner.
             unsafe { set_interpolation(pc, number, original.get())? };
         }

@@ -51,9 +51,32 @@ impl Matrix {
         unsafe { set_rigid_motions(self.raw.get(), size, coordinates) }
     }
 
+    /// Attaches fields of little energy for multigrid, in place of rigid motions: the values on this rank of each. Collective.
+    pub fn attach_soft_fields(&mut self, block: usize, fields: &[Vec<f64>]) -> Result<()> {
+        let count = index(fields.len(), "fields of little energy")?;
+        let mut vectors: Vec<DistributedVector> = Vec::new();
+        for field in fields {
+            let mut vector = DistributedVector::ghosted(block, field.len() / block, &[])?;
+            vector.owned_mut()?.copy_from_slice(field);
+            for other in &vectors {
+                vector.add_scaled(-vector.dot(other)?, other)?;
+            }
+            vector.scale(1.0 / vector.norm()?.max(f64::MIN_POSITIVE))?;
+            vectors.push(vector);
+        }
+        let raw: Vec<sys::Vec> = vectors.iter().map(|vector| vector.raw.get()).collect();
+        // SAFETY: live objects; the space and the matrix take their own references.
+        unsafe {
+            let space = Reference::new(|space| {
+                sys::MatNullSpaceCreate(communicator(), 0, count, raw.as_ptr(), space)
+            })?;
+            check(sys::MatSetNearNullSpace(self.raw.get(), space.get()))
+        }
+    }
+
     /// Accelerates later products by a copy of half the size of the matrix. Collective.
     pub fn multiply_often(&mut self) -> Result<()> {
-        self.blocks = BlockProduct::shell::<f64>(self.raw.get())?.map(Rc::new);
+        self.blocks = BlockProduct::shell::<f64>(self.raw.get(), &Rc::default())?.map(Rc::new);
         Ok(())
     }
 

@@ -24,6 +24,7 @@ mod reduced;
 mod reference;
 mod shell;
 mod snes;
+mod subspace;
 mod variational_inequality;
 mod vector;
 

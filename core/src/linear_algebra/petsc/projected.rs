@@ -5,9 +5,10 @@ use super::{
     ksp::TOO_MANY,
     library::communicator,
     projected_operator::{multiply, precondition, project},
-    reduced::{ReducedMatrix, block_rows},
+    reduced::{ReducedMatrix, block_rows, write_unit},
     reference::Reference,
     shell::symmetric_shell,
+    subspace::Projections,
     sys,
 };
 use crate::error::Result;
@@ -16,7 +17,8 @@ use std::ptr;
 /// A Krylov solver on a subspace that changes between solves, preconditioned by a constant matrix.
 ///
 /// PETSc treats the operator as a shell matrix whose null space is the complement of the subspace, and therefore projects every
-/// result of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] uses the preconditioner of the constant
+/// result of the preconditioner. Multigrid with matrices of known block sizes is restricted to the subspace of each solve. Otherwise the first
+/// solve after [`ProjectedKsp::set_tolerances`] uses the preconditioner of the constant
 /// matrix or, if the dimension of the complement is [`MISSING_DIRECTIONS`] or more, one built for the subspace. In later solves the
 /// preconditioner is rebuilt only if a solve has not converged within a number of iterations equal to the cost of rebuilding
 /// ([`ProjectedKsp::set_refresh_threshold`]); the solve then continues from its last iterate.
@@ -32,6 +34,10 @@ pub struct ProjectedKsp {
     /// The same with what was added for the preconditioner alone.
     stiffened: Option<Matrix>,
     reduced: Option<ReducedMatrix>,
+    /// Work space for the columns of the projection of each node.
+    columns: Vec<DistributedVector>,
+    /// Whether multigrid is restricted to the subspace of the solve.
+    restricted: bool,
     block: usize,
     tolerances: (f64, f64, usize),
     most: usize,
@@ -81,6 +87,8 @@ impl ProjectedKsp {
             constant: None,
             stiffened: None,
             reduced: None,
+            columns: Vec::new(),
+            restricted: false,
             block,
             tolerances: (1e-5, 0.0, 10_000),
             most: usize::MAX,
@@ -169,7 +177,7 @@ impl ProjectedKsp {
 
     /// Sets up the preconditioner of a matrix on the whole space.
     fn restart_with(&mut self, matrix: &Matrix) -> Result<()> {
-        (self.reduced, self.reducing, self.first) = (None, false, true);
+        (self.reduced, self.reducing, self.first, self.restricted) = (None, false, true, false);
         self.precondition_with(matrix.raw.get())
     }
 
@@ -202,6 +210,9 @@ impl ProjectedKsp {
         operator: &mut dyn ProjectedOperator,
         like: &DistributedVector,
     ) -> Result<[bool; 2]> {
+        if self.restrict(operator, like)? {
+            return Ok([false; 2]);
+        }
         let Some(constant) = self.stiffened.as_ref().or(self.constant.as_ref()) else {
             return Ok([false; 2]);
         };
@@ -228,6 +239,22 @@ impl ProjectedKsp {
         }
         self.reducing = worth;
         Ok([false, worth && stale])
+    }
+
+    /// Restricts multigrid to the current subspace; returns whether it can be. Collective.
+    fn restrict(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<bool> {
+        self.restricted = self.ksp.can_be_restricted() && operator.may_project();
+        if self.restricted {
+            while self.columns.len() < self.block {
+                self.columns.push(like.like()?);
+            }
+            for (i, column) in self.columns.iter_mut().enumerate() {
+                write_unit(column, i, self.block)?;
+                operator.project(column)?;
+            }
+            self.ksp.restrict(Projections::of(&self.columns)?)?;
+        }
+        Ok(self.restricted)
     }
 
     /// Later solves take at most so many iterations, and not more than [`ProjectedKsp::set_tolerances`] allows.
@@ -263,6 +290,7 @@ impl ProjectedKsp {
         solution: &mut DistributedVector,
     ) -> Result<LinearOutcome> {
         let (_, absolute, iterations) = self.tolerances;
+        self.restrict(operator, right_hand_side)?;
         self.attached(operator, |solver| {
             solver.ksp.set_tolerances(0.0, absolute, iterations)?;
             solver.ksp.solve(right_hand_side, solution)
@@ -275,6 +303,7 @@ impl ProjectedKsp {
         operator: &mut dyn ProjectedOperator,
         solve: impl FnOnce(&mut Self) -> Result<T>,
     ) -> Result<T> {
+        self.ksp.use_subspace(self.restricted);
         let callback = Callback::new(operator);
         let (shell, complement) = (self.shell.get(), self.complement.get());
         // SAFETY: the context lives on this frame until it is detached below; PETSc calls the trampolines only inside
@@ -297,6 +326,7 @@ impl ProjectedKsp {
             check(sys::MatSetNullSpace(shell, ptr::null_mut()))?;
             check(sys::MatNullSpaceSetFunction(complement, None, ptr::null_mut()))?;
         }
+        self.ksp.use_subspace(false);
         callback.finish()?;
         outcome
     }

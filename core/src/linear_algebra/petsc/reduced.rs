@@ -179,7 +179,7 @@ fn first_node(matrix: &Matrix, block: usize) -> Result<usize> {
 }
 
 /// Writes `e_i` at each node.
-fn write_unit(column: &mut DistributedVector, i: usize, block: usize) -> Result<()> {
+pub(super) fn write_unit(column: &mut DistributedVector, i: usize, block: usize) -> Result<()> {
     column.owned_mut()?.chunks_exact_mut(block).for_each(|node| {
         node.fill(0.0);
         node[i] = 1.0;

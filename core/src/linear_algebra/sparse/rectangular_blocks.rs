@@ -21,6 +21,7 @@ pub(crate) fn transfer(blocks: [usize; 2], rows: ScalarRows<'_>) -> Option<Box<d
         return None;
     }
     match blocks {
+        [2, 2] => Some(Box::new(RectangularBlocks::<2, 2>::new(rows))),
         [2, 3] => Some(Box::new(RectangularBlocks::<2, 3>::new(rows))),
         [3, 3] => Some(Box::new(RectangularBlocks::<3, 3>::new(rows))),
         [3, 6] => Some(Box::new(RectangularBlocks::<3, 6>::new(rows))),
@@ -116,6 +117,7 @@ mod tests {
 
     #[test]
     fn both_products_are_those_of_the_whole_matrix() {
+        check::<2, 2>();
         check::<2, 3>();
         check::<3, 3>();
         check::<3, 6>();

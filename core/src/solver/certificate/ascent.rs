@@ -1,8 +1,13 @@
 //! Largest quotient of quadratic forms by preconditioned conjugate ascent (LOBPCG with one vector).
 
-use super::small_eigen::{Small, largest};
-use crate::{error::Result, linear_algebra::petsc::DistributedVector, parallel::session::Session};
+use crate::{
+    error::Result,
+    linear_algebra::{petsc::DistributedVector, small_eigen},
+    parallel::session::Session,
+};
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
+
+type Small = small_eigen::Small<3>;
 
 /// Quadratic forms, their quotient, and a preconditioner for its denominator.
 pub(super) trait Quotient {
@@ -132,7 +137,7 @@ fn best_combination(b: &Small, c: &Small, n: usize) -> Option<[f64; 3]> {
     let scaled = |m: &Small| -> Small {
         std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] * scale[i] * scale[j]))
     };
-    let (_, y) = largest(&scaled(b), &scaled(c), n)?;
+    let (_, y) = small_eigen::largest(&scaled(b), &scaled(c), n)?;
     Some(std::array::from_fn(|i| y[i] * scale[i]))
 }
 

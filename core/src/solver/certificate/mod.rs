@@ -46,7 +46,6 @@ mod cells;
 mod certificates;
 mod coverage;
 mod forms;
-mod small_eigen;
 mod suprema;
 mod verdict;
 mod worst_length;

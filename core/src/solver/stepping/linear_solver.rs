@@ -96,13 +96,14 @@ impl Preconditioner {
         }
     }
 
-    /// Number of iterations that take as long as rebuilding it; in 3D rebuilding never pays (measured, see
-    /// docs/contact-preconditioner.md).
+    /// Number of iterations that take as long as rebuilding it for the motions that contact leaves free; in 3D rebuilding never pays
+    /// (measured, see docs/contact-preconditioner.md), and GAMG is restricted to these motions instead.
     pub(super) fn refresh_threshold(self, dimension: usize) -> usize {
         match self {
             _ if dimension == 3 => usize::MAX,
             Self::Auto | Self::Cholesky => 5,
-            Self::Gamg | Self::Boomeramg => 40,
+            Self::Gamg => usize::MAX,
+            Self::Boomeramg => 40,
         }
     }
 

@@ -19,6 +19,8 @@ pub(super) struct Assembled<'a> {
     pub precision: Precision,
     /// Coordinates in m of the nodes of this rank, for multigrid.
     pub coordinates: &'a [f64],
+    /// The rigid motions in the unknowns of this rank, for multigrid, where they differ from those of the nodes.
+    pub rigid_motions: Option<Vec<Vec<f64>>>,
     /// The linear fields among quadratic ones, for multigrid.
     pub coarse: Option<Interpolation>,
 }

@@ -229,14 +229,17 @@ impl StepSolver {
         rows: RowsWithSprings,
         like: &DistributedVector,
     ) -> Result<bool> {
-        let has_coarse = self.settings.preconditioner == Preconditioner::Gamg && body.mesh.order() == 2;
+        let is_multigrid = self.settings.preconditioner == Preconditioner::Gamg;
+        let has_coarse = is_multigrid && body.mesh.order() == 2;
         let coarse = if has_coarse {
             Some(session.agree(linear_subspace(session, &body.mesh, &body.held))?)
         } else {
             None
         };
         let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
-        let assembled = Assembled { matrix, rows, precision: self.precision, coordinates, coarse };
+        let rigid_motions = if is_multigrid { body.common_rigid_motions() } else { None };
+        let precision = self.precision;
+        let assembled = Assembled { matrix, rows, precision, coordinates, rigid_motions, coarse };
         if !solver.prepare(session, assembled)? {
             return Ok(false);
         }

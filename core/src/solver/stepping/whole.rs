@@ -94,7 +94,10 @@ impl LinearSolver for Whole {
                 self.krylov.linear_solver().set_coarse_space(dimension, interpolation)?;
             }
             let matrix = with_springs.as_mut().unwrap_or(matrix);
-            matrix.attach_rigid_motions(dimension, assembled.coordinates)?;
+            match assembled.rigid_motions {
+                Some(motions) => matrix.attach_soft_fields(dimension, &motions)?,
+                None => matrix.attach_rigid_motions(dimension, assembled.coordinates)?,
+            }
         }
         if preconditioner != Preconditioner::Cholesky {
             matrix.multiply_often()?;

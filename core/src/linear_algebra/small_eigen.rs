@@ -1,15 +1,33 @@
-//! The largest eigenvalue of a small symmetric pencil, for subspace iterations.
+//! Eigenvalues of small symmetric pencils.
 
-/// A symmetric matrix of at most 3 rows.
-pub(super) type Small = [[f64; 3]; 3];
+use std::array;
 
-/// Largest `b(y, y) / c(y, y)` over vectors of `n <= 3` components, and its maximiser `y`; `None` if `c` is not positive definite
+/// A symmetric matrix of at most `N` rows.
+pub(crate) type Small<const N: usize> = [[f64; N]; N];
+
+/// Most sweeps of rotations; a few suffice.
+const SWEEPS: usize = 30;
+/// Share of the diagonal below which an entry changes no eigenvalue.
+const NEGLIGIBLE: f64 = 1e-18;
+
+/// Largest `b(y, y) / c(y, y)` over vectors of `n` components, and its maximiser `y`; `None` if `c` is not positive definite
 /// to working accuracy.
-pub(super) fn largest(b: &Small, c: &Small, n: usize) -> Option<(f64, [f64; 3])> {
+pub(crate) fn largest<const N: usize>(b: &Small<N>, c: &Small<N>, n: usize) -> Option<(f64, [f64; N])> {
+    let pairs = eigenpairs(b, c, n)?;
+    pairs.into_iter().take(n).max_by(|(x, _), (y, _)| x.total_cmp(y))
+}
+
+/// The eigenvalues and eigenvectors of the pencil of the first `n` rows, `b y = lambda c y`, in no order, before entries of no meaning; `None`
+/// as for [`largest`].
+pub(crate) fn eigenpairs<const N: usize>(
+    b: &Small<N>,
+    c: &Small<N>,
+    n: usize,
+) -> Option<[(f64, [f64; N]); N]> {
     let lower = cholesky(c, n)?;
-    let mut m = [[0.0; 3]; 3];
+    let mut m = [[0.0; N]; N];
     for j in 0..n {
-        let column = forward(&lower, &std::array::from_fn(|i| b[i][j]), n);
+        let column = forward(&lower, &array::from_fn(|i| b[i][j]), n);
         for i in 0..n {
             m[i][j] = column[i];
         }
@@ -17,22 +35,32 @@ pub(super) fn largest(b: &Small, c: &Small, n: usize) -> Option<(f64, [f64; 3])>
     for i in 0..n {
         m[i] = forward(&lower, &m[i], n);
     }
-    let mut vectors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    for _ in 0..30 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)].into_iter().filter(|&(_, q)| q < n) {
-            rotate(&mut m, &mut vectors, p, q, n);
+    let mut vectors = array::from_fn(|i| array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+    for _ in 0..SWEEPS {
+        let mut is_diagonal = true;
+        for p in 0..n {
+            for q in p + 1..n {
+                if m[p][q].abs() > NEGLIGIBLE * (m[p][p].abs() + m[q][q].abs()) {
+                    is_diagonal = false;
+                    rotate(&mut m, &mut vectors, p, q, n);
+                }
+            }
+        }
+        if is_diagonal {
+            break;
         }
     }
-    let best = (0..n).max_by(|&i, &j| m[i][i].total_cmp(&m[j][j]))?;
-    let y = backward(&lower, &std::array::from_fn(|i| vectors[i][best]), n);
-    m[best][best].is_finite().then_some((m[best][best], y))
+    let is_finite = (0..n).all(|k| m[k][k].is_finite());
+    is_finite.then(|| {
+        array::from_fn(|k| match k < n {
+            true => (m[k][k], backward(&lower, &array::from_fn(|i| vectors[i][k]), n)),
+            false => (0.0, [0.0; N]),
+        })
+    })
 }
 
 /// One Jacobi rotation that removes `m[p][q]`.
-fn rotate(m: &mut Small, vectors: &mut Small, p: usize, q: usize, n: usize) {
-    if m[p][q] == 0.0 {
-        return;
-    }
+fn rotate<const N: usize>(m: &mut Small<N>, vectors: &mut Small<N>, p: usize, q: usize, n: usize) {
     let ratio = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
     let t = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
     let cos = 1.0 / t.hypot(1.0);
@@ -47,8 +75,8 @@ fn rotate(m: &mut Small, vectors: &mut Small, p: usize, q: usize, n: usize) {
     }
 }
 
-fn cholesky(c: &Small, n: usize) -> Option<Small> {
-    let mut lower = [[0.0; 3]; 3];
+fn cholesky<const N: usize>(c: &Small<N>, n: usize) -> Option<Small<N>> {
+    let mut lower = [[0.0; N]; N];
     for j in 0..n {
         let mut pivot = c[j][j];
         for k in 0..j {
@@ -70,7 +98,7 @@ fn cholesky(c: &Small, n: usize) -> Option<Small> {
     Some(lower)
 }
 
-fn forward(lower: &Small, right: &[f64; 3], n: usize) -> [f64; 3] {
+fn forward<const N: usize>(lower: &Small<N>, right: &[f64; N], n: usize) -> [f64; N] {
     let mut out = *right;
     for i in 0..n {
         for k in 0..i {
@@ -81,8 +109,8 @@ fn forward(lower: &Small, right: &[f64; 3], n: usize) -> [f64; 3] {
     out
 }
 
-fn backward(lower: &Small, right: &[f64; 3], n: usize) -> [f64; 3] {
-    let mut out = [0.0; 3];
+fn backward<const N: usize>(lower: &Small<N>, right: &[f64; N], n: usize) -> [f64; N] {
+    let mut out = [0.0; N];
     for i in (0..n).rev() {
         out[i] = right[i];
         for k in i + 1..n {
@@ -108,6 +136,24 @@ mod tests {
     }
 
     #[test]
+    fn all_pairs_of_a_pencil_of_six_rows() {
+        let entry = |seed: usize, i: usize, j: usize| ((seed + 7 * i + 7 * j + i * j) as f64).sin();
+        let b: Small<6> = array::from_fn(|i| array::from_fn(|j| entry(1, i, j)));
+        let c: Small<6> = array::from_fn(|i| {
+            array::from_fn(|j| {
+                (0..6).map(|k| entry(i, i, k) * entry(j, j, k)).sum::<f64>() + f64::from(i == j)
+            })
+        });
+        let times =
+            |m: &Small<6>, y: &[f64; 6]| m.map(|row| row.iter().zip(y).map(|(m, y)| m * y).sum::<f64>());
+        for (value, y) in eigenpairs(&b, &c, 6).unwrap() {
+            let (left, right) = (times(&b, &y), times(&c, &y));
+            assert!((0..6).all(|i| (left[i] - value * right[i]).abs() < 1e-13), "{value}");
+            assert!((y.iter().zip(right).map(|(y, r)| y * r).sum::<f64>() - 1.0).abs() < 1e-13);
+        }
+    }
+
+    #[test]
     fn dependent_vectors_are_noticed() {
         let c = [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         assert!(largest(&c, &c, 2).is_none());
@@ -128,7 +174,7 @@ mod tests {
                         + if i == j { 0.1 } else { 0.0 };
                 }
             }
-            let form = |m: &Small, y: &[f64; 3]| -> f64 {
+            let form = |m: &Small<3>, y: &[f64; 3]| -> f64 {
                 (0..3).map(|i| (0..3).map(|j| y[i] * m[i][j] * y[j]).sum::<f64>()).sum()
             };
             let (value, y) = largest(&b, &c, 3).unwrap();
