@@ -183,6 +183,48 @@ fn on_soft_springs(session: &Session) {
     }
 }
 
+/// A block so stiff that rounding errors of its internal forces are a share of its loads sinks in with an error of that share, and
+/// one on which they are as large as the loads is refused in words that are true.
+fn beyond_rounding(session: &Session) {
+    let mesh = rectangle([1.5, 0.25], [48, 4], Diagonal::Left, [1.0, 1.0]).expect("mesh");
+    let job = |modulus: f64| {
+        format!(
+            "{}[material]\nhypothesis = \"plane_strain\"\n\
+             elasticity = {{ youngs_modulus = {modulus:e}, poisson_ratio = 0.25 }}\n\
+             [[support]]\non = [\"left\"]\nwhere = \"y < 1e-6\"\nfix = [\"x\"]\n\
+             [[traction]]\non = [\"top\"]\npressure = 8\n\
+             [[contact]]\non = [\"bottom\"]\nnormal.compliance = {{ stiffness = 2000 }}\n\
+             [time]\nscheme = \"implicit_euler\"\nend = 1\nstep = 0.5\n",
+            any_mesh::<2>()
+        )
+    };
+    let mut run = simulation::<2, 4>(session, &job(1e14), &mesh);
+    while run.advance(session).expect("solved").is_some() {}
+    let residual = run.totals.max_residual;
+    for found in run.state.displacement.owned().expect("values").chunks_exact(2) {
+        assert!((found[1] / -0.004 - 1.0).abs() < 10.0 * residual, "{} m, residual {residual:e}", found[1]);
+    }
+    println!("residual {residual:e}");
+    assert!(residual > 1e-5 && residual < 1e-2, "residual {residual:e}");
+    let mut run = simulation::<2, 4>(session, &job(1e18), &mesh);
+    let message = loop {
+        match run.advance(session) {
+            Ok(outcome) => assert!(outcome.is_some(), "it has digits"),
+            Err(error) => break error.to_string(),
+        }
+    };
+    println!("{message}");
+    assert!(
+        message.contains("rounding errors") && message.contains("divide its elastic moduli"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_block_whose_rounding_errors_hide_its_loads_is_solved_to_them_or_refused_by_them() {
+    run_on(&[1, 2], |world| beyond_rounding(&world.session));
+}
+
 #[test]
 fn a_stiff_block_sinks_into_soft_springs_as_far_as_rounding_errors_permit() {
     run_on(&[1, 2], |world| on_soft_springs(&world.session));

@@ -17,7 +17,7 @@ use clarke::{
         expression::Formula,
         material::{ByMaterial, Isotropic},
     },
-    linear_algebra::petsc::{Matrix, NonlinearProblem, ProjectedKsp},
+    linear_algebra::petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp},
     mesh::GlobalMesh,
     parallel::session::Session,
     solver::stepping::{ContactEquations, Floor, ObstacleMotions, Scratch, SolveCounts},
@@ -221,9 +221,47 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             matrix.multiply(&direction, &mut second).expect("product");
             second.add_scaled(-0.5 / h, &above).expect("add");
             assert!(second.norm().expect("norm") > 1e-3 * size, "contact has its share in the difference");
+            if smooth {
+                point.add_scaled(h, &direction).expect("add");
+                directions_of_velocities(session, &mut contacts, [&mut point, &mut direction], &what);
+            }
         }
     }
     assert!(coupled > 0, "sliding and pressure meet");
+}
+
+/// Velocities move along a direction that is solved for, whatever share of the softening the equations have.
+fn directions_of_velocities<const D: usize>(
+    session: &Session,
+    contacts: &mut [Contact<D>],
+    [point, direction]: [&mut DistributedVector; 2],
+    what: &str,
+) {
+    let h = 1e-5;
+    for share in [0.0, 0.3, 1.0] {
+        contacts.iter_mut().for_each(|contact| contact.normal.softening = share);
+        let (point, direction) = (point.owned().expect("unknowns"), direction.owned().expect("a direction"));
+        let mut direction = direction.to_vec();
+        for contact in contacts.iter_mut() {
+            contact.linearise_parameters(&point, &mut point.to_vec());
+            contact.project(&mut direction);
+        }
+        let mut unknowns = direction.clone();
+        let open = vec![0.0; unknowns.len()];
+        contacts.iter().for_each(|contact| contact.unmap_direction(&open, &mut unknowns));
+        let [above, below] = [h, -h].map(|length| {
+            let mut velocities: Vec<f64> = point.iter().zip(&unknowns).map(|(x, d)| x + length * d).collect();
+            contacts.iter_mut().for_each(|contact| contact.map(&mut velocities));
+            velocities
+        });
+        let mut sums = [0.0; 2];
+        for ((above, below), change) in above.iter().zip(&below).zip(direction.iter()) {
+            sums[0] += (0.5 / h * (above - below) - change).powi(2);
+            sums[1] += change.powi(2);
+        }
+        let [error, size] = session.sum(sums).map(f64::sqrt);
+        assert!(error < 1e-5 * size, "{what}, share {share}: {error} of {size}");
+    }
 }
 
 fn compare(session: &Session) {

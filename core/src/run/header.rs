@@ -79,6 +79,22 @@ pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &
     given.chain(steps::warnings(&loaded.job)).collect()
 }
 
+/// A residual as a share of the forces from which rounding errors are warned of.
+const WARNED_ROUNDING: f64 = 1e-5;
+
+/// The warning that rounding errors have left more of the forces than the tolerance of this job, if they have left much.
+pub(super) fn warning_of_rounding(summary: &Summary, job: &Job) -> Option<String> {
+    let left = summary.max_residual;
+    (left > WARNED_ROUNDING && left > job.solver.tolerance).then(|| {
+        format!(
+            "steps were solved to {left:.0e} of their forces only, because rounding errors are as large: results may be off by several times \
+             this share. A body that is much stiffer than the springs or the contact that hold it has them: with elastic moduli divided by \
+             {:.0} it moves as a rigid body, too",
+            left / (0.1 * WARNED_ROUNDING)
+        )
+    })
+}
+
 /// Logs status, totals and times of a finished run.
 pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
     if let Some(error) = &summary.error {

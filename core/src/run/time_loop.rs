@@ -476,7 +476,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             let lagging = summary
                 .certificates
                 .lagging_friction(summary.max_friction_fall, steps::longest_step(self.job));
-            let warnings = summary.range_warnings(surface_has_mass, covered).chain(lagging);
+            let rounding = header::warning_of_rounding(&summary, self.job);
+            let warnings = summary.range_warnings(surface_has_mass, covered).chain(lagging).chain(rounding);
             warnings.for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
             self.session.on_first(|| {

@@ -530,6 +530,11 @@ impl Newton {
         Ok(true)
     }
 
+    /// The least residual norm of the last search in N, and the norm of its last velocities in m/s. Collective.
+    pub(super) fn ended_at(&self) -> Result<(f64, f64)> {
+        Ok((self.counts.least.0, self.scratch.velocity.norm()?))
+    }
+
     /// The residual at the end of the last solve, in N.
     fn last_residual(&self) -> &DistributedVector {
         match (&self.bounded, &self.descent) {

@@ -402,13 +402,8 @@ impl<const D: usize> Friction<D> {
 
     /// Keeps only this share of the slopes of decreasing branches in the derivatives.
     pub(super) fn keep_share_of_decreases(&mut self, share: f64) {
-        let scale = self.scale;
-        let decreases = |point: &&mut TangentialPoint<D>| point.tangent.slopes[0] < 0.0 && share < 1.0;
-        for Tangent { theta, slopes, .. } in
-            self.points.iter_mut().filter(decreases).map(|point| &mut point.tangent)
-        {
-            slopes[0] *= share;
-            theta[0] = scale / (scale + slopes[0]);
+        for slope in self.points.iter_mut().map(|point| &mut point.tangent.slopes[0]) {
+            *slope *= if *slope < 0.0 { share } else { 1.0 };
         }
     }
 
@@ -448,7 +443,8 @@ impl<const D: usize> Friction<D> {
         for point in self.points.iter().filter(|p| !p.tangent.sticks) {
             let normal = &points[point.at];
             let pressed = normal.slope * normal.free_length * normal.along(Newton, direction);
-            point.add(Newton, point.weight, &point.sliding_change(direction, pressed), forces);
+            let change = point.sliding_change(direction, pressed, point.tangent.slopes);
+            point.add(Newton, point.weight, &change, forces);
         }
     }
 
@@ -490,7 +486,9 @@ impl<const D: usize> Friction<D> {
                 let normal = &points[point.at];
                 let pressed =
                     normal_scale * normal.free_length * (1.0 - normal.theta) * normal.along(Newton, values);
-                point.add(Newton, 1.0 / self.scale, &point.sliding_change(values, pressed), values);
+                // Those of the graph, whatever share of a decrease the equations have.
+                let slopes = [self.scale * (1.0 / point.tangent.theta[0] - 1.0), point.tangent.slopes[1]];
+                point.add(Newton, 1.0 / self.scale, &point.sliding_change(values, pressed, slopes), values);
             }
         }
     }

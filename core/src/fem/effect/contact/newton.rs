@@ -116,9 +116,9 @@ impl<const D: usize> Contact<D> {
         for point in self.normal.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let derivative = point.resolve(law, scale, point.along(Newton, unknowns)).derivative;
             point.linearise(scale, derivative);
+            // Unknowns change with velocities by the slopes of the graphs, whatever share of these the equations have.
             if softening < 1.0 && point.slope < 0.0 {
                 point.slope *= softening;
-                point.theta = scale / (scale + point.slope);
             }
         }
         if let Some(friction) = &mut self.friction {

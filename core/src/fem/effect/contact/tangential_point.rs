@@ -236,9 +236,10 @@ impl<const D: usize> TangentialPoint<D> {
         self.add(Newton, 1.0, &change, nodal);
     }
 
-    /// Change of the traction at a sliding point, with a change of the velocity, a vector of Newton's method, and of the pressure.
-    pub(super) fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
-        let Tangent { toward, slopes, coefficient, .. } = self.tangent;
+    /// Change of the traction at a sliding point, with a change of the velocity, a vector of Newton's method, and of the pressure; given the
+    /// slopes `g'` and `g / V`.
+    pub(super) fn sliding_change(&self, direction: &[f64], pressed: f64, slopes: [f64; 2]) -> Vector<D> {
+        let Tangent { toward, coefficient, .. } = self.tangent;
         let velocity = self.along(Newton, direction);
         let ahead = dot(&toward, &velocity);
         std::array::from_fn(|i| {

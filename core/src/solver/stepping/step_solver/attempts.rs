@@ -34,6 +34,10 @@ const LEAST_REFERENCE: f64 = 1e-130;
 const ROUNDING_SHARE: f64 = 0.1;
 /// Share of the forces of a step above which no residual counts as rounding errors, unless those of `K v` are as large.
 const LARGEST_FLOOR: f64 = 1e-4;
+/// The same where contact alone holds a body: moved as a rigid one, it has those of its stiffness.
+const LARGEST_FLOOR_OF_FREE: f64 = 1e-2;
+/// The share of the forces that a stiffness is to leave of rounding errors where they hide the solution.
+const WANTED_FLOOR: f64 = 1e-6;
 /// The largest residual at which Newton's method stagnates by rounding errors, as a multiple of those of `K v`.
 const STAGNANT: f64 = 4.0;
 
@@ -47,6 +51,8 @@ const MOST_FACTORS: usize = 15;
 
 /// A body that only contact holds flies away if it moves by more than this multiple of its size in a step.
 const FAR: f64 = 1e3;
+/// The same for one that comes to rest on its contacts.
+const LARGEST_REST: f64 = 0.1;
 const FLIGHT: &str =
     "a body moves by more than a thousand times its size, so that rounding errors hide the forces on it";
 const NO_FLIGHT: &str = "check the loads and the gap";
@@ -137,7 +143,7 @@ impl StepSolver {
         if self.springs.are_needed() || accuracy.tries_rest {
             keep(&mut self.first_start, trial)?;
         }
-        let mut failure = None;
+        let (mut failure, mut hidden) = (None, None);
         for change in Change::ALL {
             if !self.apply(change, problem, trial, &mut accuracy)? {
                 continue;
@@ -157,11 +163,36 @@ impl StepSolver {
                     let residual = if reference > 0.0 { solved.residual / reference } else { 0.0 };
                     return Ok(StepOutcome { residual, ..solved });
                 }
-                Err(error) if error.is_failure() => failure = Some(error),
+                Err(error) if error.is_failure() => {
+                    failure = Some(error);
+                    hidden = hidden.or(self.rounding_that_hides(problem, accuracy)?);
+                }
                 Err(error) => return Err(self.springs.explain(error)),
             }
         }
+        if let Some(share) = hidden {
+            let [why, remedy] = words_of_rounding(share);
+            return Err(problem.failed(&why, &remedy));
+        }
         Err(failure.map_or_else(unassembled, |failure| self.springs.explain(failure)))
+    }
+
+    /// The residual of the last search that failed as a share of the forces, where contact alone holds a body and it consists of rounding
+    /// errors of the forces within the body. Collective.
+    fn rounding_that_hides<const D: usize, const S: usize>(
+        &self,
+        problem: &StepProblem<'_, D, S>,
+        accuracy: Accuracy,
+    ) -> Result<Option<f64>> {
+        let Some(newton) = self.newton.as_ref().filter(|_| self.springs.are_needed()) else {
+            return Ok(None);
+        };
+        let (residual, speed) = newton.ended_at()?;
+        // The motion of a body that nothing holds has rounding errors of any size.
+        let is_near = speed <= LARGEST_REST * farthest(problem) / FAR;
+        let is_rounding =
+            is_near && residual > accuracy.floor.largest && residual <= accuracy.floor.slope * speed;
+        Ok((is_rounding && accuracy.size > 0.0).then(|| residual / accuracy.size))
     }
 
     /// Changes how a step is solved; returns whether the change is one. Collective.
@@ -446,7 +477,8 @@ impl StepSolver {
         let slope = STAGNANT * f64::EPSILON * self.matrix_norm;
         // No rounding errors of a flight.
         let far = if self.springs.are_needed() { farthest(problem) } else { f64::INFINITY };
-        let floor = Floor { slope, largest: (LARGEST_FLOOR * all).max(STAGNANT * product).min(slope * far) };
+        let share = if self.springs.are_needed() { LARGEST_FLOOR_OF_FREE } else { LARGEST_FLOOR };
+        let floor = Floor { slope, largest: (share * all).max(STAGNANT * product).min(slope * far) };
         let tries_rest = self.flowing.is_none()
             && self.newton.as_ref().is_some_and(|newton| newton.properties(problem).may_be_solved_at_rest());
         Ok(Accuracy {
@@ -507,6 +539,17 @@ impl Accuracy {
 /// The residual below which these rounding errors may hide that nothing holds a body.
 fn hiding(Floor { slope, largest }: Floor) -> Floor {
     Floor { slope: HIDING * slope, largest: HIDING * largest }
+}
+
+/// The reason and the remedy where rounding errors of the forces within a body that contact alone holds are this share of the loads.
+fn words_of_rounding(share: f64) -> [String; 2] {
+    let why = format!(
+        "the body is so much stiffer than the contact that holds it that rounding errors of the forces within it are about {:.0} % of \
+         its loads, which hides where it comes to rest",
+        100.0 * share
+    );
+    let factor = share / WANTED_FLOOR;
+    [why, format!("divide its elastic moduli by {factor:.0e}, with which it moves as a rigid body, too")]
 }
 
 /// Resets a step to a start that was kept. Collective.
