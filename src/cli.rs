@@ -151,6 +151,9 @@ enum Command {
         /// Draw contour lines on the body.
         #[arg(long)]
         contours: bool,
+        /// Overwrite files in the folder `report` that no report has written.
+        #[arg(long)]
+        force: bool,
     },
     /// Write the cell sizes for a target error of the stress of a run, for `gmsh -bgm`. The run needs `[output] error_indicator =
     /// true`.
@@ -250,8 +253,8 @@ fn dispatch(cli: Cli) -> Result<Exit> {
             let options = study::Options { with_ablation: ablate, is_quiet: quiet };
             run_study(&study, &overrides, options, part)
         }
-        Some(Command::Report { folder, other, cells, contours }) => {
-            report_on(&folder, other.as_deref(), report::Options { per_cell: cells, contours })
+        Some(Command::Report { folder, other, cells, contours, force }) => {
+            report_on(&folder, other.as_deref(), report::Options { per_cell: cells, contours, force })
         }
         Some(Command::Remesh { folder, error, output }) => write_sizes(&folder, error, &output),
         Some(Command::Completion { shell }) => completion(shell),

@@ -483,6 +483,38 @@ fn corners_of_quadratic_cells_have_the_mean_traction_around_for_any_division_int
 }
 
 #[test]
+fn corners_of_quadratic_cells_have_their_own_distance_from_an_obstacle() {
+    for (sliding, ranks) in [("small", 1), ("small", 3), ("finite", 2)] {
+        let case = Case::written_as("material.elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}")
+            .set("mesh", "{order = 2, box = {size = [0.6, 0.6, 0.3], cells = [4, 4, 2]}}")
+            .set("support", "[{on = ['top'], fix = 'all', displacement = [0, 0, '0.01*t']}]")
+            .set(
+                "contact",
+                &format!(
+                    "[{{on = ['bottom'], sliding = '{sliding}', normal.unilateral = {{}}, \
+                     obstacle.sphere = {{centre = [0.3, 0.3, -1.0], radius = 1.0}}}}]"
+                ),
+            )
+            .set("output", "{folder = 'out', profile = [{on = 'bottom'}]}")
+            .set("time", "{scheme = 'implicit_euler', end = 1, step = 0.5}");
+        let rows = case.run(ranks).table("profiles.csv");
+        let last = rows.only("time", rows.words("time").last().expect("a row"));
+        let [x, y, gaps] = ["x", "y", "gap"].map(|column| last.numbers(column));
+        assert!(gaps.len() > 50, "corners and midpoints: {}", gaps.len());
+        for ((x, y), gap) in x.iter().zip(&y).zip(gaps) {
+            let across = ((x - 0.3).powi(2) + (y - 0.3).powi(2)).sqrt();
+            // Along the normal of the boundary, or to the nearest place of the sphere.
+            let distance = if sliding == "small" {
+                1.01 - (1.0 - across.powi(2)).sqrt()
+            } else {
+                1.01f64.hypot(across) - 1.0
+            };
+            assert!((gap - distance).abs() < 1e-9, "{gap} at {x}, {y}, not {distance}: {sliding}");
+        }
+    }
+}
+
+#[test]
 fn a_body_that_bounces_turns_as_much_as_the_moment_of_its_contact_forces_says() {
     let bounce = |order: usize, dimension: usize| {
         let case = Case::of("pressing_disc")

@@ -482,6 +482,35 @@ fn an_obstacle_inside_the_body_is_warned_of() {
     }
 }
 
+#[test]
+fn an_obstacle_between_the_nodes_of_a_body_is_warned_of() {
+    let with = |obstacle: &str| {
+        Case::written_as("material = {elasticity = {youngs_modulus = 2e6, poisson_ratio = 0.3}}")
+            .set("mesh.box", "{size = [0.6, 0.6, 0.4], cells = [6, 6, 3]}")
+            .set("support", "[{on = ['top'], fix = 'all'}]")
+            .set("contact", &format!("[{{on = ['bottom'], normal.unilateral = {{}}, obstacle.{obstacle}}}]"))
+            .set("time", "{end = 0.1, step = 0.02, scheme = 'implicit_euler'}")
+    };
+    let ball = |height: &str| format!("sphere = {{centre = [0.36, 0.33, '{height}'], radius = 0.02}}");
+    let stamp = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stamp.stl");
+    let stamp = format!("shape = {{surface = '{stamp}', scale = 0.1, centre = [0.35, 0.33, 0.2]}}");
+    let shape = "shape = {distance = 'sqrt(x^2 + y^2 + z^2) - 0.02', centre = [0.35, 0.33, 0.2]}";
+    for (obstacle, ranks) in [(ball("0.06"), 1), (ball("0.2"), 2), (shape.into(), 3), (stamp, 2)] {
+        let case = with(&obstacle);
+        launch::run(ranks, &["check", case.written().to_str().expect("a path")])
+            .expect(0)
+            .says("contact.0: the obstacle lies inside the body, up to ")
+            .says("gap        bottom: no obstacle along the normal of any point");
+    }
+    let words = "at the end it lies inside the body, up to 1.";
+    for (height, is_in) in [("-0.03 + 2*t", true), ("-0.03 - t", false)] {
+        let case = with(&ball(height));
+        let outcome = case.run_with(2, &["--force"]).expect(0);
+        assert_eq!(warns_of(&outcome, &case, words), is_in, "{}", outcome.stdout);
+        assert!(!warns_of(&outcome, &case, "the obstacle lies inside"), "not at the start");
+    }
+}
+
 /// The half-space of a plane goes on to where other bodies may be.
 #[test]
 fn a_body_without_contact_may_lie_inside_an_obstacle() {

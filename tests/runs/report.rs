@@ -378,6 +378,56 @@ fn a_failed_run_says_so_with_its_error() {
 }
 
 #[test]
+fn a_report_overwrites_its_own_files_only() {
+    let case = square();
+    case.run(1);
+    let out = case.folder().join("out");
+    let folder = out.join("report");
+    for own in ["index.html", "von_mises.svg"] {
+        std::fs::create_dir(&folder).expect("folder");
+        std::fs::write(folder.join(own), "<p>notes</p>").expect("written");
+        launch::run_alone(&["report".as_ref(), out.as_os_str()])
+            .expect(2)
+            .says(&format!("{own}: no report has written this file"))
+            .says("overwrite it with --force");
+        assert_eq!(std::fs::read_dir(&folder).expect("folder").count(), 1, "as it was");
+        launch::run_alone(&["report".as_ref(), out.as_os_str(), "--force".as_ref()]).expect(0);
+        report(&out);
+        launch::run_alone(&["report".as_ref(), out.as_os_str(), out.as_os_str()]).expect(0);
+        std::fs::remove_dir_all(&folder).expect("removed");
+    }
+}
+
+#[test]
+fn a_run_at_rest_has_no_pictures_of_rounding_errors() {
+    let ground = |support: &str, rest: &str| {
+        Case::written_as(
+            "material = {hypothesis = 'plane_strain', density = 1900, elasticity = {youngs_modulus = 6e7, poisson_ratio = 0.3}, \
+             viscosity = {volumetric = 1e7, shear = 1e7}}",
+        )
+        .set("mesh.rectangle", "{size = [40, 10], cells = [20, 5]}")
+        .set("support", &format!("[{{on = ['bottom'], fix = 'all'}}, {{on = ['left', 'right'], {support}}}]"))
+        .set("gravity.acceleration", "[0, -9.81]")
+        .set("checkpoint.every", "1000")
+        .set("output.probe", "[{name = 'side', point = [40, 5]}]")
+        .set("time", &format!("{{scheme = 'bdf2', {rest}}}"))
+    };
+    let settled = ground("fix = ['x']", "end = 20, step = 0.1");
+    settled.run(1);
+    let from = format!("{:?}", settled.folder().join("out"));
+    let at_rest = ground("absorbing = true", "end = 1, step = 0.01").set("initial.from", &from);
+    at_rest.run(1);
+    let page = std::fs::read_to_string(report(&at_rest.folder().join("out"))).expect("page");
+    let document = parsed(&page);
+    let names: Vec<&str> =
+        elements(&document, "figure").iter().filter_map(|figure| figure.attribute("id")).collect();
+    assert!(names.contains(&"von_mises"), "{names:?}");
+    for noise in ["speed", "velocity", "dissipation", "energies"] {
+        assert!(!names.iter().any(|name| name.contains(noise)), "{noise} among {names:?}");
+    }
+}
+
+#[test]
 fn a_folder_without_a_run_is_refused_with_the_remedy() {
     let folder = tempfile::tempdir().expect("folder");
     let empty = folder.path().join("empty");

@@ -282,6 +282,40 @@ fn copied_stages_go_on_whatever_the_times_of_their_files() {
 }
 
 #[test]
+fn a_half_done_stage_goes_on_where_its_start_state_is_gone() {
+    for reset in ["[]", "['displacement']"] {
+        let first = first("bdf2");
+        let second = second("bdf2", &out(&first))
+            .set("initial.reset", reset)
+            .set("checkpoint.every", "4")
+            .set("output.probe_also", "['strain']");
+        let [one, two] = [&first, &second].map(|case| case.written().display().to_string());
+        launch::run(2, &["run", &one, &two]).expect(0);
+        let tables = ["probes.csv", "history.csv", "resultants.csv"];
+        let straight = tables.map(|name| second.results().text(name));
+        let [here, elsewhere] = [out(&first), out(&first) + "_elsewhere"];
+        for from_file in [false, true] {
+            launch::run(2, &["run", &two, "--set", "time.end=0.25", "--force"]).expect(0);
+            std::fs::rename(&here, &elsewhere).expect("moved");
+            // A new start needs it, and the run itself its own checkpoints.
+            launch::run(2, &["run", &two, "--force"]).expect(2).says("name a checkpoint or an output folder");
+            let file = second.results().path("checkpoint-4.h5").display().to_string();
+            let mut restart = vec!["run", &*two, "--restart"];
+            restart.extend(from_file.then_some(&*file));
+            launch::run(2, &restart)
+                .expect(0)
+                .says("continuing from")
+                .says("the state that [initial] from names is gone; the run goes on without it");
+            assert_eq!(straight, tables.map(|name| second.results().text(name)), "reset = {reset}");
+            // It still knows from which state it started.
+            std::fs::rename(&elsewhere, &here).expect("moved back");
+            let outcome = launch::run(2, &["run", &one, &two, "--restart"]).expect(0);
+            assert_eq!(outcome.stdout.matches("completed before").count(), 2, "{}", outcome.stdout);
+        }
+    }
+}
+
+#[test]
 fn states_that_do_not_fit_are_refused() {
     second("lagged_euler", "nowhere").run_with(2, &[]).expect(2).says("does not exist");
     let empty = tempfile::tempdir().expect("a folder");

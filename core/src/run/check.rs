@@ -86,7 +86,7 @@ pub(super) fn check<const D: usize, const S: usize>(
     let quality = mesh.quality_summary(session);
     let folder = loaded.job.output_folder();
     session.on_first(|| refuse_unwritable(folder))?;
-    let ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
+    let ready = session.agree(setup::<D, S>(session, loaded, mesh, &[]))?;
     session.agree(check_loads(&loaded.job, &ready.body, &ready.state))?;
     let mut report = session.agree(report(session, loaded, &ready, quality))?;
     let longest = steps::longest_step(&loaded.job);

@@ -100,16 +100,19 @@ pub(super) fn starts(stages: &[&Job], start: &Start) -> Result<Vec<Option<Start>
 fn continuation(job: &Job) -> Result<Option<Start>> {
     let folder = job.output_folder();
     let start_state = start_state(job)?;
+    // The stages before are complete: a start state that is not there is gone.
+    let is_gone = start_state.is_none() && job.initial.as_ref().is_some_and(|initial| initial.from.is_some());
+    let is_same =
+        |known: Option<&str>| if is_gone { known.is_some() } else { known == start_state.as_deref() };
     let summary: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join(SUMMARY)).unwrap_or_default())
             .unwrap_or_default();
-    let is_complete =
-        summary["status"] == "completed" && summary["start_state"].as_str() == start_state.as_deref();
+    let is_complete = summary["status"] == "completed" && is_same(summary["start_state"].as_str());
     if is_complete && is_of(folder, job)? {
         return Ok(None);
     }
     let newest = list(folder)?.into_iter().next();
-    let goes_on = newest.is_some_and(|(_, file)| start_state_of(&file) == start_state);
+    let goes_on = newest.is_some_and(|(_, file)| is_same(start_state_of(&file).as_deref()));
     Ok(Some(if goes_on { Start::Newest } else { Start::Anew }))
 }
 

@@ -9,6 +9,7 @@ mod deadline;
 mod estimate;
 mod folder;
 mod header;
+mod inside;
 mod validate;
 mod loads;
 mod materials;

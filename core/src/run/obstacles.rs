@@ -2,6 +2,7 @@
 //! the gaps of all contacts.
 
 use super::{
+    inside::{Inside, nodes_of_bodies},
     side_words::{EDGE, pressed_by_edge},
     steps::shortest_step,
 };
@@ -18,7 +19,7 @@ use crate::{
     laws::{contact::Gap, digits::Digits},
     linear_algebra::tensor::{Vector, add_scaled, larger, norm},
     mesh::{Mesh, shape::facet_normal},
-    parallel::{agreement::Agreed, exchange::gather, session::Session},
+    parallel::{agreement::Agreed, session::Session},
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -86,8 +87,8 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &State,
 ) -> Result<Vec<String>> {
-    let displacement = session.agree(state.displacement.local())?;
-    let displacement = body.seen_by_contacts(&displacement);
+    let absolute = session.agree(state.displacement.local())?;
+    let displacement = body.seen_by_contacts(&absolute);
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
@@ -131,15 +132,12 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 if is_deep { share } else { String::new() }
             ));
         }
-        let all = body.mesh.nodes.iter();
-        let [_, most] = depths(session, &contact.obstacle.gap, all);
-        if deepest > ROUNDING * size || most <= TOO_DEEP * size {
+        let inside = Inside::new(&body.mesh, &contact.obstacle.gap, (0.0, TOO_DEEP * size), &absolute);
+        if deepest > ROUNDING * size || inside.deepest(session) <= TOO_DEEP * size {
             continue;
         }
         // Other bodies may be anywhere.
-        let own = nodes_of_bodies(session, body, contact)?;
-        let [least, most] =
-            depths(session, &contact.obstacle.gap, own.iter().map(|node| &body.mesh.nodes[*node]));
+        let [least, most] = inside.depths_of_own(session, body, contact)?;
         if most <= TOO_DEEP * size {
             continue;
         }
@@ -392,8 +390,8 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     state: &State,
     has_ended: bool,
 ) -> Result<Vec<String>> {
-    let displacement = session.agree(state.displacement.local())?;
-    let displacement = body.seen_by_contacts(&displacement);
+    let absolute = session.agree(state.displacement.local())?;
+    let displacement = body.seen_by_contacts(&absolute);
     let size = longest_side(session, &body.mesh.nodes);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
@@ -477,6 +475,14 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             } else {
                 String::new()
             };
+            let least = TOO_DEEP * size;
+            let inside = Inside::new(&body.mesh, &contact.obstacle.gap, (state.time, least), &absolute);
+            let last = match inside.depths_of_own(session, body, contact)? {
+                [out, depth] if out < -ROUNDING * size && depth > least => {
+                    format!("{last}, at the end it lies inside the body, up to {depth:.3e} m deep")
+                }
+                _ => last,
+            };
             out.push(format!(
                 "contact.{number}: the boundary {on} never touched {}: {nearest}{last}; if it should have, check position, size \
                  and motion of both, and their units",
@@ -493,31 +499,4 @@ fn faced(table: &job::Contact) -> String {
         none if none.is_empty() => "its obstacle".into(),
         other => other,
     }
-}
-
-/// The nodes on this rank of the bodies that have a contact, ascending. Collective.
-fn nodes_of_bodies<const D: usize, const S: usize>(
-    session: &Session,
-    body: &Body<D, S>,
-    contact: &Contact<D>,
-) -> Result<Vec<usize>, Agreed> {
-    let of_node = body.mesh.bodies(session)?.of_nodes(&body.mesh);
-    let mine: Vec<u32> = contact.normal.nodes().filter_map(|node| of_node[node]).collect();
-    let touched: BTreeSet<u32> = gather(session.world(), &mine)?.into_iter().collect();
-    let is_own = |node: &usize| of_node[*node].is_some_and(|number| touched.contains(&number));
-    Ok((0..of_node.len()).filter(is_own).collect())
-}
-
-/// The smallest and the largest depth of nodes inside of the obstacle in m, negative outside; minus infinity without an obstacle.
-/// Collective.
-fn depths<'a, const D: usize>(
-    session: &Session,
-    gap: &Gap,
-    nodes: impl Iterator<Item = &'a Vector<D>>,
-) -> [f64; 2] {
-    let depths = nodes.filter_map(|node| gap.depth(0.0, node));
-    let [least, most] =
-        depths.fold([f64::NEG_INFINITY; 2], |[a, b], depth| [larger(a, -depth), larger(b, depth)]);
-    let [least, most] = session.largest([least, most]);
-    [-least, most]
 }

@@ -12,7 +12,7 @@ use crate::{
         state::State,
     },
     io::output::{
-        checkpoint::{self, Identity},
+        checkpoint::{self, Identity, start_state_of, state_digest},
         checkpoint_folder::{checkpoint_path, list},
         history::Totals,
     },
@@ -93,30 +93,53 @@ pub(super) struct StartState {
     pub words: String,
     /// The warning about its balance.
     pub warning: Option<String>,
+    /// Whether it is gone, so that a checkpoint of the run itself stands for it.
+    pub is_gone: bool,
 }
 
-/// The file of the state that a job starts from, if it names one. Collective.
-pub(super) fn start_file(session: &Session, loaded: &Loaded) -> Result<Option<PathBuf>> {
+/// A file with the state that a job starts from.
+pub(super) struct StartFile {
+    pub path: PathBuf,
+    /// The digest of the start state if that is gone and the file is a checkpoint of the run itself.
+    gone: Option<String>,
+}
+
+/// The file of the state that a job starts from, if it names one; if it is gone, the newest of the run's own checkpoints that tells from which
+/// state the run started. Collective.
+pub(super) fn start_file(
+    session: &Session,
+    loaded: &Loaded,
+    own: &[PathBuf],
+) -> Result<Option<StartFile>, Agreed> {
     let Some(from) = loaded.job.initial.as_ref().and_then(|initial| initial.from.as_deref()) else {
         return Ok(None);
     };
     let fault = |words: String, help: &str| loaded.fault("initial.from", words, help);
     let is_folder = session.total(usize::from(session.is_first() && from.is_dir())) > 0;
-    if is_folder {
-        let help = "add a [checkpoint] table to the job of that folder, so that its last state is saved";
-        let none = || fault(format!("{} holds no checkpoint", from.display()), help);
-        let newest = newest(session, from)?.into_iter().next();
-        return Ok(Some(session.agree(newest.ok_or_else(none))?));
-    }
-    let is_there = session.total(usize::from(session.is_first() && from.is_file())) > 0;
-    let none = || {
-        fault(
-            format!("{} does not exist or is no regular file", from.display()),
-            "name a checkpoint or an output folder",
-        )
+    let is_file = session.total(usize::from(session.is_first() && from.is_file())) > 0;
+    let found = match is_folder {
+        true => newest(session, from)?.into_iter().next(),
+        false => is_file.then(|| from.to_owned()),
     };
-    session.agree(if is_there { Ok(()) } else { Err(none()) })?;
-    Ok(Some(from.to_owned()))
+    if let Some(path) = found {
+        return Ok(Some(StartFile { path, gone: None }));
+    }
+    let is_known = |path: &PathBuf| state_digest(path).is_ok() && start_state_of(path).is_some();
+    let known = if session.is_first() { own.iter().position(is_known).map_or(0, |at| at + 1) } else { 0 };
+    let at = session.total(known);
+    session.agree(if at > 0 {
+        let path = own[at - 1].clone();
+        let gone = start_state_of(&path);
+        let unreadable =
+            || Error::Failed(format!("{}: the file cannot be read on every rank", path.display()));
+        if gone.is_none() { Err(unreadable()) } else { Ok(Some(StartFile { path, gone })) }
+    } else if is_folder {
+        let help = "add a [checkpoint] table to the job of that folder, so that its last state is saved";
+        Err(fault(format!("{} holds no checkpoint", from.display()), help))
+    } else {
+        let words = format!("{} does not exist or is no regular file", from.display());
+        Err(fault(words, "name a checkpoint or an output folder"))
+    })
 }
 
 /// The contacts between bodies that the run had which wrote the state that a job starts from, by their positions in the job, each with
@@ -141,11 +164,11 @@ pub(super) fn sides_before(
 /// Collective.
 pub(super) fn transfer<const D: usize, const S: usize>(
     session: &Session,
-    (loaded, file): (&Loaded, Option<PathBuf>),
+    (loaded, file): (&Loaded, Option<StartFile>),
     body: &mut Body<D, S>,
     state: &mut State,
 ) -> Result<Option<StartState>> {
-    let Some(file) = file else { return Ok(None) };
+    let Some(StartFile { path: file, gone }) = file else { return Ok(None) };
     let physics = session.agree(loaded.job.physics())?;
     // Elastic supports keep the reactions that they have taken over before.
     let [can_react] = session.largest([f64::from(u8::from(!body.elastic_support.points.is_empty()))]);
@@ -193,11 +216,18 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         words += "; displacements count from the start of a stage";
     }
     words += &handover.words();
+    if let Some(digest) = gone {
+        let words = format!(
+            "the state that [initial] from names is gone; the run goes on without it, because {} has all of it",
+            file.display()
+        );
+        return Ok(Some(StartState { digest, words, warning: None, is_gone: true }));
+    }
     let warning = match handover.warning() {
         None => imbalance(session, body, state, (&found.acceleration, loaded.job.time.step))?,
         released => released,
     };
-    Ok(Some(StartState { digest: found.digest, words, warning }))
+    Ok(Some(StartState { digest: found.digest, words, warning, is_gone: false }))
 }
 
 fn without_temperature(loaded: &Loaded, file: &Path) -> Error {

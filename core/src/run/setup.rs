@@ -23,6 +23,7 @@ use crate::{
         stepping::{ProblemSize, Stepper, StepperSettings},
     },
 };
+use std::path::PathBuf;
 
 /// All that is needed for the first step.
 pub(super) struct Setup<const D: usize, const S: usize> {
@@ -38,19 +39,20 @@ pub(super) struct Setup<const D: usize, const S: usize> {
     pub began_from: Option<StartState>,
 }
 
-/// Sets a job up on its mesh, which was checked against the job. Collective.
+/// Sets a job up on its mesh, which was checked against the job, given the run's own checkpoints from which it may go on. Collective.
 pub(super) fn setup<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     mut mesh: Mesh<D>,
+    own: &[PathBuf],
 ) -> Result<Setup<D, S>> {
     let job = &loaded.job;
     for (name, value) in &job.solver.petsc {
         session.agree(set_option(name, value))?;
     }
-    let from = start_file(session, loaded)?;
+    let from = start_file(session, loaded, own)?;
     let materials = Materials::new(session, job, &mesh)?;
-    let earlier = sides_before(session, loaded, from.as_deref())?;
+    let earlier = sides_before(session, loaded, from.as_ref().map(|from| &*from.path))?;
     let paired = pairs::find(session, job, &mut mesh, (&materials, &earlier))?;
     let probes = session.agree(Probes::locate(session, &mesh, &job.output))?;
     let (mut body, mut state) = build::body::<D, S>(session, job, (mesh, &materials), paired)?;

@@ -65,7 +65,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
 
     /// The same on this rank's part of a mesh that was checked against the job. Collective.
     pub fn on(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Result<Self> {
-        let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh)?;
+        let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh, &[])?;
         Ok(Self::start(session, &loaded.job, Prepared { body, state, scheme }, None)?)
     }
 

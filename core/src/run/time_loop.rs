@@ -63,12 +63,12 @@ pub(super) fn run<const D: usize, const S: usize>(
     let mut log = Log::new(session.is_first(), clock.on_terminal);
     let claimed = session.on_first(|| claim_folder(job, start, &mut log))?.unwrap_or_default();
     let began_on = job.output.error_estimate.then(|| (loaded, mesh.clone()));
-    let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let is_restart = start.is_restart();
+    let candidates = candidates(session, start, folder)?;
+    let mut ready = session.agree(setup::<D, S>(session, loaded, mesh, &candidates))?;
     let start_state = ready.began_from.as_ref().map(|state| state.digest.clone());
     let physics = session.agree(job.physics())?;
     let identity = Identity { version: super::version().into(), physics, start_state };
-    let candidates = candidates(session, start, folder)?;
     let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
     if restored.is_some() && ready.body.paired_displacement.is_some() {
         let Setup { scheme, body, state, .. } = &mut ready;
@@ -78,9 +78,9 @@ pub(super) fn run<const D: usize, const S: usize>(
     if let Some(restored) = &restored {
         restored.faults.iter().for_each(|fault| log.warning(fault));
         log.line(&restored.words);
-    } else if let Some(state) = &ready.began_from {
-        log.line(&state.words);
     }
+    let began_from = ready.began_from.iter().filter(|state| state.is_gone || restored.is_none());
+    began_from.for_each(|state| log.line(&state.words));
     let start_state = identity.start_state.clone();
     session
         .agree(header::lines(session, loaded, &ready, clock.logs_every_step))?

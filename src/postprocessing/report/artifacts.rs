@@ -1,10 +1,15 @@
 //! The output files of a run, as far as they are readable.
 
-use super::table::{ROUNDING, Table};
+use super::{
+    scale::extent,
+    table::{ROUNDING, Table},
+};
 use crate::{
     error::{Error, Result},
+    fem::effect::ENERGIES,
     io::output::{
         columns::{HISTORY, PROBES, PROFILES, RESULTANTS},
+        field_list::{DISPLACEMENT, SLIDING_VELOCITY, VELOCITY, VON_MISES},
         field_snapshot::Snapshot,
     },
     job::{Job, Loaded},
@@ -18,6 +23,8 @@ use std::{
 /// The most times that are drawn, and the most cells of all drawings together.
 const MOST: usize = 12;
 const MOST_CELLS: usize = 2_000_000;
+/// The share of displacements below which double precision does not resolve their changes, after the operations of a step.
+const UNRESOLVED: f64 = 1e-12;
 
 /// Files that only a run creates; a folder without any of them does not belong to a run.
 const SIGNS: [&str; 5] = ["job.toml", "summary.json", HISTORY.file, PROBES.file, PROFILES.file];
@@ -54,8 +61,8 @@ pub(super) struct RunFiles {
     pub profiles: Option<Table>,
     /// `fields.vtkhdf` at its last time, without rounding errors.
     pub snapshot: Option<Snapshot>,
-    /// The largest number of each field at the times that are drawn.
-    pub largest: BTreeMap<String, f64>,
+    /// Up to which size numbers of each quantity are rounding errors.
+    rounding: BTreeMap<String, f64>,
     /// Files that are missing.
     pub gaps: Vec<MissingFile>,
 }
@@ -99,17 +106,51 @@ impl RunFiles {
         found.snapshot = found.take("fields.vtkhdf", "pictures of the body", Snapshot::read);
         if let Some(snapshot) = &found.snapshot {
             let largest = Snapshot::largest(&folder.join("fields.vtkhdf"), &drawn_times(snapshot));
-            found.largest = largest.unwrap_or_default();
+            found.rounding = found.rounding(&largest.unwrap_or_default());
         }
-        let Self { snapshot, largest, .. } = &mut found;
-        snapshot.iter_mut().for_each(|snapshot| snapshot.clear_below(ROUNDING, largest));
+        let Self { snapshot, rounding, probes, profiles, history, .. } = &mut found;
+        snapshot.iter_mut().for_each(|snapshot| snapshot.clear_below(rounding));
+        let tables = [probes, profiles, history].into_iter().flatten();
+        tables.for_each(|table| table.clear_below(rounding));
         Ok(found)
+    }
+
+    /// Up to which size numbers of each quantity are rounding errors, given the largest numbers of the fields: small shares of these, and what
+    /// double precision leaves of the displacements that the largest stress makes, and of the work of the largest force along them.
+    fn rounding(&self, largest: &BTreeMap<String, f64>) -> BTreeMap<String, f64> {
+        let mut rounding: BTreeMap<String, f64> =
+            largest.iter().map(|(name, most)| (name.clone(), ROUNDING * most)).collect();
+        let most = |name: &str| largest.get(name).copied().unwrap_or(0.0);
+        let nodes: &[[f64; 3]] = self.snapshot.as_ref().map_or(&[], |snapshot| &snapshot.nodes);
+        let extent =
+            |i: usize| extent(nodes.iter().map(|node| node[i])).map_or(0.0, |(low, high)| high - low);
+        let size = (0..3).map(extent).fold(0.0, f64::max);
+        let elasticity = self.job.as_ref().and_then(|job| job.material.elasticity.as_ref());
+        let modulus = nodes.first().and_then(|node| Some(elasticity?.youngs_modulus.evaluate(0.0, node)));
+        let strain =
+            modulus.filter(|modulus| *modulus > 0.0).map_or(0.0, |modulus| most(VON_MISES.name) / modulus);
+        let way = f64::max(most(DISPLACEMENT.name), strain * size);
+        let step = self.history.as_ref().map_or(0.0, |history| history.largest("dt"));
+        let force = self.resultants.as_ref().map_or(0.0, |table| table.largest("force"));
+        let energies = || ENERGIES.iter().map(|kind| kind.column);
+        let energy = self.history.iter().flat_map(|table| energies().map(|column| table.largest(column)));
+        let energy = energy.fold(force * way, f64::max);
+        let mut raise = |name: &str, scale: f64| {
+            let least = rounding.entry(name.to_owned()).or_default();
+            *least = f64::max(*least, UNRESOLVED * scale);
+        };
+        raise(DISPLACEMENT.name, way);
+        if step > 0.0 {
+            [VELOCITY.name, SLIDING_VELOCITY.name].into_iter().for_each(|name| raise(name, way / step));
+        }
+        energies().for_each(|column| raise(column, energy));
+        rounding
     }
 
     /// The fields at one of their times, without rounding errors.
     pub(super) fn snapshot_at(&self, step: usize) -> Result<Snapshot> {
         let mut snapshot = Snapshot::read_at(&self.folder.join("fields.vtkhdf"), Some(step))?;
-        snapshot.clear_below(ROUNDING, &self.largest);
+        snapshot.clear_below(&self.rounding);
         Ok(snapshot)
     }
 

@@ -35,6 +35,8 @@ pub struct Options {
     pub per_cell: bool,
     /// Whether pictures of the body have contour lines.
     pub contours: bool,
+    /// Whether files that no report has written are overwritten.
+    pub force: bool,
 }
 
 /// The title of a run: that of its job, or the name of its folder.
@@ -86,7 +88,7 @@ pub(super) type Section = (String, String, Vec<Picture>);
 /// How bodies are drawn.
 fn look(found: &RunFiles, options: Options) -> body::Look {
     let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
-    let Options { per_cell, contours } = options;
+    let Options { per_cell, contours, .. } = options;
     body::Look { per_cell, contours, several_materials }
 }
 

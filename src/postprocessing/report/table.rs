@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::io::output::csv::records;
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 /// A number below this share of the largest one of its quantity in the run is a rounding error.
 pub(super) const ROUNDING: f64 = 1e-9;
@@ -127,20 +127,28 @@ impl Table {
     /// The same with zeros in place of rounding errors: numbers far below the largest one that any component of the same quantity has
     /// in any row.
     pub(super) fn without_rounding(mut self) -> Self {
-        let largest: Vec<f64> = self.header.iter().map(|name| self.largest(quantity(name))).collect();
-        let is_place: Vec<bool> = self.header.iter().map(|name| PLACES.contains(&name.as_str())).collect();
-        for row in &mut self.rows {
-            for (at, value) in row.iter_mut().enumerate() {
-                if !is_place[at] && value.abs() <= ROUNDING * largest[at] {
-                    *value = 0.0;
-                }
-            }
-        }
+        let least = |name: &String| (quantity(name).to_owned(), ROUNDING * self.largest(quantity(name)));
+        let least = self.header.iter().map(least).collect();
+        self.clear_below(&least);
         self
     }
 
+    /// Replaces numbers of quantities up to these least ones by zero.
+    pub(super) fn clear_below(&mut self, least: &BTreeMap<String, f64>) {
+        let least = |name: &String| match PLACES.contains(&name.as_str()) {
+            true => None,
+            false => least.get(quantity(name)).copied(),
+        };
+        let least: Vec<Option<f64>> = self.header.iter().map(least).collect();
+        for (value, least) in self.rows.iter_mut().flat_map(|row| row.iter_mut().zip(&least)) {
+            if least.is_some_and(|least| value.abs() <= least) {
+                *value = 0.0;
+            }
+        }
+    }
+
     /// The largest magnitude of the finite numbers of a quantity.
-    fn largest(&self, of: &str) -> f64 {
+    pub(super) fn largest(&self, of: &str) -> f64 {
         let columns = self.header.iter().filter(|name| quantity(name) == of);
         let values = columns.filter_map(|name| self.column(name)).flatten();
         values.filter(|value| value.is_finite()).fold(0.0, |most, value| f64::max(most, value.abs()))

@@ -8,9 +8,11 @@ use crate::{
     error::Result,
     fem::{
         effect::{Contact, Moment, PointState, Quantity, SurfaceForce},
-        space::{SurfacePoint, corner_means},
+        space::{SurfacePoint, corner_means, omits_corners},
     },
-    linear_algebra::tensor::{Vector, dot, larger},
+    linear_algebra::tensor::{Vector, dot, larger, norm},
+    mesh::shape::facet_normal,
+    parallel::exchange::exchange_lists,
 };
 use std::{cmp::Ordering, collections::BTreeSet};
 
@@ -24,7 +26,8 @@ const SAME_FACE: f64 = 0.7;
 /// The states of the nodal points of all contacts at the nodes of this rank, those of a node together, in the order of
 /// their normals: neither the order of the tables of the job nor the partition matters. Nodes of the other side of contact between bodies
 /// have means of those that face them, with opposite tractions and sliding velocities. Corners where no law acts
-/// have the means of the points at the midpoints of edges around, a mean for each face of the body. Collective.
+/// have the means of the points at the midpoints of edges around, a mean for each face of the body, and their own distance from an obstacle.
+/// Collective.
 pub(super) fn contact_points<const D: usize, const S: usize>(
     at: Converged<'_, D, S>,
 ) -> Result<Vec<(usize, PointState<D>)>> {
@@ -71,12 +74,51 @@ pub(super) fn contact_points<const D: usize, const S: usize>(
         points_at(&points, node as usize).max_by(|a, b| along(a).total_cmp(&along(b))).map(values_of)
     };
     let corners = corner_means(at.session, &at.body.mesh, &facets, of_midside)?;
-    points.extend(corners.into_iter().map(|(point, values)| {
+    let displacement = at.session.agree(at.state.displacement.local())?;
+    let obstacles = obstacles_at_corners(at)?;
+    for (point, values) in corners {
         let normal = at.body.held.whole(point).normal;
-        (point.node as usize, PointState { normal, ..state_of(&values) })
-    }));
+        let node = point.node as usize;
+        let near =
+            obstacles.iter().filter(|(other, _, facing)| *other == node && dot(facing, &normal) > SAME_FACE);
+        let place = (at.body.mesh.nodes[node], normal);
+        let own = displacement[node * D..].first_chunk().unwrap_or(&[0.0; D]);
+        let gaps =
+            near.filter_map(|(_, contact, _)| at.body.contacts[*contact].gap_at(place, at.state.time, own));
+        let state = state_of(&values);
+        let gap = gaps.min_by(f64::total_cmp).unwrap_or(state.gap);
+        points.push((node, PointState { normal, gap, ..state }));
+    }
     points.sort_by(in_order);
     Ok(points)
+}
+
+/// The owned corners of facets before obstacles where no law acts, each with the contact and the unit normal of the facet. Collective.
+fn obstacles_at_corners<const D: usize, const S: usize>(
+    at: Converged<'_, D, S>,
+) -> Result<Vec<(usize, usize, Vector<D>)>> {
+    let mesh = &at.body.mesh;
+    if !omits_corners(mesh) {
+        return Ok(Vec::new());
+    }
+    let mut records = vec![Vec::new(); at.session.ranks()];
+    let before_obstacles = at.body.contacts.iter().enumerate().filter(|(_, contact)| !contact.is_paired);
+    for (number, facet) in before_obstacles
+        .flat_map(|(number, contact)| contact.facets.iter().map(move |facet| (number, *facet)))
+    {
+        let normal = facet_normal(&mesh.facet_corners(facet));
+        for corner in mesh.facets[facet as usize].map(|node| mesh.global_node(node)) {
+            let record = &mut records[mesh.owner(corner)];
+            record.extend([f64::from(corner), number as f64]);
+            record.extend(normal.map(|n| n / norm(&normal)));
+        }
+    }
+    let records = exchange_lists(at.session.world(), &records)?;
+    let of_record = |record: &[f64]| {
+        let normal = std::array::from_fn(|i| record[i + 2]);
+        (mesh.owned_node(record[0] as u32), record[1] as usize, normal)
+    };
+    Ok(records.chunks_exact(D + 2).map(of_record).collect())
 }
 
 /// The states at a node, of points in the order of their nodes.

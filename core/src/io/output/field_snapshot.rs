@@ -82,12 +82,12 @@ impl Snapshot {
         fields.chain(self.histories.iter().map(|history| (history.name.as_str(), history.values.as_slice())))
     }
 
-    /// Replaces values below this share of these largest ones of their fields by zero.
-    pub fn clear_below(&mut self, share: f64, largest: &BTreeMap<String, f64>) {
+    /// Replaces values up to these least ones of their fields by zero.
+    pub fn clear_below(&mut self, least: &BTreeMap<String, f64>) {
         let fields = self.fields.iter_mut().map(|(name, values)| (*name, values));
         let histories = self.histories.iter_mut().map(|history| (history.name.as_str(), &mut history.values));
         for (name, values) in fields.chain(histories) {
-            let least = share * largest.get(name).copied().unwrap_or(0.0);
+            let least = least.get(name).copied().unwrap_or(0.0);
             values.iter_mut().filter(|value| value.abs() <= least).for_each(|value| *value = 0.0);
         }
     }
@@ -244,15 +244,15 @@ mod tests {
     }
 
     #[test]
-    fn values_far_below_the_largest_of_their_field_are_zero() {
+    fn values_up_to_the_least_ones_of_their_field_are_zero() {
         let wear = History { name: "wear".into(), place: Place::Node, values: vec![3e-9, -2e-9, f64::NAN] };
         let mut snapshot = Snapshot {
             fields: [("displacement", vec![1e-9, -3e-9, 1.0])].into(),
             histories: vec![wear],
             ..Snapshot::default()
         };
-        let largest = [("displacement", 2.0), ("wear", 1e-3)].map(|(name, most)| (name.to_owned(), most));
-        snapshot.clear_below(1e-9, &largest.into());
+        let least = [("displacement", 2e-9), ("wear", 1e-12)].map(|(name, least)| (name.to_owned(), least));
+        snapshot.clear_below(&least.into());
         assert_eq!(snapshot.fields["displacement"], [0.0, -3e-9, 1.0]);
         let wear = &snapshot.histories[0].values;
         assert!(wear[..2] == [3e-9, -2e-9] && wear[2].is_nan(), "{wear:?}");

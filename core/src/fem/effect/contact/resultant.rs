@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    linear_algebra::tensor::{Vector, add_scaled, larger},
+    linear_algebra::tensor::{Vector, add_scaled, dot, larger},
 };
 
 /// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points whose normal a support holds count for friction
@@ -133,6 +133,28 @@ impl<const D: usize> Contact<D> {
             visit(point.node(), state);
         }
         Ok(())
+    }
+
+    /// The distance in m to the obstacle, at a `time`, of an undeformed place with this unit normal and this displacement, where the law has no
+    /// point; none where the obstacle is not along the normal, the surface wears, or the law has no gap.
+    pub fn gap_at(
+        &self,
+        (place, normal): (Vector<D>, Vector<D>),
+        time: f64,
+        displacement: &Vector<D>,
+    ) -> Option<f64> {
+        if !self.normal.law.depends_on_displacement() || self.wear.is_some() {
+            return None;
+        }
+        let gap = &self.obstacle.gap;
+        let found = if self.follows_surface {
+            let here = self.obstacle.seen_before(&add_scaled(&place, 1.0, displacement));
+            gap.at(time, &here, &gap.direction_of_nearest(&here, time).unwrap_or(normal))
+        } else {
+            let moved = dot(&normal, displacement);
+            gap.of_moved(time, &self.obstacle.seen_before(&place), &normal, moved).map(|gap| gap - moved)
+        };
+        found.ok().filter(|gap| gap.is_finite())
     }
 
     /// Visits the forces in N on the body at the nodes of points on this rank in the step just solved, at its velocities with ghosts.
