@@ -19,8 +19,10 @@ mod threads;
 pub(crate) use block_rows::index;
 pub use block_rows::{BlockRows, INDEX_BITS};
 pub use cholesky::{Cholesky, Precision};
-pub use dense_factor::{DenseFactor, DensePanels, Team};
-pub use packed::{LocalCholesky, PackedSymmetric, column, columns};
+pub use dense_factor::{DenseFactor, DensePanels, Factored, Team};
+pub use packed::{
+    LocalCholesky, PackedSymmetric, add_times_own_transpose, bytes_of_columns, column, columns, share,
+};
 pub(crate) use rectangular_blocks::{Transfer, transfer};
 pub(crate) use symmetric_blocks::{Product, ScalarRows, Stored, product};
 pub(crate) use threads::one_unless_chosen;

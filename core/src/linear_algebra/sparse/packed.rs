@@ -15,6 +15,12 @@ pub struct PackedSymmetric {
 const WIDTH: usize = 128;
 
 impl PackedSymmetric {
+    /// With these entries.
+    pub fn of(size: usize, entries: Vec<f64>) -> Self {
+        assert_eq!(entries.len(), size * (size + 1) / 2);
+        Self { size, entries }
+    }
+
     /// `L L^T`, given packed columns of `L`. Unknown `i` of the product is unknown `places[i]` of `L`.
     pub fn times_own_transpose(lower: &[f64], places: &[usize]) -> Self {
         let size = places.len();
@@ -57,55 +63,45 @@ impl PackedSymmetric {
         }
         full
     }
-
-    /// The columns whose entries a rank multiplies: each nearly as many.
-    pub fn share(&self, rank: usize, ranks: usize) -> Range<usize> {
-        // Entries from the column `size - n` on: about half the square of n.
-        let start = |rank: usize| {
-            let left = (ranks - rank) as f64 / ranks as f64;
-            self.size - (left.sqrt() * self.size as f64).round() as usize
-        };
-        start(rank)..start(rank + 1)
-    }
-
-    /// Adds the product of the entries in these columns, and of those that are equal to them in the rows, with `x`.
-    pub fn add_product(&self, columns: Range<usize>, x: &[f64], product: &mut [f64]) {
-        let entries = &self.entries[index(self.size, columns.start, columns.start)..];
-        add_product(entries, columns, x, product);
-    }
-
-    /// Bytes of these columns.
-    pub fn bytes(&self, columns: Range<usize>) -> u64 {
-        let entries: usize = columns.map(|at| self.size - at).sum();
-        (entries * size_of::<f64>()) as u64
-    }
 }
 
-/// Each entry is read once, for its row and its column.
+/// The packed columns of a lower triangle, of this many, whose entries a rank multiplies: each nearly as many.
+pub fn share(size: usize, rank: usize, ranks: usize) -> Range<usize> {
+    // Entries from the column `size - n` on: about half the square of n.
+    let start = |rank: usize| {
+        let left = (ranks - rank) as f64 / ranks as f64;
+        size - (left.sqrt() * size as f64).round() as usize
+    };
+    start(rank)..start(rank + 1)
+}
+
+/// Bytes of these columns.
+pub fn bytes_of_columns(size: usize, columns: Range<usize>) -> u64 {
+    let entries: usize = columns.map(|at| size - at).sum();
+    (entries * size_of::<f64>()) as u64
+}
+
+/// Adds the product of these columns of `L` and their transpose with `x`: those of all columns add up to `L L^T x`.
+pub fn add_times_own_transpose(lower: &[f64], columns: Range<usize>, x: &[f64], product: &mut [f64]) {
+    add_products(&lower[index(x.len(), columns.start, columns.start)..], columns, x, product);
+}
+
+/// Each entry is read from memory once: a column stays in the cache between its two products.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2+fma", "x86_64+avx2"))]
-fn add_product(mut entries: &[f64], columns: Range<usize>, x: &[f64], product: &mut [f64]) {
+fn add_products(mut entries: &[f64], columns: Range<usize>, x: &[f64], product: &mut [f64]) {
     const LANES: usize = 16;
     for at in columns {
         let (column, rest) = entries.split_at(x.len() - at);
         entries = rest;
-        let factor = x[at];
-        let (values, values_rest) = x[at + 1..].as_chunks::<LANES>();
-        let (below, below_rest) = column[1..].as_chunks::<LANES>();
-        let (own, others) = product[at..].split_at_mut(1);
-        let (sums, sums_rest) = others.as_chunks_mut::<LANES>();
+        let (values, values_rest) = x[at..].as_chunks::<LANES>();
+        let (below, below_rest) = column.as_chunks::<LANES>();
         let mut lanes = [0.0; LANES];
-        for ((l, x), sum) in below.iter().zip(values).zip(sums) {
-            for i in 0..LANES {
-                lanes[i] += l[i] * x[i];
-                sum[i] += l[i] * factor;
-            }
+        for (l, x) in below.iter().zip(values) {
+            (0..LANES).for_each(|i| lanes[i] += l[i] * x[i]);
         }
-        let mut dot = column[0] * factor + lanes.iter().sum::<f64>();
-        for ((l, x), sum) in below_rest.iter().zip(values_rest).zip(sums_rest) {
-            dot += l * x;
-            *sum += l * factor;
-        }
-        own[0] += dot;
+        let rest: f64 = below_rest.iter().zip(values_rest).map(|(l, x)| l * x).sum();
+        let dot = lanes.iter().sum::<f64>() + rest;
+        product[at..].iter_mut().zip(column).for_each(|(sum, l)| *sum += l * dot);
     }
 }
 
@@ -256,9 +252,10 @@ mod tests {
             for ranks in [1, 2, 3] {
                 let mut product = vec![0.0; size];
                 for rank in 0..ranks {
-                    matrix.add_product(matrix.share(rank, ranks), &x, &mut product);
+                    add_times_own_transpose(&lower, share(size, rank, ranks), &x, &mut product);
                 }
-                assert_eq!(product, expected(&lower, &places, &x), "{size} unknowns, {ranks} ranks");
+                let in_order: Vec<usize> = (0..size).collect();
+                assert_eq!(product, expected(&lower, &in_order, &x), "{size} unknowns, {ranks} ranks");
             }
             let full = matrix.full();
             let column =
@@ -269,8 +266,7 @@ mod tests {
 
     #[test]
     fn ranks_share_the_entries_evenly() {
-        let matrix = PackedSymmetric::times_own_transpose(&lower(302), &(0..302).collect::<Vec<_>>());
-        let bytes: Vec<u64> = (0..3).map(|rank| matrix.bytes(matrix.share(rank, 3))).collect();
+        let bytes: Vec<u64> = (0..3).map(|rank| bytes_of_columns(302, share(302, rank, 3))).collect();
         assert_eq!(bytes.iter().sum::<u64>(), 8 * 302 * 303 / 2);
         assert!(bytes.iter().all(|bytes| (*bytes as f64) < 1.02 * 8.0 * 302.0 * 151.5 / 3.0), "{bytes:?}");
     }
