@@ -21,6 +21,9 @@ pub trait Team {
     /// Gives the values of one rank to all.
     fn spread(&self, from: usize, values: &mut [f64]);
 
+    /// The same in single precision.
+    fn spread_single(&self, from: usize, values: &mut [f32]);
+
     /// Gives one rank the values of all, of which each has the same number, in the order of the ranks.
     fn collect(&self, to: usize, own: &[f64], all: &mut [f64]);
 
@@ -416,74 +419,7 @@ fn zeros<R: Real>(count: usize) -> Vec<R> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use std::{
-        cell::Cell,
-        sync::{Barrier, Mutex},
-    };
-
-    /// Ranks that are threads.
-    struct Threads<'a> {
-        rank: usize,
-        messages: Cell<usize>,
-        barrier: &'a Barrier,
-        rooms: &'a [Mutex<Vec<f64>>],
-    }
-
-    impl Threads<'_> {
-        fn exchange(&self, own: &[f64], mut take: impl FnMut(usize, &[f64])) {
-            self.messages.update(|count| count + 1);
-            *self.rooms[self.rank].lock().unwrap() = own.to_vec();
-            self.barrier.wait();
-            self.rooms.iter().enumerate().for_each(|(rank, room)| take(rank, &room.lock().unwrap()));
-            self.barrier.wait();
-        }
-    }
-
-    impl Team for Threads<'_> {
-        fn rank(&self) -> usize {
-            self.rank
-        }
-
-        fn ranks(&self) -> usize {
-            self.rooms.len()
-        }
-
-        fn spread(&self, from: usize, values: &mut [f64]) {
-            let own = values.to_vec();
-            self.exchange(&own, |rank, room| {
-                if rank == from {
-                    values.copy_from_slice(room);
-                }
-            });
-        }
-
-        fn collect(&self, to: usize, own: &[f64], all: &mut [f64]) {
-            self.exchange(own, |rank, room| {
-                if self.rank == to {
-                    all[rank * own.len()..][..own.len()].copy_from_slice(room);
-                }
-            });
-        }
-
-        fn gather(&self, own: &[f64], all: &mut [f64]) {
-            self.exchange(own, |rank, room| all[rank * own.len()..][..own.len()].copy_from_slice(room));
-        }
-    }
-
-    /// What a function gives on each of several ranks.
-    fn on_ranks<T: Send>(ranks: usize, function: impl Fn(&Threads<'_>) -> T + Sync) -> Vec<T> {
-        let (barrier, rooms) =
-            (&Barrier::new(ranks), &(0..ranks).map(|_| Mutex::default()).collect::<Vec<_>>()[..]);
-        let function = &function;
-        std::thread::scope(|scope| {
-            let threads = (0..ranks).map(|rank| {
-                scope.spawn(move || function(&Threads { rank, messages: Cell::new(0), barrier, rooms }))
-            });
-            let threads: Vec<_> = threads.collect();
-            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
-        })
-    }
+    use super::{super::thread_team::on_ranks, *};
 
     /// Units of the unknowns, far apart.
     fn unit(i: usize) -> f64 {

@@ -1,4 +1,4 @@
-//! Dense symmetric matrices that each rank has as a whole, by packed columns, and Cholesky factors of such matrices.
+//! Dense symmetric matrices that each rank has as a whole, by packed columns.
 
 use super::panel::Real;
 use multiversion::multiversion;
@@ -120,99 +120,6 @@ fn index(size: usize, row: usize, column: usize) -> usize {
     column * size - column * column.saturating_sub(1) / 2 + row - column
 }
 
-/// Cholesky factors of dense matrices of any size up to the largest, one after the other in the same memory, for preconditioners: those of
-/// large ones are in single precision, where rounding errors leave them as they are.
-#[derive(Debug)]
-pub struct LocalCholesky {
-    size: usize,
-    /// The scaled matrix or its factor, column after column; entries above the diagonal are not used.
-    columns: Vec<f64>,
-    /// Its factor in single precision, in place of the other.
-    single: Vec<f32>,
-    /// Factors of rows and columns, with which all diagonal entries are one.
-    scales: Vec<f64>,
-    values: Vec<f64>,
-    single_values: Vec<f32>,
-}
-
-/// Unknowns from which reading a factor takes longer than the iterations that rounding errors may add.
-const SINGLE_FROM: usize = 1024;
-/// The smallest pivot of a factor in single precision over the diagonal entry: below, the matrix is nearly singular.
-const LEAST_PIVOT: f64 = 1e-4;
-
-impl LocalCholesky {
-    /// Memory for matrices of this size at most.
-    pub fn with_capacity(most: usize) -> Self {
-        let singles = if most < SINGLE_FROM { 0 } else { most };
-        Self {
-            size: 0,
-            columns: Vec::with_capacity(most * most),
-            single: Vec::with_capacity(singles * singles),
-            scales: Vec::with_capacity(most),
-            values: Vec::with_capacity(most),
-            single_values: Vec::with_capacity(singles),
-        }
-    }
-
-    /// Zeros for the entries of a matrix to be factored, column after column; those above the diagonal are not used.
-    pub fn columns_of(&mut self, size: usize) -> &mut [f64] {
-        self.size = size;
-        self.columns.clear();
-        self.columns.resize(size * size, 0.0);
-        &mut self.columns
-    }
-
-    /// Factors the matrix of these entries; `None` where it is not positive definite.
-    pub fn factor(&mut self) -> Option<()> {
-        let Self { size, columns, single, scales, .. } = self;
-        scales.clear();
-        scales.extend(columns.iter().step_by(*size + 1).map(|entry| 1.0 / entry.sqrt()));
-        for (column, factor) in columns.chunks_exact_mut((*size).max(1)).zip(&*scales) {
-            column.iter_mut().zip(&*scales).for_each(|(entry, scale)| *entry *= factor * scale);
-        }
-        single.clear();
-        if *size >= SINGLE_FROM {
-            single.extend(columns.iter().map(|entry| f32::rounded(*entry)));
-            let is_accurate = f32::factor(single, *size).is_some()
-                && single.iter().step_by(*size + 1).all(|pivot| pivot.exact().powi(2) >= LEAST_PIVOT);
-            if is_accurate {
-                return Some(());
-            }
-            single.clear();
-        }
-        if *size == 0 { Some(()) } else { f64::factor(columns, *size) }
-    }
-
-    /// Replaces a right-hand side by the solution.
-    pub fn solve(&mut self, values: &mut [f64]) {
-        let Self { size, columns, single, scales, values: scaled, single_values } = self;
-        assert_eq!(values.len(), *size);
-        scaled.clear();
-        scaled.extend(values.iter().zip(&*scales).map(|(value, scale)| value * scale));
-        if !single.is_empty() {
-            // Right-hand sides may be smaller than the least number in single precision.
-            let largest = scaled.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-            let unit = if largest > 0.0 && largest.is_finite() { largest } else { 1.0 };
-            single_values.clear();
-            single_values.extend(scaled.iter().map(|value| f32::rounded(value / unit)));
-            f32::forward(single, *size, single_values);
-            f32::backward(single, *size, single_values);
-            scaled.iter_mut().zip(&*single_values).for_each(|(scaled, value)| *scaled = unit * value.exact());
-        } else if *size > 0 {
-            f64::forward(columns, *size, scaled);
-            f64::backward(columns, *size, scaled);
-        }
-        let solution = scaled.iter().zip(&*scales).map(|(scaled, scale)| scaled * scale);
-        values.iter_mut().zip(solution).for_each(|(value, solution)| *value = solution);
-    }
-
-    /// Bytes that a solve reads.
-    pub fn bytes(&self) -> u64 {
-        let number = if self.single.is_empty() { size_of::<f64>() } else { size_of::<f32>() };
-        (self.size * (self.size + 1) * number) as u64
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -269,54 +176,5 @@ mod tests {
         let bytes: Vec<u64> = (0..3).map(|rank| bytes_of_columns(302, share(302, rank, 3))).collect();
         assert_eq!(bytes.iter().sum::<u64>(), 8 * 302 * 303 / 2);
         assert!(bytes.iter().all(|bytes| (*bytes as f64) < 1.02 * 8.0 * 302.0 * 151.5 / 3.0), "{bytes:?}");
-    }
-
-    /// A matrix of these units with ones and small numbers beside its diagonal.
-    fn spread(size: usize, units: impl Fn(usize) -> f64) -> Vec<f64> {
-        let entry = |row: usize, column: usize| match row == column {
-            true => 1.0,
-            false => 0.4 / (1.0 + (row as f64 - column as f64).powi(2)),
-        };
-        (0..size * size).map(|at| entry(at % size, at / size) * units(at % size) * units(at / size)).collect()
-    }
-
-    #[test]
-    fn factors_solve_in_any_units_up_to_the_rounding_of_their_precision() {
-        let units = |i: usize| [1.0, 1e-40, 1e40][i % 3];
-        let mut factor = LocalCholesky::with_capacity(SINGLE_FROM);
-        for (size, tolerance) in [(0, 0.0), (1, 1e-15), (100, 1e-13), (SINGLE_FROM, 1e-5), (99, 1e-13)] {
-            let matrix = spread(size, units);
-            let x: Vec<f64> =
-                vector(size).iter().enumerate().map(|(i, value)| value * 1e-60 / units(i)).collect();
-            let mut values: Vec<f64> =
-                (0..size).map(|row| (0..size).map(|at| matrix[at * size + row] * x[at]).sum()).collect();
-            factor.columns_of(size).copy_from_slice(&matrix);
-            factor.factor().unwrap();
-            assert_eq!(!factor.single.is_empty(), size >= SINGLE_FROM);
-            factor.solve(&mut values);
-            let errors =
-                values.iter().zip(&x).enumerate().map(|(i, (value, x))| (value - x).abs() * units(i) / 3e-60);
-            let worst =
-                errors.fold(0.0, |most, error| if error > most || error.is_nan() { error } else { most });
-            assert!(worst <= tolerance, "{size} unknowns: {worst:e}");
-        }
-    }
-
-    #[test]
-    fn nearly_singular_matrices_are_factored_in_double_precision_and_indefinite_ones_not_at_all() {
-        let size = SINGLE_FROM;
-        let with_pair = |entry: f64| {
-            let mut matrix = spread(size, |_| 1.0);
-            for at in 0..size {
-                (matrix[at], matrix[at * size], matrix[size + at], matrix[at * size + 1]) =
-                    (0.0, 0.0, 0.0, 0.0);
-            }
-            (matrix[0], matrix[1], matrix[size], matrix[size + 1]) = (1.0, entry, entry, 1.0);
-            let mut factor = LocalCholesky::with_capacity(size);
-            factor.columns_of(size).copy_from_slice(&matrix);
-            factor.factor().map(|()| !factor.single.is_empty())
-        };
-        let factored = [0.5, 1.0 - 5e-6, 1.0 - 1e-9, 1.0 + 1e-9].map(with_pair);
-        assert_eq!(factored, [Some(true), Some(false), Some(false), None]);
     }
 }

@@ -459,7 +459,7 @@ impl StepMatrix for CondensedMatrix {
         projection_blocks.clear();
         let factor = factor.get_or_insert_with(|| ReducedFactor::with_capacity(&self.nodes));
         let product = self.product(product, complement, &workspace.world);
-        factor.set(product, &self.nodes, [additions, blocks])?;
+        factor.set(product, &self.nodes, [additions, blocks], &Ranks(&workspace.world))?;
         projection_blocks.clone_from(blocks);
         Ok(true)
     }

@@ -101,6 +101,10 @@ impl Team for Ranks<'_> {
         self.0.process_at_rank(from as i32).broadcast_into(values);
     }
 
+    fn spread_single(&self, from: usize, values: &mut [f32]) {
+        self.0.process_at_rank(from as i32).broadcast_into(values);
+    }
+
     fn collect(&self, to: usize, own: &[f64], all: &mut [f64]) {
         let root = self.0.process_at_rank(to as i32);
         if to == self.rank() { root.gather_into_root(own, all) } else { root.gather_into(own) }
