@@ -44,7 +44,7 @@ pub use variational_inequality::{BoundedSnes, Limits, UNBOUNDED};
 pub use vector::{DistributedVector, Local, LocalRead, LocalWrite};
 
 pub use crate::linear_algebra::sparse::{
-    BlockRows, Cholesky, DenseFactor, DensePanels, INDEX_BITS, Precision, Team,
+    BlockRows, Cholesky, DenseFactor, DensePanels, Factored, INDEX_BITS, Precision, Team,
 };
 use crate::{
     error::{Error, Result},

@@ -21,6 +21,9 @@ pub trait Team {
     /// Gives the values of one rank to all.
     fn spread(&self, from: usize, values: &mut [f64]);
 
+    /// The same in single precision.
+    fn spread_single(&self, from: usize, values: &mut [f32]);
+
     /// Gives one rank the values of all, of which each has the same number, in the order of the ranks.
     fn collect(&self, to: usize, own: &[f64], all: &mut [f64]);
 
@@ -70,6 +73,17 @@ pub struct DenseFactor {
     all: Vec<f64>,
 }
 
+/// A factored matrix.
+#[derive(Debug)]
+pub struct Factored {
+    /// For substitutions.
+    pub factor: DenseFactor,
+    /// The columns of `L` of the unknowns that substitutions do not eliminate, from the diagonal down, on all ranks.
+    pub last: Vec<f64>,
+    /// The Schur complement of these unknowns, whose factor they are.
+    pub complement: DensePanels,
+}
+
 #[derive(Debug)]
 enum Numbers {
     Double(Vec<f64>),
@@ -103,6 +117,12 @@ impl Blocks {
             entries[*owner] += (range[1] - range[0]) * range[1].min(starts[eliminated]);
         }
         Self { starts, owners, eliminated, rank, ranks }
+    }
+
+    /// The blocks that are not eliminated, of a matrix of their own.
+    fn rest(&self) -> Self {
+        let starts = self.starts[self.eliminated..].iter().map(|start| start - self.interior()).collect();
+        Self { starts, owners: self.owners[self.eliminated..].to_vec(), eliminated: 0, ..*self }
     }
 
     fn is_own(&self, at: usize) -> bool {
@@ -150,13 +170,15 @@ impl DensePanels {
         self.panels[at].get_mut((column - first) * rows + column - first..(column - first + 1) * rows)
     }
 
-    /// Factors the matrix, panel after panel. Also gives the columns of `L` of the unknowns that substitutions do not eliminate, from the
-    /// diagonal down, on all ranks. Fails on all ranks where the matrix is not positive definite. Collective.
-    pub fn factor(mut self, team: &impl Team, precision: Precision) -> Result<(DenseFactor, Vec<f64>)> {
+    /// Factors the matrix, panel after panel. Fails on all ranks where it is not positive definite. Collective.
+    pub fn factor(mut self, team: &impl Team, precision: Precision) -> Result<Factored> {
         let mut factor = DenseFactor::new(&self.blocks, self.scales(team), precision);
         let Self { panels, blocks } = &mut self;
-        let (mut update, mut last) = (Vec::new(), Vec::new());
+        let (mut last, mut complement) = (Vec::new(), Self { panels: Vec::new(), blocks: blocks.rest() });
         for at in 0..blocks.len() {
+            if at == blocks.eliminated {
+                complement.panels.extend_from_slice(&panels[at..]);
+            }
             let mut panel = take(&mut panels[at]);
             let (width, first) = (blocks.range(at).len(), blocks.starts[at]);
             let rows = blocks.size() - first;
@@ -172,23 +194,28 @@ impl DensePanels {
             let ahead = (at + 1..blocks.len()).zip(&mut panels[at + 1..]);
             for (next, target) in ahead.filter(|(_, target)| !target.is_empty()) {
                 let count = blocks.range(next).len();
-                let height = blocks.size() - blocks.starts[next];
-                update.resize(usize::max(update.len(), height * count), 0.0);
-                f64::own_product(&panel, rows, blocks.starts[next] - first, count, &mut update);
-                let columns = target.chunks_exact_mut(height).zip(update.chunks_exact(height));
-                for (column, (target, update)) in columns.enumerate() {
-                    let pairs = target[column..].iter_mut().zip(&update[column..]);
-                    pairs.for_each(|(value, update)| *value -= update);
-                }
+                f64::subtract_own_product(&panel, rows, blocks.starts[next] - first, count, target);
             }
             if at < blocks.eliminated {
                 factor.store(at, &panel);
             } else {
-                let columns = panel.chunks_exact(rows).enumerate();
-                columns.for_each(|(column, entries)| last.extend_from_slice(&entries[column..]));
+                append_columns(&panel, rows, &mut last);
             }
         }
-        Ok((factor, last))
+        Ok(Factored { factor, last, complement })
+    }
+
+    /// The entries on all ranks, column after column from the diagonal down. Collective.
+    pub fn gather(mut self, team: &impl Team) -> Vec<f64> {
+        let size = self.blocks.size();
+        let mut columns = Vec::with_capacity(size * (size + 1) / 2);
+        for (at, mut panel) in take(&mut self.panels).into_iter().enumerate() {
+            let rows = size - self.blocks.starts[at];
+            panel.resize(rows * self.blocks.range(at).len(), 0.0);
+            team.spread(self.blocks.owners[at], &mut panel);
+            append_columns(&panel, rows, &mut columns);
+        }
+        columns
     }
 
     /// For each unknown a power of two that scales its diagonal entry to about one. Collective.
@@ -204,6 +231,12 @@ impl DensePanels {
         scales.iter_mut().for_each(|entry| *entry = (-0.5 * entry.log2()).round().exp2());
         scales
     }
+}
+
+/// Appends the columns of a panel with this many rows, from the diagonal down.
+fn append_columns(panel: &[f64], rows: usize, columns: &mut Vec<f64>) {
+    let entries = panel.chunks_exact(rows.max(1)).enumerate();
+    entries.for_each(|(column, entries)| columns.extend_from_slice(&entries[column..]));
 }
 
 impl DenseFactor {
@@ -386,74 +419,7 @@ fn zeros<R: Real>(count: usize) -> Vec<R> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use std::{
-        cell::Cell,
-        sync::{Barrier, Mutex},
-    };
-
-    /// Ranks that are threads.
-    struct Threads<'a> {
-        rank: usize,
-        messages: Cell<usize>,
-        barrier: &'a Barrier,
-        rooms: &'a [Mutex<Vec<f64>>],
-    }
-
-    impl Threads<'_> {
-        fn exchange(&self, own: &[f64], mut take: impl FnMut(usize, &[f64])) {
-            self.messages.update(|count| count + 1);
-            *self.rooms[self.rank].lock().unwrap() = own.to_vec();
-            self.barrier.wait();
-            self.rooms.iter().enumerate().for_each(|(rank, room)| take(rank, &room.lock().unwrap()));
-            self.barrier.wait();
-        }
-    }
-
-    impl Team for Threads<'_> {
-        fn rank(&self) -> usize {
-            self.rank
-        }
-
-        fn ranks(&self) -> usize {
-            self.rooms.len()
-        }
-
-        fn spread(&self, from: usize, values: &mut [f64]) {
-            let own = values.to_vec();
-            self.exchange(&own, |rank, room| {
-                if rank == from {
-                    values.copy_from_slice(room);
-                }
-            });
-        }
-
-        fn collect(&self, to: usize, own: &[f64], all: &mut [f64]) {
-            self.exchange(own, |rank, room| {
-                if self.rank == to {
-                    all[rank * own.len()..][..own.len()].copy_from_slice(room);
-                }
-            });
-        }
-
-        fn gather(&self, own: &[f64], all: &mut [f64]) {
-            self.exchange(own, |rank, room| all[rank * own.len()..][..own.len()].copy_from_slice(room));
-        }
-    }
-
-    /// What a function gives on each of several ranks.
-    fn on_ranks<T: Send>(ranks: usize, function: impl Fn(&Threads<'_>) -> T + Sync) -> Vec<T> {
-        let (barrier, rooms) =
-            (&Barrier::new(ranks), &(0..ranks).map(|_| Mutex::default()).collect::<Vec<_>>()[..]);
-        let function = &function;
-        std::thread::scope(|scope| {
-            let threads = (0..ranks).map(|rank| {
-                scope.spawn(move || function(&Threads { rank, messages: Cell::new(0), barrier, rooms }))
-            });
-            let threads: Vec<_> = threads.collect();
-            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
-        })
-    }
+    use super::{super::thread_team::on_ranks, *};
 
     /// Units of the unknowns, far apart.
     fn unit(i: usize) -> f64 {
@@ -484,6 +450,8 @@ mod tests {
         x: Vec<f64>,
         /// The columns of the unknowns that are not eliminated.
         last: Vec<f64>,
+        /// Their Schur complement.
+        complement: Vec<f64>,
         bytes: u64,
         messages: usize,
     }
@@ -491,7 +459,9 @@ mod tests {
     /// Solves on each rank; the last unknowns are solved with their columns, as contact would be.
     fn solve(ranks: usize, size: usize, eliminated: usize, precision: Precision) -> Vec<Solved> {
         on_ranks(ranks, |team| {
-            let (mut factor, last) = filled(size, eliminated, team).factor(team, precision).unwrap();
+            let Factored { mut factor, last, complement } =
+                filled(size, eliminated, team).factor(team, precision).unwrap();
+            let complement = complement.gather(team);
             let known = |i: usize| (i % 7) as f64;
             let sum: f64 = (0..size).map(known).sum();
             let mut x: Vec<f64> = (0..size).map(|i| unit(i) * (size as f64 * known(i) + sum)).collect();
@@ -510,7 +480,7 @@ mod tests {
             }
             factor.backward(team, &mut x).unwrap();
             assert!(factor.forward(team, &mut vec![0.0; size + 1]).is_err());
-            Solved { x, last, bytes: factor.bytes(), messages: team.messages.get() - before }
+            Solved { x, last, complement, bytes: factor.bytes(), messages: team.messages.get() - before }
         })
     }
 
@@ -527,11 +497,25 @@ mod tests {
         ] {
             for (precision, error) in [(Precision::Double, 1e-10), (Precision::Single, 1e-4)] {
                 let found = solve(ranks, size, eliminated, precision);
-                for Solved { x, last, .. } in &found {
+                for Solved { x, last, complement, .. } in &found {
                     let off = |i: usize| (x[i] * unit(i) - (i % 7) as f64).abs();
                     assert!((0..size).all(|i| off(i) < error), "{ranks} ranks, {eliminated} of {size}");
-                    assert_eq!((x, last), (&found[0].x, &found[0].last), "the same bits on all ranks");
-                    assert_eq!(last.len(), (size - eliminated) * (size - eliminated + 1) / 2);
+                    let first = &found[0];
+                    assert_eq!(
+                        (x, last, complement),
+                        (&first.x, &first.last, &first.complement),
+                        "the same bits on all ranks"
+                    );
+                    let left = size - eliminated;
+                    assert_eq!([last.len(), complement.len()], [left * (left + 1) / 2; 2]);
+                    // Of ones and `n` more on the diagonal, `n / (n + m)` in the place of the ones without `m` unknowns.
+                    let one = size as f64 / (size + eliminated) as f64;
+                    let mut entries = complement.iter();
+                    for (column, row) in (eliminated..size).flat_map(|c| (c..size).map(move |r| (c, r))) {
+                        let known = one + if row == column { size as f64 } else { 0.0 };
+                        let found = entries.next().unwrap() / unit(row) / unit(column);
+                        assert!((found - known).abs() < 1e-11 * known, "{row}, {column}: {found}, {known}");
+                    }
                 }
             }
         }

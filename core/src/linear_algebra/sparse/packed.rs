@@ -1,4 +1,4 @@
-//! Dense symmetric matrices that each rank has as a whole, by packed columns, and Cholesky factors of such matrices.
+//! Dense symmetric matrices that each rank has as a whole, by packed columns.
 
 use super::panel::Real;
 use multiversion::multiversion;
@@ -15,6 +15,12 @@ pub struct PackedSymmetric {
 const WIDTH: usize = 128;
 
 impl PackedSymmetric {
+    /// With these entries.
+    pub fn of(size: usize, entries: Vec<f64>) -> Self {
+        assert_eq!(entries.len(), size * (size + 1) / 2);
+        Self { size, entries }
+    }
+
     /// `L L^T`, given packed columns of `L`. Unknown `i` of the product is unknown `places[i]` of `L`.
     pub fn times_own_transpose(lower: &[f64], places: &[usize]) -> Self {
         let size = places.len();
@@ -57,55 +63,45 @@ impl PackedSymmetric {
         }
         full
     }
-
-    /// The columns whose entries a rank multiplies: each nearly as many.
-    pub fn share(&self, rank: usize, ranks: usize) -> Range<usize> {
-        // Entries from the column `size - n` on: about half the square of n.
-        let start = |rank: usize| {
-            let left = (ranks - rank) as f64 / ranks as f64;
-            self.size - (left.sqrt() * self.size as f64).round() as usize
-        };
-        start(rank)..start(rank + 1)
-    }
-
-    /// Adds the product of the entries in these columns, and of those that are equal to them in the rows, with `x`.
-    pub fn add_product(&self, columns: Range<usize>, x: &[f64], product: &mut [f64]) {
-        let entries = &self.entries[index(self.size, columns.start, columns.start)..];
-        add_product(entries, columns, x, product);
-    }
-
-    /// Bytes of these columns.
-    pub fn bytes(&self, columns: Range<usize>) -> u64 {
-        let entries: usize = columns.map(|at| self.size - at).sum();
-        (entries * size_of::<f64>()) as u64
-    }
 }
 
-/// Each entry is read once, for its row and its column.
+/// The packed columns of a lower triangle, of this many, whose entries a rank multiplies: each nearly as many.
+pub fn share(size: usize, rank: usize, ranks: usize) -> Range<usize> {
+    // Entries from the column `size - n` on: about half the square of n.
+    let start = |rank: usize| {
+        let left = (ranks - rank) as f64 / ranks as f64;
+        size - (left.sqrt() * size as f64).round() as usize
+    };
+    start(rank)..start(rank + 1)
+}
+
+/// Bytes of these columns.
+pub fn bytes_of_columns(size: usize, columns: Range<usize>) -> u64 {
+    let entries: usize = columns.map(|at| size - at).sum();
+    (entries * size_of::<f64>()) as u64
+}
+
+/// Adds the product of these columns of `L` and their transpose with `x`: those of all columns add up to `L L^T x`.
+pub fn add_times_own_transpose(lower: &[f64], columns: Range<usize>, x: &[f64], product: &mut [f64]) {
+    add_products(&lower[index(x.len(), columns.start, columns.start)..], columns, x, product);
+}
+
+/// Each entry is read from memory once: a column stays in the cache between its two products.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2+fma", "x86_64+avx2"))]
-fn add_product(mut entries: &[f64], columns: Range<usize>, x: &[f64], product: &mut [f64]) {
+fn add_products(mut entries: &[f64], columns: Range<usize>, x: &[f64], product: &mut [f64]) {
     const LANES: usize = 16;
     for at in columns {
         let (column, rest) = entries.split_at(x.len() - at);
         entries = rest;
-        let factor = x[at];
-        let (values, values_rest) = x[at + 1..].as_chunks::<LANES>();
-        let (below, below_rest) = column[1..].as_chunks::<LANES>();
-        let (own, others) = product[at..].split_at_mut(1);
-        let (sums, sums_rest) = others.as_chunks_mut::<LANES>();
+        let (values, values_rest) = x[at..].as_chunks::<LANES>();
+        let (below, below_rest) = column.as_chunks::<LANES>();
         let mut lanes = [0.0; LANES];
-        for ((l, x), sum) in below.iter().zip(values).zip(sums) {
-            for i in 0..LANES {
-                lanes[i] += l[i] * x[i];
-                sum[i] += l[i] * factor;
-            }
+        for (l, x) in below.iter().zip(values) {
+            (0..LANES).for_each(|i| lanes[i] += l[i] * x[i]);
         }
-        let mut dot = column[0] * factor + lanes.iter().sum::<f64>();
-        for ((l, x), sum) in below_rest.iter().zip(values_rest).zip(sums_rest) {
-            dot += l * x;
-            *sum += l * factor;
-        }
-        own[0] += dot;
+        let rest: f64 = below_rest.iter().zip(values_rest).map(|(l, x)| l * x).sum();
+        let dot = lanes.iter().sum::<f64>() + rest;
+        product[at..].iter_mut().zip(column).for_each(|(sum, l)| *sum += l * dot);
     }
 }
 
@@ -122,99 +118,6 @@ pub fn columns(packed: &[f64], size: usize) -> impl Iterator<Item = &[f64]> {
 /// Where an entry on or below the diagonal is.
 fn index(size: usize, row: usize, column: usize) -> usize {
     column * size - column * column.saturating_sub(1) / 2 + row - column
-}
-
-/// Cholesky factors of dense matrices of any size up to the largest, one after the other in the same memory, for preconditioners: those of
-/// large ones are in single precision, where rounding errors leave them as they are.
-#[derive(Debug)]
-pub struct LocalCholesky {
-    size: usize,
-    /// The scaled matrix or its factor, column after column; entries above the diagonal are not used.
-    columns: Vec<f64>,
-    /// Its factor in single precision, in place of the other.
-    single: Vec<f32>,
-    /// Factors of rows and columns, with which all diagonal entries are one.
-    scales: Vec<f64>,
-    values: Vec<f64>,
-    single_values: Vec<f32>,
-}
-
-/// Unknowns from which reading a factor takes longer than the iterations that rounding errors may add.
-const SINGLE_FROM: usize = 1024;
-/// The smallest pivot of a factor in single precision over the diagonal entry: below, the matrix is nearly singular.
-const LEAST_PIVOT: f64 = 1e-4;
-
-impl LocalCholesky {
-    /// Memory for matrices of this size at most.
-    pub fn with_capacity(most: usize) -> Self {
-        let singles = if most < SINGLE_FROM { 0 } else { most };
-        Self {
-            size: 0,
-            columns: Vec::with_capacity(most * most),
-            single: Vec::with_capacity(singles * singles),
-            scales: Vec::with_capacity(most),
-            values: Vec::with_capacity(most),
-            single_values: Vec::with_capacity(singles),
-        }
-    }
-
-    /// Zeros for the entries of a matrix to be factored, column after column; those above the diagonal are not used.
-    pub fn columns_of(&mut self, size: usize) -> &mut [f64] {
-        self.size = size;
-        self.columns.clear();
-        self.columns.resize(size * size, 0.0);
-        &mut self.columns
-    }
-
-    /// Factors the matrix of these entries; `None` where it is not positive definite.
-    pub fn factor(&mut self) -> Option<()> {
-        let Self { size, columns, single, scales, .. } = self;
-        scales.clear();
-        scales.extend(columns.iter().step_by(*size + 1).map(|entry| 1.0 / entry.sqrt()));
-        for (column, factor) in columns.chunks_exact_mut((*size).max(1)).zip(&*scales) {
-            column.iter_mut().zip(&*scales).for_each(|(entry, scale)| *entry *= factor * scale);
-        }
-        single.clear();
-        if *size >= SINGLE_FROM {
-            single.extend(columns.iter().map(|entry| f32::rounded(*entry)));
-            let is_accurate = f32::factor(single, *size).is_some()
-                && single.iter().step_by(*size + 1).all(|pivot| pivot.exact().powi(2) >= LEAST_PIVOT);
-            if is_accurate {
-                return Some(());
-            }
-            single.clear();
-        }
-        if *size == 0 { Some(()) } else { f64::factor(columns, *size) }
-    }
-
-    /// Replaces a right-hand side by the solution.
-    pub fn solve(&mut self, values: &mut [f64]) {
-        let Self { size, columns, single, scales, values: scaled, single_values } = self;
-        assert_eq!(values.len(), *size);
-        scaled.clear();
-        scaled.extend(values.iter().zip(&*scales).map(|(value, scale)| value * scale));
-        if !single.is_empty() {
-            // Right-hand sides may be smaller than the least number in single precision.
-            let largest = scaled.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-            let unit = if largest > 0.0 && largest.is_finite() { largest } else { 1.0 };
-            single_values.clear();
-            single_values.extend(scaled.iter().map(|value| f32::rounded(value / unit)));
-            f32::forward(single, *size, single_values);
-            f32::backward(single, *size, single_values);
-            scaled.iter_mut().zip(&*single_values).for_each(|(scaled, value)| *scaled = unit * value.exact());
-        } else if *size > 0 {
-            f64::forward(columns, *size, scaled);
-            f64::backward(columns, *size, scaled);
-        }
-        let solution = scaled.iter().zip(&*scales).map(|(scaled, scale)| scaled * scale);
-        values.iter_mut().zip(solution).for_each(|(value, solution)| *value = solution);
-    }
-
-    /// Bytes that a solve reads.
-    pub fn bytes(&self) -> u64 {
-        let number = if self.single.is_empty() { size_of::<f64>() } else { size_of::<f32>() };
-        (self.size * (self.size + 1) * number) as u64
-    }
 }
 
 #[cfg(test)]
@@ -256,9 +159,10 @@ mod tests {
             for ranks in [1, 2, 3] {
                 let mut product = vec![0.0; size];
                 for rank in 0..ranks {
-                    matrix.add_product(matrix.share(rank, ranks), &x, &mut product);
+                    add_times_own_transpose(&lower, share(size, rank, ranks), &x, &mut product);
                 }
-                assert_eq!(product, expected(&lower, &places, &x), "{size} unknowns, {ranks} ranks");
+                let in_order: Vec<usize> = (0..size).collect();
+                assert_eq!(product, expected(&lower, &in_order, &x), "{size} unknowns, {ranks} ranks");
             }
             let full = matrix.full();
             let column =
@@ -269,58 +173,8 @@ mod tests {
 
     #[test]
     fn ranks_share_the_entries_evenly() {
-        let matrix = PackedSymmetric::times_own_transpose(&lower(302), &(0..302).collect::<Vec<_>>());
-        let bytes: Vec<u64> = (0..3).map(|rank| matrix.bytes(matrix.share(rank, 3))).collect();
+        let bytes: Vec<u64> = (0..3).map(|rank| bytes_of_columns(302, share(302, rank, 3))).collect();
         assert_eq!(bytes.iter().sum::<u64>(), 8 * 302 * 303 / 2);
         assert!(bytes.iter().all(|bytes| (*bytes as f64) < 1.02 * 8.0 * 302.0 * 151.5 / 3.0), "{bytes:?}");
-    }
-
-    /// A matrix of these units with ones and small numbers beside its diagonal.
-    fn spread(size: usize, units: impl Fn(usize) -> f64) -> Vec<f64> {
-        let entry = |row: usize, column: usize| match row == column {
-            true => 1.0,
-            false => 0.4 / (1.0 + (row as f64 - column as f64).powi(2)),
-        };
-        (0..size * size).map(|at| entry(at % size, at / size) * units(at % size) * units(at / size)).collect()
-    }
-
-    #[test]
-    fn factors_solve_in_any_units_up_to_the_rounding_of_their_precision() {
-        let units = |i: usize| [1.0, 1e-40, 1e40][i % 3];
-        let mut factor = LocalCholesky::with_capacity(SINGLE_FROM);
-        for (size, tolerance) in [(0, 0.0), (1, 1e-15), (100, 1e-13), (SINGLE_FROM, 1e-5), (99, 1e-13)] {
-            let matrix = spread(size, units);
-            let x: Vec<f64> =
-                vector(size).iter().enumerate().map(|(i, value)| value * 1e-60 / units(i)).collect();
-            let mut values: Vec<f64> =
-                (0..size).map(|row| (0..size).map(|at| matrix[at * size + row] * x[at]).sum()).collect();
-            factor.columns_of(size).copy_from_slice(&matrix);
-            factor.factor().unwrap();
-            assert_eq!(!factor.single.is_empty(), size >= SINGLE_FROM);
-            factor.solve(&mut values);
-            let errors =
-                values.iter().zip(&x).enumerate().map(|(i, (value, x))| (value - x).abs() * units(i) / 3e-60);
-            let worst =
-                errors.fold(0.0, |most, error| if error > most || error.is_nan() { error } else { most });
-            assert!(worst <= tolerance, "{size} unknowns: {worst:e}");
-        }
-    }
-
-    #[test]
-    fn nearly_singular_matrices_are_factored_in_double_precision_and_indefinite_ones_not_at_all() {
-        let size = SINGLE_FROM;
-        let with_pair = |entry: f64| {
-            let mut matrix = spread(size, |_| 1.0);
-            for at in 0..size {
-                (matrix[at], matrix[at * size], matrix[size + at], matrix[at * size + 1]) =
-                    (0.0, 0.0, 0.0, 0.0);
-            }
-            (matrix[0], matrix[1], matrix[size], matrix[size + 1]) = (1.0, entry, entry, 1.0);
-            let mut factor = LocalCholesky::with_capacity(size);
-            factor.columns_of(size).copy_from_slice(&matrix);
-            factor.factor().map(|()| !factor.single.is_empty())
-        };
-        let factored = [0.5, 1.0 - 5e-6, 1.0 - 1e-9, 1.0 + 1e-9].map(with_pair);
-        assert_eq!(factored, [Some(true), Some(false), Some(false), None]);
     }
 }

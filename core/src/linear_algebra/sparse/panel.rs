@@ -36,12 +36,15 @@ pub(super) trait Real: Copy + Debug + Default + AddAssign + SubAssign + 'static 
 
     /// Writes the product of a panel's rows from `first` on with the first `count` of them, below its diagonal, column after column.
     fn own_product(panel: &[Self], rows: usize, first: usize, count: usize, product: &mut [Self]);
+
+    /// Subtracts the same from such columns.
+    fn subtract_own_product(panel: &[Self], rows: usize, first: usize, count: usize, from: &mut [Self]);
 }
 
 macro_rules! real {
     ($real:ident, $lanes:literal, $potrf:ident, $trsm:ident, $syrk:ident, $gemm:ident, $solves:ident) => {
         mod $solves {
-            use super::multiversion;
+            use super::{c_int, multiversion, sys};
 
             #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
             pub(super) fn forward(panel: &[$real], columns: usize, values: &mut [$real]) {
@@ -98,6 +101,58 @@ macro_rules! real {
                 }
                 let rest: $real = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
                 sums.iter().sum::<$real>() + rest
+            }
+
+            /// Replaces columns by a share of themselves and a factor times the product of a panel's rows from the first of these on with
+            /// these, below its diagonal.
+            pub(super) fn combine(
+                panel: &[$real],
+                rows: usize,
+                columns: std::ops::Range<usize>,
+                [factor, share]: [$real; 2],
+                product: &mut [$real],
+            ) {
+                let (first, count, height) = (columns.start, columns.len(), rows - columns.start);
+                assert!(
+                    panel.len().is_multiple_of(rows) && count <= height && product.len() >= count * height
+                );
+                let (width, height_count, count_count) =
+                    ((panel.len() / rows) as c_int, height as c_int, count as c_int);
+                // SAFETY: rows `first..` of the panel and the product lie in these slices.
+                unsafe {
+                    let (from, to) = (panel.as_ptr().add(first), product.as_mut_ptr());
+                    sys::$syrk(
+                        sys::CblasColMajor,
+                        sys::CblasLower,
+                        sys::CblasNoTrans,
+                        count_count,
+                        width,
+                        factor,
+                        from,
+                        rows as c_int,
+                        share,
+                        to,
+                        height_count,
+                    );
+                    if height > count {
+                        sys::$gemm(
+                            sys::CblasColMajor,
+                            sys::CblasNoTrans,
+                            sys::CblasTrans,
+                            height_count - count_count,
+                            count_count,
+                            width,
+                            factor,
+                            from.add(count),
+                            rows as c_int,
+                            from,
+                            rows as c_int,
+                            share,
+                            to.add(count),
+                            height_count,
+                        );
+                    }
+                }
             }
         }
 
@@ -158,47 +213,17 @@ macro_rules! real {
             }
 
             fn own_product(panel: &[Self], rows: usize, first: usize, count: usize, product: &mut [Self]) {
-                let height = rows - first;
-                assert!(
-                    panel.len().is_multiple_of(rows) && count <= height && product.len() >= count * height
-                );
-                let (width, height_count, count_count) =
-                    ((panel.len() / rows) as c_int, height as c_int, count as c_int);
-                // SAFETY: rows `first..` of the panel and the product lie in these slices.
-                unsafe {
-                    let (from, to) = (panel.as_ptr().add(first), product.as_mut_ptr());
-                    sys::$syrk(
-                        sys::CblasColMajor,
-                        sys::CblasLower,
-                        sys::CblasNoTrans,
-                        count_count,
-                        width,
-                        1.0,
-                        from,
-                        rows as c_int,
-                        0.0,
-                        to,
-                        height_count,
-                    );
-                    if height > count {
-                        sys::$gemm(
-                            sys::CblasColMajor,
-                            sys::CblasNoTrans,
-                            sys::CblasTrans,
-                            height_count - count_count,
-                            count_count,
-                            width,
-                            1.0,
-                            from.add(count),
-                            rows as c_int,
-                            from,
-                            rows as c_int,
-                            0.0,
-                            to.add(count),
-                            height_count,
-                        );
-                    }
-                }
+                $solves::combine(panel, rows, first..first + count, [1.0, 0.0], product);
+            }
+
+            fn subtract_own_product(
+                panel: &[Self],
+                rows: usize,
+                first: usize,
+                count: usize,
+                from: &mut [Self],
+            ) {
+                $solves::combine(panel, rows, first..first + count, [-1.0, 1.0], from);
             }
         }
     };

@@ -157,7 +157,7 @@ impl<const D: usize> LinearSolver for Condensed<D> {
             own: own.clone(),
             motions: nodes.motions.clone(),
             springs,
-            subspace: Subspace::whole(&self.velocity)?,
+            subspace: Subspace::whole(&self.velocity, factors.take_complement())?,
             workspace: Workspace::new(session, &nodes.motions, frames.unknowns.len())?,
         };
         if factors.precision() == Precision::Single {

@@ -3,12 +3,13 @@
 use super::{
     equations::{Linearised, LinearisedAction, NodeByNode, Rigid, StepMatrix},
     reduced_factor::ReducedFactor,
+    substructuring::Ranks,
 };
 use crate::{
     error::Result,
     linear_algebra::{
-        petsc::{DistributedVector, LocalFactor, MISSING_DIRECTIONS},
-        sparse::{PackedSymmetric, column, columns},
+        petsc::{DensePanels, DistributedVector, LocalFactor, MISSING_DIRECTIONS},
+        sparse::{PackedSymmetric, add_times_own_transpose, bytes_of_columns, column, columns, share},
     },
     parallel::{
         exchange::Gathering,
@@ -51,12 +52,12 @@ pub(super) struct Workspace {
     own: Vec<f64>,
     all: Vec<f64>,
     gathering: Gathering,
-    /// Parts of products of this rank and of all ranks.
+    /// Parts of products of this rank and of all ranks, in the order of the factor.
     part: Vec<f64>,
     parts: Vec<f64>,
     part_gathering: Gathering,
     /// Amounts in the order of the factor.
-    ordered_amounts: [Vec<f64>; 2],
+    ordered_amounts: Vec<f64>,
     /// The blocks of a projection, of this rank and of all ranks, and the images of unit motions that they are made of.
     own_blocks: Vec<f64>,
     blocks: Vec<f64>,
@@ -82,7 +83,7 @@ impl Workspace {
             part: vec![0.0; total],
             parts: vec![0.0; total * session.ranks()],
             part_gathering: Gathering::new(&world, total)?,
-            ordered_amounts: [vec![0.0; total], vec![0.0; total]],
+            ordered_amounts: vec![0.0; total],
             own_blocks: Vec::with_capacity(pairs),
             blocks: vec![0.0; block_gathering.total()],
             block_gathering,
@@ -102,8 +103,9 @@ pub(super) struct Subspace {
     projection_blocks: Vec<f64>,
     /// The same of symmetric, positive forces in addition to `S`; empty if there are none.
     additions: Vec<f64>,
-    /// `L L^T` in the order of the motions, once it was needed.
+    /// `L L^T` in the order of the motions, once it was needed, and the shares of ranks in it until then, where they have some.
     product: Option<PackedSymmetric>,
+    complement: Option<DensePanels>,
     factor: Option<ReducedFactor>,
     is_active: bool,
     /// Factors of linearised equations, which precondition better than those on the subspace.
@@ -112,7 +114,7 @@ pub(super) struct Subspace {
 
 impl Subspace {
     /// The whole space, for vectors with the layout of `like`.
-    pub(super) fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
+    pub(super) fn whole(like: &DistributedVector, complement: Option<DensePanels>) -> Result<RefCell<Self>> {
         let work_vector = like.like()?;
         let (projection_blocks, additions) = (Vec::new(), Vec::new());
         Ok(RefCell::new(Self {
@@ -120,6 +122,7 @@ impl Subspace {
             projection_blocks,
             additions,
             product: None,
+            complement,
             factor: None,
             is_active: false,
             linearised: None,
@@ -132,8 +135,8 @@ impl CondensedMatrix {
     pub(super) fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         workspace.traffic += self.bytes();
-        self.times_lower(x, &mut workspace.ordered_amounts[0]);
-        self.write(&workspace.ordered_amounts[0], vector)
+        self.times_lower(x, &mut workspace.ordered_amounts);
+        self.write(&workspace.ordered_amounts, vector)
     }
 
     /// `L^T x` for the amounts `x` of all motions in a vector of contact nodes. Collective.
@@ -141,7 +144,7 @@ impl CondensedMatrix {
         let workspace = &mut *self.workspace.borrow_mut();
         self.read(vector, workspace)?;
         workspace.traffic += self.bytes();
-        self.times_upper(&workspace.ordered_amounts[0], product);
+        self.times_upper(&workspace.ordered_amounts, product);
         Ok(())
     }
 
@@ -149,7 +152,7 @@ impl CondensedMatrix {
     pub(super) fn read_amounts(&self, vector: &DistributedVector, amounts: &mut [f64]) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         self.read(vector, workspace)?;
-        amounts.copy_from_slice(&workspace.ordered_amounts[0]);
+        amounts.copy_from_slice(&workspace.ordered_amounts);
         Ok(())
     }
 
@@ -181,11 +184,11 @@ impl CondensedMatrix {
         Ok(())
     }
 
-    /// The same into the first work vector in the order of the factor. Collective.
+    /// The same into a work vector in the order of the factor. Collective.
     fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
         self.gather(vector, workspace)?;
-        let Workspace { all, ordered_amounts: [ordered, _], .. } = workspace;
-        self.positions.iter().zip(all).for_each(|(&position, amount)| ordered[position] = *amount);
+        let Workspace { all, ordered_amounts, .. } = workspace;
+        self.positions.iter().zip(all).for_each(|(&position, amount)| ordered_amounts[position] = *amount);
         Ok(())
     }
 
@@ -275,9 +278,17 @@ impl CondensedMatrix {
         Ok(())
     }
 
-    /// `L L^T` in the order of the motions.
-    fn product<'a>(&self, product: &'a mut Option<PackedSymmetric>) -> &'a PackedSymmetric {
-        product.get_or_insert_with(|| PackedSymmetric::times_own_transpose(&self.lower, &self.positions))
+    /// `L L^T` in the order of the motions. Collective.
+    fn product<'a>(
+        &self,
+        product: &'a mut Option<PackedSymmetric>,
+        complement: &mut Option<DensePanels>,
+        world: &World,
+    ) -> &'a PackedSymmetric {
+        product.get_or_insert_with(|| match complement.take() {
+            Some(complement) => PackedSymmetric::of(self.positions.len(), complement.gather(&Ranks(world))),
+            None => PackedSymmetric::times_own_transpose(&self.lower, &self.positions),
+        })
     }
 
     /// `R (L L^T - D + C) P + k (I - P)` in the order of the motions, given a full `L L^T`, the springs `D` and the blocks of the
@@ -346,38 +357,23 @@ const ROUNDING: f64 = 1e-12;
 const MAX_DIMENSION: usize = 3;
 
 impl StepMatrix for CondensedMatrix {
+    /// Each rank reads its share of the columns.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         self.read(x, workspace)?;
-        workspace.traffic += 2 * self.bytes();
-        let [amounts, product] = &mut workspace.ordered_amounts;
-        self.times_upper(amounts, product);
-        self.times_lower(product, amounts);
-        self.subtract_springs(&workspace.own, |number, force| amounts[self.positions[number]] -= force);
-        self.write(amounts, y)
-    }
-
-    /// With the product `L L^T`, of which each rank reads its share; where it is not at hand in every run alike, as
-    /// [`multiply`](StepMatrix::multiply).
-    fn multiply_direction(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        let subspace = self.subspace.borrow();
-        let Some(product) = subspace.product.as_ref().filter(|_| subspace.is_active) else {
-            return self.multiply(x, y);
-        };
-        let workspace = &mut *self.workspace.borrow_mut();
-        self.gather(x, workspace)?;
-        let Workspace { own, all, part, parts, part_gathering, world, rank, traffic, .. } = workspace;
-        let columns = product.share(rank[0], rank[1]);
-        *traffic += product.bytes(columns.clone());
+        let Workspace { own, part, parts, part_gathering, ordered_amounts, world, rank, traffic, .. } =
+            workspace;
+        let columns = share(part.len(), rank[0], rank[1]);
+        *traffic += bytes_of_columns(part.len(), columns.clone());
         part.fill(0.0);
-        product.add_product(columns, all, part);
+        add_times_own_transpose(&self.lower, columns, ordered_amounts, part);
         part_gathering.gather(world, part, parts);
-        all.fill(0.0);
-        for part in parts.chunks_exact(all.len().max(1)) {
-            all.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
+        ordered_amounts.fill(0.0);
+        for part in parts.chunks_exact(part.len().max(1)) {
+            ordered_amounts.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
         }
-        self.subtract_springs(own, |number, force| all[number] -= force);
-        self.write_own(|number| all[number], y)
+        self.subtract_springs(own, |number, force| ordered_amounts[self.positions[number]] -= force);
+        self.write(ordered_amounts, y)
     }
 
     fn precondition(&self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
@@ -397,8 +393,8 @@ impl StepMatrix for CondensedMatrix {
             _ => {
                 self.read(r, workspace)?;
                 workspace.traffic += 2 * self.bytes();
-                self.solve(&mut workspace.ordered_amounts[0]);
-                return self.write(&workspace.ordered_amounts[0], z);
+                self.solve(&mut workspace.ordered_amounts);
+                return self.write(&workspace.ordered_amounts, z);
             }
         }
         self.write_own(|number| workspace.all[number], z)
@@ -431,7 +427,7 @@ impl StepMatrix for CondensedMatrix {
             self.write_blocks(&mut |column| act(map, column), &mut subspace.work_vector, workspace)?;
             blocks.clone_from(&workspace.blocks);
         }
-        let full = self.product(&mut subspace.product).full();
+        let full = self.product(&mut subspace.product, &mut subspace.complement, &workspace.world).full();
         let mut springs = Vec::new();
         if let Some(own) = self.springs.as_ref().filter(|_| bodies == Rigid::Free) {
             springs.resize(self.positions.len(), 0.0);
@@ -459,10 +455,11 @@ impl StepMatrix for CondensedMatrix {
         if !subspace.is_active || subspace.projection_blocks == *blocks {
             return Ok(false);
         }
-        let Subspace { product, additions, projection_blocks, factor, .. } = subspace;
+        let Subspace { product, complement, additions, projection_blocks, factor, .. } = subspace;
         projection_blocks.clear();
         let factor = factor.get_or_insert_with(|| ReducedFactor::with_capacity(&self.nodes));
-        factor.set(self.product(product), &self.nodes, [additions, blocks])?;
+        let product = self.product(product, complement, &workspace.world);
+        factor.set(product, &self.nodes, [additions, blocks], &Ranks(&workspace.world))?;
         projection_blocks.clone_from(blocks);
         Ok(true)
     }

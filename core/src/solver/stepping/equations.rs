@@ -43,11 +43,6 @@ pub trait StepMatrix {
     /// `y = K x`. Collective.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
 
-    /// The same within iterations for a direction, where rounding errors of the largest entries of `K` do no harm. Collective.
-    fn multiply_direction(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        self.multiply(x, y)
-    }
-
     /// `x . K x`. Collective.
     fn power(&self, x: &DistributedVector) -> Result<f64> {
         let mut product = x.like()?;
@@ -885,7 +880,7 @@ impl<const D: usize> ReducedJacobian<'_, D> {
 
 impl<const D: usize> ProjectedOperator for ReducedJacobian<'_, D> {
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        self.matrix.multiply_direction(x, y)?;
+        self.matrix.multiply(x, y)?;
         self.add_derivatives(x, y)?;
         self.reduce(y)
     }

@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    linear_algebra::sparse::{LocalCholesky, PackedSymmetric},
+    linear_algebra::sparse::{LocalCholesky, PackedSymmetric, Team},
 };
 use std::ops::Range;
 
@@ -37,12 +37,13 @@ impl ReducedFactor {
     }
 
     /// Takes a matrix `S` of the motions of these nodes, given the blocks of the additions `B`, if there are any, and of `P`, node after node
-    /// and row by row.
+    /// and row by row. Ranks share the work; all have the same outcome. Collective.
     pub(super) fn set(
         &mut self,
         matrix: &PackedSymmetric,
         nodes: &[Range<usize>],
         [additions, projection]: [&[f64]; 2],
+        team: &impl Team,
     ) -> Result<()> {
         let Self { bases, free, factor: reduced, amounts, image } = self;
         let size = nodes.last().map_or(0, |last| last.end);
@@ -56,12 +57,13 @@ impl ReducedFactor {
         let total: usize = free.iter().sum();
         amounts.clear();
         amounts.resize(total, 0.0);
-        let columns = reduced.columns_of(total);
+        reduced.start(total, team);
         let (mut at, mut base, mut block) = (0, 0, 0);
         for (number, node) in nodes.iter().enumerate() {
             let count = node.len();
             let addition = additions.get(block..block + count * count).unwrap_or_default();
             for own in 0..free[number] {
+                let Some(column_below) = reduced.column_mut(at + own) else { continue };
                 image.clear();
                 image.resize(size - node.start, 0.0);
                 for motion in 0..count {
@@ -78,13 +80,14 @@ impl ReducedFactor {
                     let added = addition.iter().skip(motion).step_by(count.max(1));
                     image.iter_mut().zip(added).for_each(|(sum, entry)| *sum += factor * entry);
                 }
-                let column = &mut columns[(at + own) * total..][..total];
-                let (mut row, mut other_base) = (at, base);
+                // Of the motions of this node those from this one on.
+                let mut sums = column_below.iter_mut();
+                let (mut skipped, mut other_base) = (own, base);
                 for (other, &free) in nodes[number..].iter().zip(&free[number..]) {
                     let values = &image[other.start - node.start..][..other.len()];
-                    for vector in bases[other_base..][..free * other.len()].chunks_exact(other.len().max(1)) {
-                        column[row] = vector.iter().zip(values).map(|(z, value)| z * value).sum();
-                        row += 1;
+                    let vectors = bases[other_base..][..free * other.len()].chunks_exact(other.len().max(1));
+                    for (vector, sum) in vectors.skip(std::mem::take(&mut skipped)).zip(&mut sums) {
+                        *sum = vector.iter().zip(values).map(|(z, value)| z * value).sum();
                     }
                     other_base += free * other.len();
                 }
@@ -93,7 +96,7 @@ impl ReducedFactor {
             base += free[number] * count;
             block += count * count;
         }
-        reduced.factor().ok_or_else(|| {
+        reduced.factor(team).ok_or_else(|| {
             Error::Failed(
                 "the matrix of the motions that contact leaves free is not positive definite".into(),
             )
@@ -154,6 +157,7 @@ fn append_basis(projection: &[f64], count: usize, bases: &mut Vec<f64>) -> usize
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear_algebra::sparse::thread_team::on_ranks;
 
     /// `I - n n^T / n^2`, or `n n^T / n^2`.
     fn across(normal: &[f64], keeps: bool) -> Vec<f64> {
@@ -189,15 +193,15 @@ mod tests {
         let positive = [2.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 3.0];
         let additions = [&positive[..], &[7.0], &[1.0, 0.0, 0.0, 2.0], &positive, &positive, &[5.0]].concat();
         let full = matrix.full();
-        let mut factor = ReducedFactor::with_capacity(&nodes);
-        for additions in [&[][..], &additions] {
-            factor.set(&matrix, &nodes, [additions, &projection]).unwrap();
-            assert_eq!(factor.free, [2, 0, 0, 1, 1, 2, 1]);
-            let forces: Vec<f64> = (0..size).map(|i| (i % 5) as f64 - 1.5).collect();
-            let mut velocity = forces.clone();
-            factor.solve(&nodes, &mut velocity);
-            let project =
-                |values: &[f64]| {
+        on_ranks(1, |team| {
+            let mut factor = ReducedFactor::with_capacity(&nodes);
+            for additions in [&[][..], &additions[..]] {
+                factor.set(&matrix, &nodes, [additions, &projection], team).unwrap();
+                assert_eq!(factor.free, [2, 0, 0, 1, 1, 2, 1]);
+                let forces: Vec<f64> = (0..size).map(|i| (i % 5) as f64 - 1.5).collect();
+                let mut velocity = forces.clone();
+                factor.solve(&nodes, &mut velocity);
+                let project = |values: &[f64]| {
                     let (mut out, mut first) = (Vec::new(), 0);
                     for node in &nodes {
                         let block = &projection[first..][..node.len().pow(2)];
@@ -208,23 +212,24 @@ mod tests {
                     }
                     out
                 };
-            let mut left = forces.clone();
-            for (row, left) in left.iter_mut().enumerate() {
-                *left -= (0..size).map(|at| full[at * size + row] * velocity[at]).sum::<f64>();
-            }
-            let mut first = 0;
-            for node in &nodes {
-                for row in 0..node.len() {
-                    let block = additions.get(first + row * node.len()..).unwrap_or_default();
-                    left[node.start + row] -=
-                        block.iter().zip(&velocity[node.clone()]).map(|(b, v)| b * v).sum::<f64>();
+                let mut left = forces.clone();
+                for (row, left) in left.iter_mut().enumerate() {
+                    *left -= (0..size).map(|at| full[at * size + row] * velocity[at]).sum::<f64>();
                 }
-                first += node.len().pow(2);
+                let mut first = 0;
+                for node in &nodes {
+                    for row in 0..node.len() {
+                        let block = additions.get(first + row * node.len()..).unwrap_or_default();
+                        left[node.start + row] -=
+                            block.iter().zip(&velocity[node.clone()]).map(|(b, v)| b * v).sum::<f64>();
+                    }
+                    first += node.len().pow(2);
+                }
+                let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-14);
+                assert!(near(&project(&velocity), &velocity), "{velocity:?}");
+                assert!(near(&project(&left), &[0.0; 13]), "{left:?}");
+                assert!(velocity.iter().any(|v| v.abs() > 0.01));
             }
-            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-14);
-            assert!(near(&project(&velocity), &velocity), "{velocity:?}");
-            assert!(near(&project(&left), &[0.0; 13]), "{left:?}");
-            assert!(velocity.iter().any(|v| v.abs() > 0.01));
-        }
+        });
     }
 }

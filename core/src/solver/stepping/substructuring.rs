@@ -11,7 +11,7 @@ use super::frames::Frames;
 use crate::{
     error::{Error, Result},
     linear_algebra::petsc::{
-        BlockRows, Cholesky, DenseFactor, DensePanels, OwnPreconditioner, Precision, Team,
+        BlockRows, Cholesky, DenseFactor, DensePanels, Factored, OwnPreconditioner, Precision, Team,
     },
     mesh::Mesh,
     parallel::{
@@ -86,7 +86,7 @@ impl Numbering {
 }
 
 /// All ranks, which share the dense matrix.
-struct Ranks<'a>(&'a SimpleCommunicator);
+pub(super) struct Ranks<'a>(pub(super) &'a SimpleCommunicator);
 
 impl Team for Ranks<'_> {
     fn rank(&self) -> usize {
@@ -98,6 +98,10 @@ impl Team for Ranks<'_> {
     }
 
     fn spread(&self, from: usize, values: &mut [f64]) {
+        self.0.process_at_rank(from as i32).broadcast_into(values);
+    }
+
+    fn spread_single(&self, from: usize, values: &mut [f32]) {
         self.0.process_at_rank(from as i32).broadcast_into(values);
     }
 
@@ -300,8 +304,9 @@ pub(super) struct Shared {
     /// The values of the unknowns that are left of all ranks.
     gathered: Vec<f64>,
     interface: DenseFactor,
-    /// The factor of the contact unknowns, until it is taken.
+    /// The factor of the contact unknowns, and their Schur complement, until they are taken.
     last_factor: Vec<f64>,
+    complement: Option<DensePanels>,
     /// Values of the unknowns of interface and contact; those of the contact start at `contact`.
     values: Vec<f64>,
     contact: usize,
@@ -392,6 +397,14 @@ impl Factors {
         }
     }
 
+    /// The Schur complement of the contact unknowns, where ranks have shares of it.
+    pub(super) fn take_complement(&mut self) -> Option<DensePanels> {
+        match self {
+            Self::Whole(_) => None,
+            Self::Shared(shared) => shared.complement.take(),
+        }
+    }
+
     /// Whether substitutions solve with the diagonal block of the contact unknowns as well.
     pub(super) fn solves_contact(&self) -> bool {
         matches!(self, Self::Whole(_))
@@ -466,12 +479,13 @@ impl Shared {
             numbering.add_schur_complements(world, &interior, &mut matrix, panel);
         }
         interior.drop_last_block();
-        let (interface, last_factor) = agree(world, matrix.factor(&team, interior.precision()))?;
+        let Factored { factor, last, complement } = agree(world, matrix.factor(&team, interior.precision()))?;
         Ok(Self {
             gathered: vec![0.0; numbering.gathering.total()],
             numbering: numbering.clone(),
-            interface,
-            last_factor,
+            interface: factor,
+            last_factor: last,
+            complement: Some(complement),
             values: vec![0.0; substructures.total],
             contact: substructures.interface,
             local: vec![0.0; interior.order().len()],
