@@ -95,8 +95,8 @@ pub(super) fn warning_of_rounding(summary: &Summary, job: &Job) -> Option<String
     })
 }
 
-/// Logs status, totals and times of a finished run.
-pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
+/// Logs status, totals and times of a finished run, and what kept its adaptive steps short.
+pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Option<String>) {
     if let Some(error) = &summary.error {
         log.line(format!("error: {error}"));
     }
@@ -109,6 +109,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job) {
         summary.newton_iterations,
         summary.linear_iterations
     ));
+    limits.into_iter().for_each(|words| log.line(format!("adaptive   {words}")));
     let inclusion = match summary.inventory.contact_points {
         0 => String::new(),
         _ => format!("inclusion residual at most {:.1e}, ", summary.max_inclusion_residual),

@@ -481,7 +481,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             warnings.for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
             self.session.on_first(|| {
-                header::closing(&mut self.log, &summary, self.job);
+                let limits = self.simulation.adaptive.as_ref().and_then(|adaptive| adaptive.limits.words());
+                header::closing(&mut self.log, &summary, self.job, limits);
                 summary.write(self.job.output_folder())
             })
         });

@@ -19,6 +19,7 @@ use super::{
     StepError, StepOutcome, Stepper,
     step_error::TemperatureError,
     step_length::{Landing, TIME_TOLERANCE, next_step},
+    step_limits::{QUANTITIES, StepLimits},
     time_dependent_data::TimeDependentData,
 };
 use crate::{
@@ -81,6 +82,8 @@ pub struct Adaptive<const D: usize> {
     highest: i32,
     /// The current level.
     pub step_level: StepLevel,
+    /// What has kept steps from being longer.
+    pub limits: StepLimits,
 }
 
 impl StepLevel {
@@ -116,6 +119,7 @@ impl<const D: usize> Adaptive<D> {
             lowest,
             highest,
             step_level: StepLevel::default(),
+            limits: StepLimits::default(),
         }
     }
 
@@ -157,8 +161,10 @@ impl<const D: usize> Adaptive<D> {
                 Ok((mut outcome, error, found)) if self.is_acceptable(step, error) => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
                     outcome.landed_on = landing.name.filter(|_| step.time == landing.time);
+                    let of_quantities = self.squares(found);
                     self.step_level.keep_largest(&found);
-                    self.adjust_level(step, error);
+                    let is_limited = self.adjust_level(step, error);
+                    self.limits.count(of_quantities, [is_limited, error > self.settings.tolerance]);
                     return Ok(outcome);
                 }
                 Ok((_, error, found)) => {
@@ -305,6 +311,11 @@ impl<const D: usize> Adaptive<D> {
 
     /// The error relative to the norms so far; NaN if the error or a norm is NaN.
     fn relative(&self, found: StepError) -> f64 {
+        self.squares(found).iter().sum::<f64>().sqrt()
+    }
+
+    /// The squares of these errors of the quantities that [`StepLimits`] counts.
+    fn squares(&self, found: StepError) -> [f64; QUANTITIES] {
         let StepError { error, size, negligible, rounding, contact, surface, temperature } = found;
         let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.step_level.velocity.max(size.velocity);
@@ -314,18 +325,19 @@ impl<const D: usize> Adaptive<D> {
         let present_stress = size.stress.max(LEAST_SHARE * largest_stress);
         let least_stress = rounding.stress.max(negligible.stress * largest_velocity);
         let stress = ratio(error.stress, present_stress.max(least_stress));
-        let mut square = velocity * velocity + stress * stress;
+        let mut ratios = [0.0; QUANTITIES];
+        (ratios[0], ratios[1]) = (velocity, stress);
         let own = self.step_level.contact.iter().chain([&self.step_level.surface]);
-        for (largest, found) in own.zip(contact.into_iter().chain([surface])) {
-            let ratio = ratio(found.error, largest.max(found.size).max(found.negligible));
-            square += ratio * ratio;
+        for ((out, largest), found) in
+            ratios[2..].iter_mut().zip(own).zip(contact.into_iter().chain([surface]))
+        {
+            *out = ratio(found.error, largest.max(found.size).max(found.negligible));
         }
         if let Some(found) = temperature {
             let [lowest, highest] = self.step_level.range_with(found);
-            let ratio = ratio(found.error, (highest - lowest).max(NEGLIGIBLE_WARMTH * highest));
-            square += ratio * ratio;
+            ratios[QUANTITIES - 1] = ratio(found.error, (highest - lowest).max(NEGLIGIBLE_WARMTH * highest));
         }
-        square.sqrt()
+        ratios.map(|ratio| ratio * ratio)
     }
 
     /// The level whose error is expected to be within the tolerance: the error is proportional to the square of the length, in a step that
@@ -352,20 +364,22 @@ impl<const D: usize> Adaptive<D> {
         self.step_level.level = level.min(self.level_of(step)).clamp(self.lowest, self.highest);
     }
 
-    /// Moves up one level if a step of twice the length would be within the tolerance, after some steps at this level.
-    fn adjust_level(&mut self, step: Step, error: f64) {
+    /// Moves up one level if a step of twice the length would be within the tolerance, after some steps at this level. Returns whether it
+    /// would not.
+    fn adjust_level(&mut self, step: Step, error: f64) -> bool {
         let level = self.level_of(step).clamp(self.lowest, self.highest);
         if step.length < 0.999_999 * self.length(self.step_level.level) {
             // Shortened to end at a prescribed time, or growing again afterwards.
-            return;
+            return false;
         }
         self.step_level.taken += 1;
         let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
-        if self.step_level.taken >= STEPS_BEFORE_GROWTH && length >= 2.0 * step.length && level < self.highest
-        {
+        let may_grow = length >= 2.0 * step.length;
+        if self.step_level.taken >= STEPS_BEFORE_GROWTH && may_grow && level < self.highest {
             self.step_level.level = level + 1;
             self.step_level.taken = 0;
         }
+        !may_grow
     }
 }
 

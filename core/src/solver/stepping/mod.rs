@@ -32,6 +32,7 @@ mod springs;
 mod step_clock;
 mod step_error;
 mod step_length;
+mod step_limits;
 mod step_range;
 mod step_solver;
 mod stepper;
