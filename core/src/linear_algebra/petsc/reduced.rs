@@ -7,8 +7,8 @@ use std::{
 
 /// `P K P + k (I - P)`: a constant matrix on a subspace, with a factor `k` of the magnitude of `K` on the complement.
 ///
-/// `P` acts on each node separately. The pattern of stored entries is that of `K`, so that an ordering or an interpolation that was
-/// set up for one of the matrices is valid for the other.
+/// `P` acts on each node separately. The pattern of stored entries is that of `K`, so that an ordering that was set up for
+/// one of the matrices is valid for the other.
 #[derive(Debug)]
 pub(super) struct ReducedMatrix {
     pub raw: Reference<sys::_p_Mat>,

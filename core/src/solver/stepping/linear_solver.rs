@@ -178,9 +178,10 @@ fn set_smoother(prefix: &str) -> Result<()> {
     Ok(())
 }
 
-/// Sets how algebraic multigrid with this prefix of its options aggregates nodes.
+/// Sets how algebraic multigrid with this prefix of its options aggregates nodes: anew for each matrix, since nodes whose motions contact
+/// prescribes are no longer coupled to others.
 fn set_aggregation(prefix: &str) -> Result<()> {
-    for (name, value) in [("threshold", "0.01"), ("agg_nsmooths", "1"), ("reuse_interpolation", "true")] {
+    for (name, value) in [("threshold", "0.01"), ("agg_nsmooths", "1"), ("reuse_interpolation", "false")] {
         set_default_option(&format!("{prefix}pc_gamg_{name}"), value)?;
     }
     Ok(())
