@@ -60,7 +60,23 @@ fn multigrid_takes_as_many_iterations_as_it_did() {
     let [square, cube] = [gamg(Case::square(32)), gamg(Case::cube(6)).set("time.end", "0.25")];
     let [quadratic_square, quadratic_cube] = [Case::square(16), Case::cube(3).set("time.end", "0.25")]
         .map(|case| gamg(case.set("mesh.order", "2")));
+    // The block of docs/contact-preconditioner.md, coarser: most of its points stick.
+    let sticking = gamg(Case::written_as(
+        "
+        mesh.rectangle = {size = [1.0, 0.25], cells = [200, 20], grading = {y = 1.5}}
+        time = {end = 0.0625, step = 0.0625}
+        support = [{on = ['left'], fix = 'all'}]
+        traction = [{on = ['top'], value = ['0', '-10*x*t/0.0625']}]
+        [material]
+        hypothesis = 'plane_strain'
+        density = 1.0
+        viscosity = {volumetric = 25.0, shear = 50.0}
+        [[contact]]
+        on = ['bottom']
+        normal.graph = {points = [[0.0, -5.0], [0.0, 5.0]], slope_before = 10.0, slope_after = 10.0}",
+    ));
     assert_counts(&[
+        ("sticking block", &sticking.set("solver.tolerance", "1e-10"), 1, [12.0, 145.0]),
         ("square", &square, 1, [66.0, 447.0]),
         ("cube", &cube, 2, [17.0, 98.0]),
         ("square of quadratic cells", &quadratic_square, 1, [65.0, 427.0]),
