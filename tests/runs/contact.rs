@@ -483,6 +483,37 @@ fn corners_of_quadratic_cells_have_the_mean_traction_around_for_any_division_int
 }
 
 #[test]
+fn a_node_on_an_axis_of_symmetry_sticks_under_pressure() {
+    for (scheme, friction) in
+        [("implicit_euler", "coulomb.coefficient = 0.3"), ("bdf2", "tresca.bound = 1e4")]
+    {
+        let case = Case::written_as(
+            "material = {hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1e7, poisson_ratio = 0.3}}",
+        )
+        .set("mesh.rectangle", "{size = [1, 0.5], cells = [8, 4]}")
+        .set("support", "[{on = ['left'], fix = ['x']}]")
+        .set("traction", "[{on = ['top'], value = [0, '-1e5*t']}]")
+        .set(
+            "contact",
+            &format!(
+                "[{{on = ['bottom'], normal.unilateral = {{}}, friction.{friction}, \
+                 obstacle.plane = {{point = [0, 0], normal = [0, 1]}}}}]"
+            ),
+        )
+        .set("output", "{folder = 'out', also = ['contact_status'], profile = [{on = 'bottom'}]}")
+        .set("time", &format!("{{scheme = '{scheme}', end = 1, step = 0.25}}"));
+        for ranks in [1, 2] {
+            let rows = case.run(ranks).table("resultants.csv").only("source", "contact bottom");
+            let [touching, sticking, slipping] =
+                ["touching_area", "sticking_area", "slipping_area"].map(|column| rows.numbers(column));
+            for ((touching, sticking), slipping) in touching.iter().zip(sticking).zip(slipping) {
+                assert!((touching - sticking - slipping).abs() < 1e-12, "{touching}: {sticking}, {slipping}");
+            }
+        }
+    }
+}
+
+#[test]
 fn corners_of_quadratic_cells_have_their_own_distance_from_an_obstacle() {
     for (sliding, ranks) in [("small", 1), ("small", 3), ("finite", 2)] {
         let case = Case::written_as("material.elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}")

@@ -443,6 +443,51 @@ fn a_gap_that_closes_and_opens_within_a_step_fails() {
 }
 
 #[test]
+fn bodies_that_supports_let_touch_and_part_within_a_step_fail() {
+    let blocks = "[{name = 'lower', size = [1.0, 0.2], cells = [6, 2]}, \
+                   {name = 'upper', corner = [0.3, 0.3], size = [0.3, 0.1], cells = [3, 1]}]";
+    let run = |support: &str, sliding: &str, time: &str| {
+        Case::written_as(
+            "material = {hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1e6, poisson_ratio = 0.3}}",
+        )
+        .set("mesh.rectangle", blocks)
+        .set("support", &format!("[{{on = ['lower.bottom'], fix = 'all'}}, {{on = ['upper.top'], {support}}}]"))
+        .set(
+            "contact",
+            &format!(
+                "[{{on = ['upper.bottom'], against = ['lower.top'], sliding = '{sliding}', normal.unilateral = {{}}}}]"
+            ),
+        )
+        .set("time", &format!("{{end = 0.04, scheme = 'implicit_euler', {time}}}"))
+    };
+    let down = |depth: &str| format!("fix = 'all', displacement = [0.0, '-{depth}*sin(pi*t/0.02)']");
+    let speed = "fix = 'all', velocity = [0.0, '-7.5*pi*sin(2*pi*t/0.02)']";
+    for (support, sliding, ranks) in [
+        (&*down("0.15"), "small", 1),
+        (&*down("0.15"), "finite", 3),
+        ("fix = ['y'], displacement = ['-0.15*sin(pi*t/0.02)']", "small", 2),
+        (speed, "small", 1),
+    ] {
+        let case = run(support, sliding, "step = 0.02").set("material.density", "1e-3");
+        case.run_with(ranks, &[])
+            .expect(1)
+            .says("contact.0: the step to t = 2.000000e-2 s")
+            .says("touch the other body and part from it within the step")
+            .says("take a smaller [time] step");
+    }
+    // Steps that resolve the motion, with contact or without.
+    for (depth, step, touches) in [("0.101", "0.001", true), ("0.099", "0.02", false)] {
+        let case = run(&down(depth), "small", &format!("step = {step}"));
+        case.run_with(1, &[]).expect(0);
+        let energy = case.results().table("history.csv").numbers("elastic_energy");
+        assert_eq!(energy.iter().any(|energy| *energy > 1e-6), touches, "{depth} in steps of {step}");
+    }
+    // A support that holds a part of the body at rest, beside which it is not known how the rest moves.
+    let partly = "fix = ['y'], where = 'x < 0.45', displacement = ['-0.15*sin(pi*t/0.02)']}, {on = ['upper.top'], where = 'x > 0.45', fix = 'all'";
+    run(partly, "small", "step = 0.02").run_with(1, &[]).expect(0);
+}
+
+#[test]
 fn a_contact_that_never_touched_is_warned_of_after_the_last_step() {
     let words = "contact.0: the boundary top never touched its obstacle";
     let plane = |height: &str| format!("{{plane = {{point = [0, '{height}'], normal = [0, -1]}}}}");

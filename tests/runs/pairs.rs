@@ -913,31 +913,32 @@ fn a_body_that_slides_far_acts_on_what_it_faces_and_restarts_in_the_same_bits() 
     short.run_with(1, &[]).expect(0).says("use sliding = \"finite\"");
 }
 
-/// A square of which facets between the columns `from` and `to` at half height are the group `fault`.
+/// A square of which facets between the columns `from` and `to` at half height are the group `fault`, with its left side as `left`.
 fn write_square_with_fault(path: &Path, n: usize, [from, to]: [usize; 2]) {
     let node = |i: usize, j: usize| j * (n + 1) + i + 1;
     let mut facets = Vec::new();
     for at in 0..n {
         facets.push((1, [node(at, 0), node(at + 1, 0)]));
         facets.push((2, [node(at + 1, n), node(at, n)]));
+        facets.push((4, [node(0, at + 1), node(0, at)]));
         if (from..to).contains(&at) {
             facets.push((3, [node(at, n / 2), node(at + 1, n / 2)]));
         }
     }
-    let mut text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n4\n1 1 \"bottom\"\n1 2 \"top\"\n1 3 \"fault\"\n\
-                    2 4 \"body\"\n$EndPhysicalNames\n$Entities\n0 3 1 0\n"
+    let mut text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n5\n1 1 \"bottom\"\n1 2 \"top\"\n1 3 \"fault\"\n\
+                    1 4 \"left\"\n2 5 \"body\"\n$EndPhysicalNames\n$Entities\n0 4 1 0\n"
         .to_owned();
-    (1..=3).for_each(|curve| text += &format!("{curve} 0 0 0 1 1 0 1 {curve} 0\n"));
-    text += "1 0 0 0 1 1 0 1 4 0\n$EndEntities\n$Nodes\n";
+    (1..=4).for_each(|curve| text += &format!("{curve} 0 0 0 1 1 0 1 {curve} 0\n"));
+    text += "1 0 0 0 1 1 0 1 5 0\n$EndEntities\n$Nodes\n";
     let count = (n + 1) * (n + 1);
     text += &format!("1 {count} 1 {count}\n2 1 0 {count}\n");
     (1..=count).for_each(|tag| text += &format!("{tag}\n"));
     let at = |index: usize| index as f64 / n as f64;
     (0..=n).for_each(|j| (0..=n).for_each(|i| text += &format!("{} {} 0\n", at(i), at(j))));
     let total = facets.len() + 2 * n * n;
-    text += &format!("$EndNodes\n$Elements\n4 {total} 1 {total}\n");
+    text += &format!("$EndNodes\n$Elements\n5 {total} 1 {total}\n");
     let mut tag = 0;
-    for curve in 1..=3 {
+    for curve in 1..=4 {
         let own: Vec<_> = facets.iter().filter(|(group, _)| *group == curve).collect();
         text += &format!("1 {curve} 1 {}\n", own.len());
         for (_, [a, b]) in own {
@@ -1023,6 +1024,35 @@ fn parts_of_a_fault_with_laws_of_their_own_are_refused_with_a_remedy_that_works(
     with_fault([0, 8]).set("contact", &parts).run_with(1, &[]).expect(2).says(words);
     let one = "[{ on = ['fault'], normal.unilateral = {}, friction.expression.coefficient = 'if(x < 0.5, 0.3, 0.6)' }]";
     with_fault([0, 8]).set("contact", one).set("time.end", "0.1").run(1);
+}
+
+#[test]
+fn a_fault_that_ends_at_a_support_is_warned_of_with_a_remedy_that_works() {
+    let held = |part: &str| {
+        let support = format!("[{{ on = ['bottom'], fix = 'all' }}, {{ on = ['left'], fix = 'all'{part} }}]");
+        with_fault([0, 8]).set("support", &support).set("time.end", "0.1")
+    };
+    let words = "the fault fault ends at the support on left, which holds nodes of both its sides, as at [0.0, 0.5] m";
+    for ranks in [1, 3] {
+        for (part, is_held) in [("", true), (", where = 'abs(y - 0.5) > 0.01'", false)] {
+            let outcome = held(part).run_with(ranks, &["--force"]).expect(0);
+            assert_eq!(launch::unwrapped(&outcome.stdout).contains(words), is_held, "{}", outcome.stdout);
+        }
+    }
+    // Where one side moves with a support, and in a plane of symmetry, the sides part.
+    for fix in ["['x']", "'all', displacement = [0, '-0.01*t']"] {
+        let support = format!("[{{ on = ['bottom'], fix = 'all' }}, {{ on = ['left'], fix = {fix} }}]");
+        let outcome = with_fault([0, 8]).set("support", &support).set("time.end", "0.1").run_with(1, &[]);
+        assert!(!launch::unwrapped(&outcome.stdout).contains("ends at the support"), "{}", outcome.stdout);
+    }
+    for (on, against) in [("fault", "top"), ("top", "fault")] {
+        let contact = format!("[{{ on = ['{on}'], against = ['{against}'], normal.unilateral = {{}} }}]");
+        with_fault([0, 8])
+            .set("contact", &contact)
+            .run_with(1, &[])
+            .expect(2)
+            .says("on = [\"fault\"], without `against`");
+    }
 }
 
 #[test]

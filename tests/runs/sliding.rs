@@ -245,6 +245,56 @@ fn a_pad_whose_ends_slide_on_a_rail_carries_the_law_however_fine_the_mesh_of_the
     assert!(left <= 1e-10, "{left}");
 }
 
+/// Two blocks of which each ends over the other, with this law and these places in x of the upper one, which is drawn to the left by 40 mm.
+fn staggered(law: &str, [left, size]: [f64; 2]) -> Case {
+    Case::written_as(&format!(
+        "mesh.rectangle = [{{ name = 'lower', size = [0.4, 0.1], cells = [40, 10] }},
+            {{ name = 'upper', corner = [{left}, 0.1], size = [{size}, 0.1], cells = [{}, 7] }}]
+         material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.3 }} }}
+         support = [{{ on = ['lower.bottom'], fix = 'all' }},
+            {{ on = ['upper.top'], fix = 'all', displacement = ['-0.2*max(0, t - 0.1)', '-2e-5*min(1, t/0.1)'] }}]
+         contact = [{{ on = ['lower.top'], against = ['upper.bottom'], sliding = 'finite', {law},
+            friction.coulomb.coefficient = 0.3 }}]
+         time = {{ end = 0.3, step = 0.01, scheme = 'implicit_euler' }}",
+        (size / 0.0143f64).round()
+    ))
+}
+
+#[test]
+fn ends_of_both_bodies_over_each_other_are_warned_of_with_remedies_that_work() {
+    let peak = |case: &Case| {
+        let table = case.results().table("resultants.csv").only("source", "contact lower.top");
+        table.numbers("largest_pressure").into_iter().skip(11).fold(0.0, f64::max)
+    };
+    let rigid = staggered("normal.unilateral = {}", [0.2, 0.4]);
+    let words = "over faces of lower.top, whose nodes carry the law";
+    let outcome = rigid.run_with(1, &[]).expect(0);
+    assert!(launch::unwrapped(&outcome.stdout).contains(words), "{}", outcome.stdout);
+    assert!(peak(&rigid) > 2e6, "{} Pa", peak(&rigid));
+    // Young's modulus over the size of a facet, and a lower block that goes on beyond the upper one.
+    for (law, place) in
+        [("normal.compliance.stiffness = 1e11", [0.2, 0.4]), ("normal.unilateral = {}", [0.1, 0.2])]
+    {
+        let case = staggered(law, place);
+        let outcome = case.run_with(2, &[]).expect(0);
+        let said = launch::unwrapped(&outcome.stdout);
+        assert!(!said.contains("whose nodes carry the law"), "{said}");
+        assert!(peak(&case) < 8e5, "{law}: {} Pa", peak(&case));
+    }
+}
+
+#[test]
+fn ends_that_come_over_faces_in_a_run_are_warned_of() {
+    // The ends meet at first.
+    let flush = staggered("normal.unilateral = {}", [0.0, 0.4]);
+    for (ranks, end, is_over) in [(1, "0.3", true), (2, "0.3", true), (1, "0.1", false)] {
+        let outcome = flush.run_with(ranks, &["--force", "--set", &format!("time.end={end}")]).expect(0);
+        let said = launch::unwrapped(&outcome.stdout);
+        assert!(!said.contains("upper.bottom lie over faces"), "not at the start: {said}");
+        assert_eq!(said.contains("came to lie over faces"), is_over, "{said}");
+    }
+}
+
 #[test]
 fn a_box_whose_edges_slide_on_a_plate_carries_the_law_and_of_two_that_cross_neither_is_better() {
     let boxes = |size: &str| {
@@ -262,8 +312,8 @@ fn a_box_whose_edges_slide_on_a_plate_carries_the_law_and_of_two_that_cross_neit
         let chosen = boxes("[0.4, 0.4, 0.1]").run_with(ranks, &["--force"]).expect(0);
         chosen.says("nodes of box.bottom carry the law, because its corners or edges lie over plate.top");
         let crossed = boxes("[0.4, 0.8, 0.1]").run_with(ranks, &["--force"]).expect(0);
-        crossed
-            .says("ends of box.bottom lie over faces of plate.top, whose nodes carry the law")
-            .says("round those of box.bottom");
+        crossed.says("ends of box.bottom lie over faces of plate.top, whose nodes carry the law").says(
+            "let one of the two surfaces go on beyond the ends of the other, or take normal.compliance",
+        );
     }
 }

@@ -168,6 +168,8 @@ pub struct Pair<const D: usize> {
     pub sharing: Vec<Sharing>,
     /// Whether facets of this rank face the other side of which none of the nodes carries a law, because of `lawless`.
     pub is_bare: bool,
+    /// Whether the other side ends over faces of the undeformed surface whose nodes carry the law.
+    pub has_ends: bool,
     /// The nodes owned here that carry the law, ascending.
     pub nodes: Vec<PairedNode<D>>,
 }
@@ -187,6 +189,7 @@ impl<const D: usize> Pair<D> {
             of_others: BTreeSet::new(),
             sharing: Vec::new(),
             is_bare: false,
+            has_ends: false,
             nodes: Vec::new(),
         }
     }

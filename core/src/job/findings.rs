@@ -181,8 +181,11 @@ impl<'a> Table<'a> {
             );
             // Meshes that are read as a whole have been split there, unless a contact has another side as well.
             let is_contact = self.path(key).starts_with("contact");
+            let alone = format!(
+                "a fault is split where `on` names it alone, and its two sides meet: on = [\"{name}\"], without `against`"
+            );
             let help = if is_contact && self.has("against") {
-                "a fault is split where `on` names it alone, and its two sides meet: leave out `against`"
+                &alone
             } else if is_contact && key.starts_with("on") {
                 "a partitioned mesh is not split along faults: name the file of which it was made in [mesh] file"
             } else {

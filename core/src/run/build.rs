@@ -2,7 +2,7 @@
 
 use super::{
     materials::{Materials, wave_speed},
-    pairs::{coupling, refuse_conflicts},
+    pairs::{coupling, refuse_conflicts, set_carried},
     parts::{centre_of, part_of},
 };
 use crate::{
@@ -86,6 +86,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.strain_by_temperature();
     }
     refuse_conflicts(session, job, &body)?;
+    set_carried(session, &mut body)?;
     if body.paired_displacement.is_some() {
         // As a restart does.
         body.form_pairs(session, &state.displacement, false)?;

@@ -3,7 +3,7 @@
 
 use super::{
     inside::{Inside, nodes_of_bodies},
-    side_words::{EDGE, pressed_by_edge},
+    side_words::warning_of_run,
     steps::shortest_step,
 };
 use crate::{
@@ -400,6 +400,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             held,
             slip,
             sharpness,
+            ends,
             leap,
             moved,
             shift,
@@ -415,8 +416,8 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                 table.against.join(", ")
             ));
         }
-        if let Some(pair) = pair_of(&body.pairs, number).filter(|pair| pair.slides && sharpness > EDGE) {
-            out.push(pressed_by_edge(job, pair));
+        if let Some(pair) = pair_of(&body.pairs, number).filter(|pair| pair.slides) {
+            out.extend(warning_of_run(job, (pair, contact), [sharpness, ends]));
         }
         if !contact.normal.law.depends_on_displacement() {
             continue;

@@ -11,10 +11,11 @@ use crate::{
     fem::{
         body::Body,
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
+        effect::{Carried, HeldNode},
         pairs::{Pair, PairedNode, inclined, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
-    job::{self, Job, Side, Sliding},
+    job::{self, Job, Scalar, Side, Sliding},
     linear_algebra::tensor::{Vector, norm},
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
@@ -233,6 +234,122 @@ pub(super) fn warnings_of_inclined_supports<const D: usize, const S: usize>(
         })
     };
     pairs.iter().filter_map(of_pair).collect()
+}
+
+/// In how many ways supports may hold the nodes of bodies that they carry.
+const MOST_WAYS: usize = 256;
+
+/// Lets contacts between bodies know the supports that carry these, if any move in time. Collective.
+pub(super) fn set_carried<const D: usize, const S: usize>(
+    session: &Session,
+    body: &mut Body<D, S>,
+) -> Result<(), Agreed> {
+    let Body { mesh, held, support_motion: Some(motion), contacts, pairs, .. } = body else { return Ok(()) };
+    if pairs.is_empty() || !motion.expressions().any(Scalar::depends_on_time) {
+        return Ok(());
+    }
+    let bodies = mesh.bodies(session)?;
+    // For each way to hold nodes of a body: its number, and the parts with numbers of what they prescribe, 1 for rest and 0 for no part.
+    let mut ways: BTreeSet<Vec<u64>> = BTreeSet::new();
+    for (node, number) in bodies.of_nodes(mesh).into_iter().enumerate().take(mesh.owned) {
+        let Some(number) = number.filter(|_| held.free_count(node) < D && ways.len() <= MOST_WAYS) else {
+            continue;
+        };
+        let (frame, free) = held.frame(node);
+        let mut parts: Vec<_> = motion.parts(node).collect();
+        if parts.is_empty() {
+            parts.extend(frame[free..].iter().map(|direction| (*direction, *direction, None)));
+        }
+        let mut way = vec![0.0; 1 + D * (2 * D + 1)];
+        way[0] = f64::from(number);
+        for ((direction, dual, value), place) in parts.into_iter().zip(way[1..].chunks_exact_mut(2 * D + 1)) {
+            place[..D].copy_from_slice(&direction);
+            place[D..2 * D].copy_from_slice(&dual);
+            place[2 * D] = value.map_or(1.0, |number| 2.0 + number as f64);
+        }
+        ways.insert(way.into_iter().map(|x| (x + 0.0).to_bits()).collect());
+    }
+    let own: Vec<f64> = ways.into_iter().flatten().map(f64::from_bits).collect();
+    let ways = gather(session.world(), &own)?;
+    if ways.len() > MOST_WAYS * (1 + D * (2 * D + 1)) {
+        return Ok(());
+    }
+    let held_nodes = |number: u32| -> Vec<HeldNode<D>> {
+        let of_body = ways.chunks_exact(1 + D * (2 * D + 1)).filter(|way| way[0] == f64::from(number));
+        let vector = |part: &[f64]| -> Vector<D> { std::array::from_fn(|i| part[i]) };
+        let node = |way: &[f64]| {
+            let parts = way[1..].chunks_exact(2 * D + 1).filter(|part| part[2 * D] > 0.0);
+            let value = |number: f64| motion.value((number as usize).checked_sub(2)?).cloned();
+            HeldNode(parts.map(|part| (vector(part), vector(&part[D..]), value(part[2 * D]))).collect())
+        };
+        of_body.map(node).collect()
+    };
+    for pair in pairs {
+        let mut numbers = [Vec::new(), Vec::new()];
+        for (numbers, facets) in numbers.iter_mut().zip([&pair.on, &pair.against]) {
+            let own: BTreeSet<u32> = facets
+                .iter()
+                .map(|facet| bodies.of_cell[mesh.facet_cells[*facet as usize] as usize])
+                .collect();
+            let own: Vec<u32> = own.into_iter().collect();
+            let all: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
+            numbers.extend(all);
+        }
+        if let [[one], [other]] = numbers.each_ref().map(Vec::as_slice)
+            && one != other
+        {
+            contacts[pair.contact].carried = Some(Carried([*one, *other].map(&held_nodes)));
+        }
+    }
+    Ok(())
+}
+
+/// Warns of faults that end at supports which hold nodes of both sides: they stay together there. Collective.
+pub(super) fn warnings_of_held_faults<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+) -> Result<Vec<String>, Agreed> {
+    let mesh = &body.mesh;
+    let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
+    let moves = |node: usize| {
+        body.support_motion.as_ref().is_some_and(|motion| (0..D).any(|i| motion.moves(node, &axis(i))))
+    };
+    let rests = |node: usize| body.held.free_count(node) == 0 && !moves(node);
+    let mut out = Vec::new();
+    for pair in body.pairs.iter().filter(|pair| job.contact[pair.contact].against.is_empty()) {
+        let twins_rest = |node: &&PairedNode<D>| {
+            let twins = node.masters.iter().map(|(twin, _)| mesh.local_node(*twin));
+            rests(node.node as usize) && twins.into_iter().all(|twin| twin.is_some_and(rests))
+        };
+        let held = pair.nodes.iter().filter(twins_rest).map(|node| node.node);
+        let records: Vec<f64> = held
+            .flat_map(|node| [f64::from(mesh.global_node(node))].into_iter().chain(mesh.nodes[node as usize]))
+            .collect();
+        let records = gather(session.world(), &records)?;
+        let Some(first) = records.chunks_exact(D + 1).next() else { continue };
+        let nodes: BTreeSet<u32> = records.chunks_exact(D + 1).map(|record| record[0] as u32).collect();
+        let holds = |name: &String| {
+            let facets = mesh.boundary(name).map_or(&[][..], |boundary| &boundary.facets);
+            let mut at = facets.iter().flat_map(|facet| mesh.facet_nodes(*facet));
+            session.total(usize::from(at.any(|node| nodes.contains(&mesh.global_node(node))))) > 0
+        };
+        let supports = job.support.iter().filter(|support| support.fix.is_some());
+        let mut names: Vec<&String> = supports.flat_map(|support| &support.on).collect();
+        names.sort();
+        names.dedup();
+        names.retain(|name| holds(name));
+        let names: Vec<&str> = names.into_iter().map(String::as_str).collect();
+        out.push(format!(
+            "contact.{}: the fault {} ends at the support on {}, which holds nodes of both its sides, as at {:?} m: there it can neither slip \
+             nor open, and the fault beside it bears less than it would; let the support end before the fault (key `where`)",
+            pair.contact,
+            job.contact[pair.contact].on.join(", "),
+            names.join(", "),
+            &first[1..]
+        ));
+    }
+    Ok(out)
 }
 
 /// Refuses nodes on the side `on` of a pair that supports hold along the normal, or tangentially where friction acts, and not what they

@@ -67,9 +67,10 @@ pub(super) fn setup<const D: usize, const S: usize>(
     warnings.extend(touching::warning(session, job, &body.mesh)?);
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);
     warnings.extend(side_words::warnings_of_changes(&earlier, &body.pairs));
-    warnings.extend(side_words::warnings_of_edges(session, job, &body.mesh, &body.pairs)?);
+    warnings.extend(side_words::warnings_of_edges(session, job, &mut body)?);
     warnings.extend(side_words::warnings_of_carriers(session, job, &body.pairs));
     warnings.extend(pairs::warnings_of_inclined_supports(session, job, &body));
+    warnings.extend(pairs::warnings_of_held_faults(session, job, &body)?);
     warnings.extend(began_from.iter().filter_map(|from| from.warning.clone()));
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };

@@ -2,9 +2,12 @@
 
 use super::sides::{STIFFER, is_smoother};
 use crate::{
-    fem::pairs::{Edges, Exchange, Pair},
+    fem::{
+        body::Body,
+        effect::Contact,
+        pairs::{Edges, Exchange, Pair},
+    },
     job::{self, Job, Side},
-    mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
 use std::collections::BTreeMap;
@@ -58,23 +61,25 @@ pub(super) fn warnings_of_changes<const D: usize>(
     changed.map(words).collect()
 }
 
-/// Warnings about corners, edges and ends of surfaces that lie over faces whose nodes carry the law. Collective, with the same warnings on all
+/// Warnings about corners, edges and ends of surfaces that lie over faces whose nodes carry the law; pairs keep whether there are ends. Collective, with the same warnings on all
 /// ranks.
-pub(super) fn warnings_of_edges<const D: usize>(
+pub(super) fn warnings_of_edges<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
-    mesh: &Mesh<D>,
-    pairs: &[Pair<D>],
+    body: &mut Body<D, S>,
 ) -> Result<Vec<String>, Agreed> {
+    let Body { mesh, pairs, contacts, .. } = body;
+    let mesh = &*mesh;
     let mut out = Vec::new();
-    for pair in pairs.iter().filter(|pair| pair.slides) {
+    for pair in pairs.iter_mut().filter(|pair| pair.slides) {
         let Edges { sharpness, ends } = pair.edges(session, mesh);
-        if sharpness <= EDGE && !ends {
+        pair.has_ends = ends;
+        if sharpness <= EDGE && !(ends && is_rigid(&contacts[pair.contact])) {
             continue;
         }
         let mut other = pair.clone().exchanged(Exchange::Requested);
         other.form(session, mesh, &mesh.nodes)?;
-        let remedy = match (is_smoother((session, mesh), [&other, pair]), job.contact[pair.contact].side) {
+        let remedy = match (is_smoother((session, mesh), [&other, &*pair]), job.contact[pair.contact].side) {
             (false, _) => None,
             (true, Side::Auto) => {
                 Some("let no support and no other contact hold their nodes, so that these carry the law")
@@ -123,9 +128,23 @@ pub(super) fn warnings_of_carriers<const D: usize>(
     out
 }
 
-/// The warning about a pair whose nodes were pressed by corners and edges of the other side in a run.
-pub(super) fn pressed_by_edge<const D: usize>(job: &Job, pair: &Pair<D>) -> String {
-    words_of_edges(job, pair, ("pressed", None))
+/// The warning about a pair whose nodes were pressed by corners and edges of the other side in a run, or came under its ends, given the
+/// largest angle in rad of edges over them and 1 if there were ends; none if the warning before the run was the same.
+pub(super) fn warning_of_run<const D: usize>(
+    job: &Job,
+    (pair, contact): (&Pair<D>, &Contact<D>),
+    [sharpness, ends]: [f64; 2],
+) -> Option<String> {
+    if sharpness > EDGE {
+        return Some(words_of_edges(job, pair, ("pressed", None)));
+    }
+    let is_new = ends > 0.0 && !pair.has_ends && is_rigid(contact);
+    is_new.then(|| words_of_ends(job, pair, ("came to lie", None)))
+}
+
+/// Whether the law of a contact bounds the gap: pressures jump where nodes begin to carry it.
+fn is_rigid<const D: usize>(contact: &Contact<D>) -> bool {
+    contact.normal.law.has_vertical_parts()
 }
 
 /// A warning about corners and edges over faces, with what they do there and what to do about it.
@@ -152,13 +171,13 @@ fn words_of_edges<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&st
 fn words_of_ends<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<&str>)) -> String {
     let [own, other] = names_of_sides(job, pair);
     let worn = if job.contact[pair.contact].wear.is_some() { ", and the worn volume is wrong" } else { "" };
-    let remedy = remedy.map_or_else(
-        || format!("round those of {other} with a radius of more than two facets of {own}"),
-        Into::into,
+    let remedy = remedy.unwrap_or(
+        "let one of the two surfaces go on beyond the ends of the other, or take normal.compliance with a stiffness of about Young's modulus \
+         over the size of a facet",
     );
     format!(
         "contact.{}: ends of {other} {lie} over faces of {own}, whose nodes carry the law: as they slide, pressures of nodes near these ends may \
-         be many times too large{worn}; {remedy}",
+         be many times too large, though not the forces{worn}; {remedy}",
         pair.contact
     )
 }

@@ -52,10 +52,10 @@ use crate::laws::step::quantity;
 pub use crate::laws::step::{Blend, Evaluation, Moment, Quantity, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    ASTRAY, CONTACT, COUNTS, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy, ContactNode,
-    EJECTED, Ejection, Freedom, Friction, Gaps, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL,
-    OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues, SLIP_BETWEEN_PAIRINGS,
-    STORED_IN_CONTACT, Touch, choose_unknowns, contact_nodes, set_walls, tangents,
+    ASTRAY, CONTACT, COUNTS, Carried, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy,
+    ContactNode, EJECTED, Ejection, Freedom, Friction, Gaps, HeldNode, LoadedMotion, OBSTACLE_KINETIC,
+    OBSTACLE_NUMERICAL, OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues,
+    SLIP_BETWEEN_PAIRINGS, STORED_IN_CONTACT, Touch, choose_unknowns, contact_nodes, set_walls, tangents,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};
@@ -78,7 +78,7 @@ pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use redistributed_mass::RedistributedMass;
 pub use step_error::{CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, StressError};
-pub use support::{SupportMotion, Supports};
+pub use support::{Prescribed, SupportMotion, Supports};
 pub use surface::{SurfaceEffect, SurfaceForce};
 pub use tangents::Tangents;
 pub use term::{ElasticLaw, ElasticTensor, FlowProperties, Form, Term};

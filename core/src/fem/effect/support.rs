@@ -44,9 +44,18 @@ pub struct SupportMotion<const D: usize> {
 
 /// What a support prescribes along a direction.
 #[derive(Debug, Clone, PartialEq)]
-struct Prescribed {
-    value: Scalar,
-    is_displacement: bool,
+pub struct Prescribed {
+    /// In m or m/s.
+    pub value: Scalar,
+    /// Whether it is a displacement, not a velocity.
+    pub is_displacement: bool,
+}
+
+impl Prescribed {
+    /// Whether it stays where it is.
+    pub fn is_rest(&self) -> bool {
+        !self.value.depends_on_time() && (self.is_displacement || self.value == Scalar::Number(0.0))
+    }
 }
 
 /// An owned node that supports move.
@@ -282,6 +291,19 @@ impl<const D: usize> SupportMotion<D> {
     /// The expressions of the values.
     pub fn expressions(&self) -> impl Iterator<Item = &Scalar> {
         self.values.iter().map(|prescribed| &prescribed.value)
+    }
+
+    /// What is prescribed, by its number.
+    pub fn value(&self, number: usize) -> Option<&Prescribed> {
+        self.values.get(number)
+    }
+
+    /// Independent unit directions in which supports hold this node of this rank, each with its part of the motion and the number of what is
+    /// prescribed, if the supports move; none at nodes that none moves.
+    pub fn parts(&self, node: usize) -> impl Iterator<Item = (Vector<D>, Vector<D>, Option<usize>)> {
+        let found = self.nodes.binary_search_by_key(&(node as u32), |moved| moved.node);
+        let parts = found.into_iter().flat_map(|at| &self.nodes[at].parts);
+        parts.map(|part| (part.direction, part.dual, part.value))
     }
 
     /// Whether supports hold this node of this rank and move it along this direction.

@@ -160,14 +160,20 @@ pub struct GivenGap<const D: usize> {
 impl<const D: usize> GivenGap<D> {
     /// Whether the gap of the point closes and opens again within the step, unseen at the ends of the step and of its neighbours.
     pub fn comes_and_goes(&self, gap: &Scalar) -> bool {
-        let Self { times: [start, end], place, closed: [before, after], body_size } = self;
-        let least = || gap.enclose_during(self.times, place).low;
-        if !gap.depends_on_time() || least() > larger(*before, *after) {
+        gap.depends_on_time() && self.comes_and_goes_along(gap, (&|_| 0.0, 0.0))
+    }
+
+    /// The same where supports let body and obstacle approach each other, by a way in m at any time, and at most by the second number.
+    pub fn comes_and_goes_along(&self, gap: &Scalar, (way, most): (&dyn Fn(f64) -> f64, f64)) -> bool {
+        let Self { times: [start, end], place, closed, body_size } = self;
+        let [before, after] = [closed[0] - way(*start), closed[1] - way(*end)];
+        let least = gap.enclose_during(self.times, place).low;
+        if least > larger(before, after) + most {
             return false;
         }
         let length = end - start;
         let depth_at = |time: f64, share: f64| {
-            let depth = before + share * (after - before) - gap.evaluate(time, place);
+            let depth = before + share * (after - before) + way(time) - gap.evaluate(time, place);
             if depth.is_nan() { f64::NEG_INFINITY } else { depth }
         };
         Course {

@@ -13,6 +13,8 @@ pub struct Closeness {
     pub slip: f64,
     /// Largest angle in rad of edges of another body over points with contact pressure.
     pub sharpness: f64,
+    /// 1 if another body ended over the facets around such a point.
+    pub ends: f64,
     /// Longest way in m of the obstacle in a step, where a force moves it.
     pub leap: f64,
     /// Largest distance in m by which a point with contact pressure had moved along an obstacle.
@@ -59,7 +61,7 @@ impl Ejection {
 }
 
 /// How many numbers these are.
-const COUNT: usize = 12;
+const COUNT: usize = 13;
 
 impl Default for Closeness {
     fn default() -> Self {
@@ -76,7 +78,7 @@ impl Closeness {
     /// All of them.
     fn numbers(self) -> [f64; COUNT] {
         let Self { penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, .. } = self;
-        let Self { inclination, ejection: Ejection { strain, overlap, time }, .. } = self;
+        let Self { inclination, ejection: Ejection { strain, overlap, time }, ends, .. } = self;
         [
             penetration,
             held,
@@ -90,6 +92,7 @@ impl Closeness {
             strain,
             overlap,
             time,
+            ends,
         ]
     }
 
@@ -101,13 +104,14 @@ impl Closeness {
     /// The one with these numbers.
     fn of(numbers: [f64; COUNT]) -> Self {
         let [penetration, held, slip, sharpness, leap, moved, shift, shift_to_spread, ..] = numbers;
-        let [.., inclination, strain, overlap, time] = numbers;
+        let [.., inclination, strain, overlap, time, ends] = numbers;
         let ejection = Ejection { strain, overlap, time };
         Self {
             penetration,
             held,
             slip,
             sharpness,
+            ends,
             leap,
             moved,
             shift,

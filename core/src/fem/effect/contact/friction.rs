@@ -289,7 +289,8 @@ impl<const D: usize> Friction<D> {
     /// Converts unknowns into velocities, after `points` have computed their pressures.
     pub(super) fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let scale = self.scale;
-        if self.follows {
+        // Laws without pressure see it as well, by which nodes that supports hold stick or not.
+        if self.follows || !self.law.follows_pressure() {
             self.update_pressures(points);
         }
         for point in &mut self.points {
@@ -554,11 +555,14 @@ impl<const D: usize> Friction<D> {
 
     /// The state of a point with this sliding velocity.
     fn status(&self, point: &TangentialPoint<D>, sliding: &Vector<D>) -> FrictionStatus {
-        // A node that is held over an obstacle at rest has no friction of its own.
+        // A node that is held over an obstacle at rest has no friction of its own: under pressure it sticks, as in a plane of symmetry.
         let is_idle = !point.is_free() && norm(sliding) == 0.0;
-        let is_apart = point.context.is_bare || (self.law.follows_pressure() && point.pressure <= 0.0);
-        if is_idle || is_apart {
+        let follows_pressure = is_idle || self.law.follows_pressure();
+        if point.context.is_bare || (follows_pressure && point.pressure <= 0.0) {
             return FrictionStatus::Separated;
+        }
+        if is_idle {
+            return FrictionStatus::Sticks;
         }
         let parameter = add_scaled(&point.whole_traction(), self.scale, sliding);
         let found = self.law.resolve(norm(&parameter), self.scale, point.pressure, point.context);

@@ -30,6 +30,7 @@ mod approach;
 mod bearing;
 mod boundary;
 mod bounds;
+mod carried;
 mod closeness;
 mod corners;
 mod count;
@@ -70,6 +71,7 @@ use point::{Point, Vectors::Body, gauss_points};
 use std::collections::BTreeSet;
 
 pub use crate::laws::contact::Quadrature;
+pub use carried::{Carried, HeldNode};
 pub use closeness::{Closeness, Ejection, Gaps};
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
@@ -118,6 +120,8 @@ pub struct Contact<const D: usize> {
     pub facets: Vec<u32>,
     /// Whether it is against another body.
     pub is_paired: bool,
+    /// How supports that move in time carry the two bodies, if they do.
+    pub carried: Option<Carried<D>>,
     /// Whether points may slide along the obstacle any distance; to be set before [`turn_edges`](Self::turn_edges).
     pub follows_surface: bool,
     /// Energy in J that it stores on this rank at the start of a step, if it follows the surface.
@@ -183,6 +187,7 @@ impl<const D: usize> Contact<D> {
             reference,
             facets: facets.to_vec(),
             is_paired,
+            carried: None,
             follows_surface: false,
             stored_before: 0.0,
             owned: mesh.owned,

@@ -94,6 +94,8 @@ pub(super) struct Point<const D: usize> {
     pub stretch: f64,
     /// The angle in rad of the edges of that body over the point.
     pub sharpness: f64,
+    /// Whether the other body ends over the facets around it.
+    pub meets_end: bool,
     /// Whether supports hold it along directions that are inclined to the boundary, which faces another body.
     pub is_inclined: bool,
     /// Whether its normal follows what it faces: no other contact acts at the node.
@@ -166,6 +168,7 @@ impl<const D: usize> Point<D> {
             facet_size: f64::INFINITY,
             stretch: 1.0,
             sharpness: 0.0,
+            meets_end: false,
             is_inclined: false,
             faced_at: [0.0; D],
             found_deeper: 0.0,
@@ -309,10 +312,16 @@ impl<const D: usize> Point<D> {
 
     /// A point at a node that faces another body, whose values are relative to that body.
     pub(super) fn paired(node: &PairedNode<D>, held: &Held<D>) -> Self {
-        let PairedNode { distance, stretch, sharpness, .. } = *node;
+        let PairedNode { distance, stretch, sharpness, meets_end, .. } = *node;
         let is_inclined = node.inclination(held).is_some();
-        let mut point =
-            Self { distance, stretch, sharpness, is_inclined, ..Self::nodal(node.point(held), held) };
+        let mut point = Self {
+            distance,
+            stretch,
+            sharpness,
+            meets_end,
+            is_inclined,
+            ..Self::nodal(node.point(held), held)
+        };
         point.set_sense();
         point
     }

@@ -117,7 +117,7 @@ impl<const D: usize> Contact<D> {
     /// (with ghosts), and where it is beyond points that should have stopped it.
     pub fn refuse_passage(&self, step: Step, displacement: &[f64], velocity: &[f64]) -> Result<()> {
         let given = match &self.obstacle.gap {
-            Gap::Distance(gap) if !gap.depends_on_time() => return Ok(()),
+            Gap::Distance(gap) if !gap.depends_on_time() && self.carried.is_none() => return Ok(()),
             Gap::Distance(gap) => Some(gap),
             _ => None,
         };
@@ -143,8 +143,20 @@ impl<const D: usize> Contact<D> {
             let moved = [along - worn_before, moved - worn];
             if let Some(gap) = given.filter(|_| point.carries(&self.normal.law)) {
                 let closed = moved.map(|moved| (moved - point.distance) / point.stretch);
-                let point = GivenGap { times, place: point.place, closed, body_size: self.normal.body_size };
-                if point.comes_and_goes(gap) {
+                let given = GivenGap { times, place: point.place, closed, body_size: self.normal.body_size };
+                let approach = self.carried.as_ref().and_then(|by| by.approach(&point.normal, times[0]));
+                if let Some(approach) = approach.filter(|_| closed[1].is_finite()) {
+                    let most = approach.most(times[1]) / point.stretch;
+                    let way = |time: f64| approach.at(time) / point.stretch;
+                    if given.comes_and_goes_along(gap, (&way, most)) {
+                        return Err(Error::Failed(format!(
+                            "the step to t = {:.6e} s (length {:.3e} s) failed: supports let the boundary at {:?} m touch the other body and \
+                             part from it within the step; take a smaller [time] step, which resolves the motion of the supports, or correct \
+                             their motion",
+                            step.time, step.length, point.place
+                        )));
+                    }
+                } else if given.comes_and_goes(gap) {
                     return Err(Error::Failed(format!(
                         "the step to t = {:.6e} s (length {:.3e} s) failed: its gap at {:?} m closes and opens within the step; take a \
                          smaller [time] step, which resolves the formula of the gap, or correct the formula",
@@ -257,9 +269,10 @@ impl<const D: usize> Contact<D> {
         }
         for point in &self.normal.points {
             if point.pressure_at(&self.normal.law, Body, velocity) != 0.0 {
-                let Closeness { slip: most, sharpness, .. } = &mut self.closeness;
+                let Closeness { slip: most, sharpness, ends, .. } = &mut self.closeness;
                 *most = larger(*most, slip(point, displacement));
                 *sharpness = larger(*sharpness, point.sharpness);
+                *ends = larger(*ends, f64::from(u8::from(point.meets_end)));
             }
         }
     }
@@ -339,7 +352,8 @@ impl<const D: usize> Contact<D> {
     ) -> Result<()> {
         for (at, node) in nodes.iter().enumerate() {
             let point = &mut self.normal.points[at];
-            (point.stretch, point.sharpness) = (node.stretch, node.sharpness);
+            (point.stretch, point.sharpness, point.meets_end) =
+                (node.stretch, node.sharpness, node.meets_end);
             point.is_inclined = node.inclination(held).is_some();
             point.faced_at = std::array::from_fn(|i| displacement[point.node() * D + i]);
             point.turn(&node.normal, held);
