@@ -208,8 +208,6 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &mut self.friction {
             friction.points.retain(|point| !given.contains(&point.at));
             friction.points.iter_mut().for_each(|point| point.at = after(point.at));
-            friction.partly_held.retain(|(at, _)| !given.contains(at));
-            friction.partly_held.iter_mut().for_each(|(at, _)| *at = after(*at));
         }
         let mut number = 0..;
         self.normal.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));
