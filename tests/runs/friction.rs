@@ -547,6 +547,100 @@ fn friction_sees_sliding_along_directions_that_a_support_holds() {
     }
 }
 
+/// A block under 1e4 N whose sides a support guides along y, on a plane with this normal that touches a corner and moves along x at this
+/// velocity in m/s.
+fn guided_block(normal: &str, velocity: f64) -> Case {
+    let corner = u8::from(normal.starts_with("[-"));
+    let text = format!(
+        "mesh.rectangle = {{ size = [1, 0.5], cells = [1, 4] }}
+        material.hypothesis = 'plane_strain'
+        material.elasticity = {{ youngs_modulus = 1e10, poisson_ratio = 0 }}
+        support = [{{ on = ['left', 'right'], fix = ['x'] }}]
+        traction = [{{ on = ['top'], value = [0, -1e4] }}]
+        time = {{ scheme = 'implicit_euler', end = 1, step = 0.1 }}
+        [[contact]]
+        on = ['bottom']
+        sliding = 'finite'
+        normal.unilateral = {{}}
+        friction.coulomb.coefficient = 0.3
+        obstacle.plane = {{ point = ['{corner} + {velocity}*t', 0], normal = {normal} }}"
+    );
+    Case::written_as(&text)
+}
+
+/// A plane whose normal is inclined by `a` presses with `N` along it and rubs with `mu N`: `N (cos a - mu sin a) = W` along the guide, and across
+/// it the support takes `W tan(a + atan mu)`. The plane slides past at `v / cos a`.
+#[test]
+fn friction_acts_along_a_guide_where_the_obstacle_is_inclined_to_it() {
+    let inclined = |degrees: f64| format!("[{}, {}]", degrees.to_radians().sin(), degrees.to_radians().cos());
+    let friction = 0.3f64;
+    let force = |results: &Results, source: &str| {
+        let rows = results.table("resultants.csv").only("source", source);
+        ["force_x", "force_y"].map(|name| rows.last(name))
+    };
+    let check = |case: &Case, what: &str, (angle, velocity): (f64, f64)| {
+        let results = case.results();
+        let mu = friction * velocity.signum();
+        let across = 1e4 * (angle + mu.atan()).tan();
+        let [x, y] = force(&results, "contact bottom");
+        assert!((x - across).abs() < 1e-5 * across.abs() && (y - 1e4).abs() < 0.1, "{what}: {x} {y} N");
+        let [support, _] = force(&results, "support left+right");
+        assert!((support + across).abs() < 1e-5 * across.abs(), "{what}: {support} N");
+        let pressed = 1e4 / (angle.cos() - mu * angle.sin());
+        let expected = friction * pressed * velocity.abs() / angle.cos();
+        let [dissipated, _] = powers(&results);
+        assert!((dissipated / expected - 1.0).abs() < 1e-3, "{what}: {dissipated} W instead of {expected} W");
+        assert!(results.number("max_energy_imbalance") < 1e-10, "{what}");
+        let rows = results.table("resultants.csv").only("source", "contact bottom");
+        let [slips, touches] = ["slipping_area", "touching_area"].map(|name| rows.last(name));
+        assert!(touches > 0.2 && (slips / touches - 1.0).abs() < 1e-9, "{what}: {slips} of {touches} m2");
+    };
+    for degrees in [0.0, 1e-7, 1e-4, 1.0, 10.0, -10.0, 30.0] {
+        for velocity in [0.02, -0.02] {
+            let what = format!("{degrees} degrees, {velocity} m/s");
+            let case = guided_block(&inclined(degrees), velocity);
+            let case = case.run_and_keep(1);
+            check(&case, &what, (degrees.to_radians(), velocity));
+        }
+    }
+    for (key, value) in [
+        ("time.scheme", "'bdf2'"),
+        ("contact.0.normal", "{ compliance = { stiffness = 1e10 } }"),
+        ("contact.0.friction", "{ tresca = { bound = 3000 } }"),
+        ("contact.0.friction", "{ expression = { coefficient = '0.3 + 0*p' } }"),
+        ("solver.friction", "'fixed_point'"),
+        ("mesh.rectangle.cells", "[4, 2]"),
+    ] {
+        let case = guided_block(&inclined(5.0), 0.02).set(key, value);
+        case.run_with(2, &[]).expect(0);
+        if value.contains("tresca") {
+            let [x, _] = force(&case.results(), "contact bottom");
+            let (sine, cosine) = 5f64.to_radians().sin_cos();
+            // 3000 Pa on the shadow of the bottom.
+            let rubbed = 3000.0 * cosine;
+            let expected = (1e4 + rubbed * sine) / cosine * sine + rubbed * cosine;
+            assert!((x / expected - 1.0).abs() < 1e-5, "{x} N instead of {expected} N");
+        } else if !value.contains("[4") {
+            check(&case, value, (5f64.to_radians(), 0.02));
+        }
+    }
+    let tilting = "['sin(0.1*max(t - 0.5, 0))', 'cos(0.1*max(t - 0.5, 0))']";
+    let straight = guided_block(tilting, 0.02).run_and_keep(1);
+    let rows = straight.results().table("resultants.csv").only("source", "contact bottom");
+    for (time, found) in rows.numbers("time").iter().zip(rows.numbers("force_x")) {
+        let expected = 1e4 * (0.1 * (time - 0.5).max(0.0) + friction.atan()).tan();
+        assert!((found / expected - 1.0).abs() < 1e-3, "{found} N instead of {expected} N at {time} s");
+    }
+    let stopped = guided_block(tilting, 0.02).set("checkpoint.every", "2");
+    stopped.run_with(1, &["--set", "time.end=0.8"]).expect(0);
+    stopped.run_with(1, &["--restart"]).expect(0);
+    for name in ["history.csv", "resultants.csv"] {
+        assert_eq!(straight.results().text(name), stopped.results().text(name), "{name}");
+    }
+    let steep = guided_block("[0.8, 0.6]", 0.02).set("contact.0.friction.coulomb.coefficient", "0.9");
+    steep.run_with(1, &[]).says("holds the node fast");
+}
+
 /// The brick is held in x and y, and the plane slides past, or the supports take it over a plane at rest.
 #[test]
 fn a_boundary_that_is_held_along_its_plane_rubs_and_wears() {

@@ -704,6 +704,24 @@ fn bodies_that_move_along_inclined_obstacles_or_turn_are_warned_of() {
     let inclined = "the resultant of the pressures is inclined by up to";
     assert!([1, 2].iter().all(|ranks| warns(round(0.06), *ranks, inclined)), "by 0.03 rad");
     assert!(!warns(round(0.0), 1, inclined), "only pressed");
+    // A round obstacle that is pressed in by friction that sticks, and moved along by a share of the half-width of 16 mm; the patch goes with it.
+    let sticking = |way: f64, sliding: &str| {
+        Case::written_as(&format!(
+            "
+            mesh.rectangle = {{corner = [-0.1, -0.1], size = [0.2, 0.1], cells = [100, 50]}}
+            material = {{hypothesis = 'plane_strain', elasticity = {{youngs_modulus = 1e9, poisson_ratio = 0.49}}}}
+            support = [{{on = ['bottom'], fix = 'all'}}]
+            contact = [{{on = ['top'], sliding = '{sliding}', normal.unilateral = {{}}, friction.coulomb.coefficient = 5.0,
+                obstacle.sphere = {{centre = ['{way}*max(t - 0.5, 0)', '0.5 - 1e-3*min(t, 0.5)'], radius = 0.5}}}}]
+            time = {{scheme = 'implicit_euler', end = 1.0, step = 0.25}}"
+        ))
+    };
+    assert!(
+        [1, 2].iter().all(|ranks| warns(sticking(6e-3, "small"), *ranks, along)),
+        "that takes the patch along"
+    );
+    assert!(!warns(sticking(0.0, "small"), 1, along), "that is only pressed in");
+    assert!(!warns(sticking(6e-3, "finite"), 1, along), "whose gaps are followed");
     let turning = |speed: f64| {
         Case::written_as(&format!(
             "
@@ -801,6 +819,35 @@ fn a_body_that_starts_inside_its_obstacle_is_warned_of_by_the_strain_of_its_ejec
         let energy = most_kinetic(&case);
         assert_eq!(energy > 1e3, is_warned, "{contact}, {time}: {energy}");
         assert!(is_warned || energy < 1e-3, "{contact}, {time}: {energy}");
+    }
+}
+
+/// Cells without mass take up the overlap `u` as springs do: their energy is that of their size `h`, about `E u^2 / (2 h)` on each m^2; that of a
+/// foundation is `k u^2 / 2`, whatever the cells.
+#[test]
+fn a_boundary_without_mass_that_starts_inside_its_obstacle_is_warned_of_and_the_remedy_is_one() {
+    let warning =
+        "starts up to 1.000e-3 m inside its obstacle: the cells there, which have no mass, are strained by";
+    let energy = |contact: &str, cells: usize, is_warned: bool| {
+        let case = Case::written_as(&format!(
+            "material = {{ hypothesis = 'plane_strain', density = 1e3, elasticity = {{ youngs_modulus = 1e7, poisson_ratio = 0.3 }} }}
+            mesh.rectangle = {{ size = [0.1, 0.1], cells = [{cells}, {cells}] }}
+            initial.displacement = [0, -1e-3]
+            time = {{ scheme = 'midpoint', end = 0.02, step = {} }}
+            contact = [{{ on = ['bottom'], redistribute_mass = true, {contact} }}]",
+            1.6e-3 / cells as f64
+        ));
+        let outcome = case.run_with(2, &[]).expect(0);
+        assert_eq!(warns_of(&outcome, &case, warning), is_warned, "{}", outcome.stdout);
+        assert!(!warns_of(&outcome, &case, "take redistribute_mass"), "{}", outcome.stdout);
+        let table = case.results().table("history.csv");
+        table.last("kinetic_energy") + table.last("elastic_energy")
+    };
+    let [coarse, fine] = [8, 16].map(|cells| energy("normal.unilateral = {}", cells, true));
+    assert!(coarse > 30.0 && fine > 1.9 * coarse, "{coarse} {fine} J");
+    for cells in [8, 16] {
+        let found = energy("normal.compliance.stiffness = 1e8", cells, false);
+        assert!((found / 5.0 - 1.0).abs() < 1e-3, "{found} J of 5 J");
     }
 }
 

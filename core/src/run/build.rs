@@ -15,7 +15,10 @@ use crate::{
             surface_effects,
         },
         pairs::{Pair, nodes_of},
-        space::{Geometry, Held, SurfacePoint, cell_rule, place_in_cell, surface_means, surface_points},
+        space::{
+            Geometry, Held, SurfacePoint, cell_rule, facet_sizes, place_in_cell, surface_means,
+            surface_points,
+        },
         state::State,
     },
     job::{self, Job, Sliding},
@@ -96,7 +99,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     }
     let Body { mesh, geometry, contacts, .. } = &mut body;
     for (contact, table) in contacts.iter_mut().zip(&job.contact) {
-        if table.redistribute_mass || contact.normal.law.velocity_bound(NodeContext::AT_THE_GAP).is_none() {
+        if contact.normal.law.velocity_bound(NodeContext::AT_THE_GAP).is_none() {
             continue;
         }
         let touches: BTreeSet<usize> = contact.normal.nodes().collect();
@@ -107,6 +110,11 @@ pub(super) fn body<const D: usize, const S: usize>(
             .filter_map(|(_, cell)| wave_speed(&materials.all[cell.material()], job.material.hypothesis));
         let [slowest] = session.largest([speeds.map(|speed| -speed).fold(f64::NEG_INFINITY, larger)]);
         contact.wave_speed = slowest.is_finite().then_some(-slowest);
+        if table.redistribute_mass {
+            let sizes = facet_sizes(session, mesh, &contact.facets)?;
+            let [least] = session.largest([sizes.values().map(|size| -size).fold(f64::NEG_INFINITY, larger)]);
+            contact.layer = least.is_finite().then_some(-least);
+        }
     }
     if job.output.asks_for_slip() {
         body.contacts.iter_mut().flat_map(|contact| &mut contact.friction).for_each(Friction::keep_slip);

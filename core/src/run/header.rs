@@ -9,7 +9,7 @@ use crate::{
         output_field::Figures,
         summary::{Errors, Summary},
     },
-    job::{Job, Loaded, Method},
+    job::{Contact, Job, Loaded, Method, Sliding},
     laws::digits::Digits,
     parallel::session::Session,
 };
@@ -135,7 +135,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
             members.iter().map(|figure| summary.of_fields.get(figure.name).copied()).collect();
         found.into_iter().for_each(|figures| log.line(line(&figures)));
     }
-    errors(log, summary);
+    errors(log, job, summary);
     if summary.unstable_steps > 0 || summary.indefinite_solves > 0 {
         log.line(format!(
             "unstable   {} steps passed unstable states, {} linear systems were indefinite",
@@ -162,7 +162,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
 }
 
 /// Logs the estimated errors, and what half of them would take.
-fn errors(log: &mut Log, summary: &Summary) {
+fn errors(log: &mut Log, job: &Job, summary: &Summary) {
     let Errors { error_of_mesh, vibrates, error_of_steps, order_of_steps } = summary.errors;
     let two_digits = |number: f64| {
         let unit = 10f64.powf(number.log10().floor() - 1.0);
@@ -185,6 +185,13 @@ fn errors(log: &mut Log, summary: &Summary) {
             None => {
                 ", uncertain: the states of longer steps show no order near that of the scheme".to_owned()
             }
+        };
+        let slides = |contact: &Contact| !contact.against.is_empty() && contact.sliding == Sliding::Finite;
+        let more = match job.contact.iter().any(slides) {
+            true => format!(
+                "{more}; without that of what sliding nodes face, which is found anew after a quarter of a facet, whatever the steps"
+            ),
+            false => more,
         };
         let error = percent(error);
         log.line(format!("errors     by the steps {error} of stress and velocity at the end{more}"));

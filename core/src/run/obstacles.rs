@@ -10,7 +10,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{ASTRAY, Closeness, Contact, EJECTED, Ejection, Friction, Gaps, OVERRUN, tangents},
+        effect::{Closeness, Contact, EJECTED, Ejection, Friction, Gaps, OVERRUN, tangents},
         pairs::pair_of,
         space::{longest_side, surface_means},
         state::State,
@@ -33,7 +33,7 @@ const TOO_DEEP: f64 = 0.01;
 
 /// The slip between bodies, as a share of the size of a facet, beyond which they no longer act on the surface that they face.
 const LARGEST_SLIP: f64 = 0.5;
-/// The change of gaps by motions along an obstacle, as a share of the spread of the normal displacements of the boundary, and the inclination
+/// The change of gaps by motions along an obstacle, as a share of the spread of the normal displacements of the boundary or under pressure, and the inclination
 /// in rad of the resultant of the pressures that comes with it, above which a warning is given.
 const LARGEST_SHIFT: f64 = 0.1;
 const LARGEST_INCLINATION: f64 = 0.01;
@@ -163,6 +163,10 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     Ok(out)
 }
 
+/// The remedy of a law that takes up an overlap.
+const COMPLIANT: &str =
+    "normal.compliance, with which the energy is that of its springs, the same for all cells and steps";
+
 /// What the first step does to a boundary that starts inside of its obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Ejected {
@@ -170,31 +174,40 @@ struct Ejected {
     step: f64,
     /// The velocity in m/s at which this step takes it out.
     speed: f64,
-    /// The strain of the body by that.
+    /// The strain of the body by that, or of the cells at the boundary where these have no mass.
     strain: f64,
+    /// Whether they have none.
+    has_layer: bool,
 }
 
 impl Ejected {
     /// That of a boundary that starts this deep in m inside of its obstacle, if its constraint ejects it.
     fn of<const D: usize>(job: &Job, contact: &Contact<D>, overlap: f64) -> Option<Self> {
-        let wave_speed = contact.wave_speed.filter(|_| contact.ejects() && overlap > 0.0)?;
+        let wave_speed = contact.wave_speed.filter(|_| overlap > 0.0)?;
         let step = shortest_step(job);
         let speed = overlap / step;
-        Some(Self { step, speed, strain: speed / wave_speed })
+        let strain = contact.layer.map_or(speed / wave_speed, |layer| overlap / layer);
+        Some(Self { step, speed, strain, has_layer: contact.layer.is_some() })
     }
 
     /// What it does and what helps.
     fn words(self, job: &Job) -> String {
-        let Self { step, speed, strain } = self;
+        let Self { step, speed, strain, has_layer } = self;
         let key = if job.time.adaptive.is_some() { "[time.adaptive] smallest_step" } else { "[time] step" };
         let from = match job.initial.as_ref().is_some_and(|initial| initial.from.is_some()) {
             true => "the law of the run before let it in, this one does not; keep that law, or ",
             false => "",
         };
+        if has_layer {
+            return format!(
+                "the cells there, which have no mass, are strained by {} at once, and the energy of this, which grows as they become smaller, \
+                 throws the body off; {from}correct the gap, the obstacle or [initial] displacement, or take {COMPLIANT}",
+                rounded(strain)
+            );
+        }
         format!(
             "a step of {step} s ejects it at {} m/s, which strains the body by {} and adds energy that grows as the square of this speed; \
-             {from}correct the gap, the obstacle or [initial] displacement, or take redistribute_mass = true, normal.compliance, or a {key} of {} s \
-             or more",
+             {from}correct the gap, the obstacle or [initial] displacement, or take a {key} of {} s or more, or {COMPLIANT}",
             rounded(speed),
             rounded(strain),
             rounded(step * strain / EJECTED)
@@ -417,7 +430,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             ));
         }
         if let Some(pair) = pair_of(&body.pairs, number).filter(|pair| pair.slides) {
-            out.extend(warning_of_run(job, (pair, contact), [sharpness, ends]));
+            out.extend(warning_of_run(session, job, (body, pair), state, [sharpness, ends])?);
         }
         if !contact.normal.law.depends_on_displacement() {
             continue;
@@ -429,7 +442,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
                  have to carry; let the contact end before the support (key `where`), or stop the obstacle earlier"
             ));
         }
-        if shift > ASTRAY * size && (shift_to_spread > LARGEST_SHIFT || inclination > LARGEST_INCLINATION) {
+        if shift_to_spread > LARGEST_SHIFT || inclination > LARGEST_INCLINATION {
             let remedy = if table.adhesion.is_none() && table.memory.is_none() {
                 "use sliding = \"finite\""
             } else {
@@ -450,7 +463,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             out.push(format!(
                 "contact.{number}: in the step to t = {time} s {} leapt {overlap:.3e} m into the boundary {on}, and ejected it within \
                  this step, which strains the body by {} and adds energy that grows as the square of the overlap over the step; let the \
-                 gap close in a time that steps resolve, or take redistribute_mass = true, normal.compliance, or longer steps",
+                 gap close in a time that steps resolve, or take longer steps, or {COMPLIANT}",
                 faced(table),
                 rounded(strain)
             ));

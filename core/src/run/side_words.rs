@@ -2,19 +2,24 @@
 
 use super::sides::{STIFFER, is_smoother};
 use crate::{
+    error::Result,
     fem::{
         body::Body,
         effect::Contact,
         pairs::{Edges, Exchange, Pair},
+        state::State,
     },
     job::{self, Job, Side},
-    parallel::{agreement::Agreed, session::Session},
+    linear_algebra::tensor::{Vector, larger},
+    parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The angle in rad (10 degrees) of edges over faces whose nodes carry the law from which on the user is warned: forces along an inclined
 /// face are 18 % of those across.
 pub(super) const EDGE: f64 = 0.175;
+/// Most times the mean pressure at the ends of a side that can carry the law.
+const MANY: f64 = 3.0;
 
 /// The boundaries of a pair at whose nodes the law acts, and those that they face.
 pub(super) fn names_of_sides<const D: usize>(job: &Job, pair: &Pair<D>) -> [String; 2] {
@@ -79,18 +84,58 @@ pub(super) fn warnings_of_edges<const D: usize, const S: usize>(
         }
         let mut other = pair.clone().exchanged(Exchange::Requested);
         other.form(session, mesh, &mesh.nodes)?;
+        let state = |side: &str| {
+            let [own, other] = names_of_sides(job, pair);
+            format!("state side = \"{side}\", unless {other} slides beyond an end of {own}")
+        };
         let remedy = match (is_smoother((session, mesh), [&other, &*pair]), job.contact[pair.contact].side) {
             (false, _) => None,
-            (true, Side::Auto) => {
-                Some("let no support and no other contact hold their nodes, so that these carry the law")
-            }
-            (true, Side::On) => Some("state side = \"against\""),
-            (true, Side::Against) => Some("state side = \"on\""),
+            (true, Side::Auto) => Some(
+                "let no support and no other contact hold their nodes, so that these carry the law".into(),
+            ),
+            (true, Side::On) => Some(state("against")),
+            (true, Side::Against) => Some(state("on")),
         };
         let words = if sharpness > EDGE { words_of_edges } else { words_of_ends };
         out.push(words(job, pair, ("lie", remedy)));
     }
     Ok(out)
+}
+
+/// What lets the other side of a pair carry the law, if little presses at the ends of this one at the end of a run. Collective.
+fn exchange_of_sides<const D: usize, const S: usize>(
+    session: &Session,
+    (body, pair): (&Body<D, S>, &Pair<D>),
+    state: &State,
+) -> Result<Option<String>> {
+    let mesh = &body.mesh;
+    let seen: Vec<(usize, [f64; 2])> = {
+        let velocity = session.agree(state.velocity.local())?;
+        body.contacts[pair.contact].pressures(&body.seen_by_contacts(&velocity)).collect()
+    };
+    let pressed = seen.iter().filter(|(_, [pressure, _])| *pressure > 0.0);
+    let sums = pressed.fold([0.0; 2], |[force, area], (_, [p, a])| [force + p * a, area + a]);
+    let [force, area] = session.sum(sums);
+    let moved = session.agree(state.displacement.local())?;
+    let places: Vec<Vector<D>> = mesh
+        .nodes
+        .iter()
+        .zip(moved.chunks_exact(D))
+        .map(|(place, moved)| std::array::from_fn(|i| place[i] + moved[i]))
+        .collect();
+    let mut other = pair.clone().exchanged(Exchange::Requested);
+    other.form(session, mesh, &places)?;
+    let own: Vec<u32> = other
+        .nodes
+        .iter()
+        .filter(|node| node.meets_end)
+        .flat_map(|node| node.faced().map(|(own, _)| *own).collect::<Vec<_>>())
+        .collect();
+    let own: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
+    let at_own = seen.iter().filter(|(node, _)| own.contains(&mesh.global_node(*node as u32)));
+    let [at_own] = session.largest([at_own.map(|(_, [p, _])| *p).fold(0.0, larger)]);
+    let side = if pair.exchange.is_some() { "on" } else { "against" };
+    Ok((at_own * area <= MANY * force).then(|| format!("state side = \"{side}\"")))
 }
 
 /// Warnings about wear that stays with the nodes of the other body, and about facets of which contacts leave all nodes without a law.
@@ -129,17 +174,22 @@ pub(super) fn warnings_of_carriers<const D: usize>(
 }
 
 /// The warning about a pair whose nodes were pressed by corners and edges of the other side in a run, or came under its ends, given the
-/// largest angle in rad of edges over them and 1 if there were ends; none if the warning before the run was the same.
-pub(super) fn warning_of_run<const D: usize>(
+/// largest angle in rad of edges over them and 1 if there were ends; none if the warning before the run was the same. Collective.
+pub(super) fn warning_of_run<const D: usize, const S: usize>(
+    session: &Session,
     job: &Job,
-    (pair, contact): (&Pair<D>, &Contact<D>),
+    (body, pair): (&Body<D, S>, &Pair<D>),
+    state: &State,
     [sharpness, ends]: [f64; 2],
-) -> Option<String> {
+) -> Result<Option<String>> {
     if sharpness > EDGE {
-        return Some(words_of_edges(job, pair, ("pressed", None)));
+        return Ok(Some(words_of_edges(job, pair, ("pressed", None))));
     }
-    let is_new = ends > 0.0 && !pair.has_ends && is_rigid(contact);
-    is_new.then(|| words_of_ends(job, pair, ("came to lie", None)))
+    if ends == 0.0 || pair.has_ends || !is_rigid(&body.contacts[pair.contact]) {
+        return Ok(None);
+    }
+    let remedy = exchange_of_sides(session, (body, pair), state)?;
+    Ok(Some(words_of_ends(job, pair, ("came to lie", remedy))))
 }
 
 /// Whether the law of a contact bounds the gap: pressures jump where nodes begin to carry it.
@@ -148,17 +198,20 @@ fn is_rigid<const D: usize>(contact: &Contact<D>) -> bool {
 }
 
 /// A warning about corners and edges over faces, with what they do there and what to do about it.
-fn words_of_edges<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<&str>)) -> String {
+fn words_of_edges<const D: usize>(
+    job: &Job,
+    pair: &Pair<D>,
+    (lie, remedy): (&str, Option<String>),
+) -> String {
     let [own, other] = names_of_sides(job, pair);
     let side = if pair.exchange.is_some() { "on" } else { "against" };
-    let remedy = remedy.map_or_else(
+    let remedy = remedy.unwrap_or_else(
         || {
             format!(
                 "if {own} is flat there, state side = \"{side}\"; of two surfaces with corners, round those of {other} with a radius of more than \
                  two facets of {own}"
             )
         },
-        Into::into,
     );
     format!(
         "contact.{}: corners or edges of {other} {lie} on faces of {own}, whose nodes carry the law: as they slide, forces along these faces may \
@@ -168,13 +221,14 @@ fn words_of_edges<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&st
 }
 
 /// A warning about the ends of a surface over faces, with what to do about it.
-fn words_of_ends<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<&str>)) -> String {
+fn words_of_ends<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str, Option<String>)) -> String {
     let [own, other] = names_of_sides(job, pair);
     let worn = if job.contact[pair.contact].wear.is_some() { ", and the worn volume is wrong" } else { "" };
-    let remedy = remedy.unwrap_or(
+    let remedy = remedy.unwrap_or_else(|| {
         "let one of the two surfaces go on beyond the ends of the other, or take normal.compliance with a stiffness of about Young's modulus \
-         over the size of a facet",
-    );
+         over the size of a facet"
+            .into()
+    });
     format!(
         "contact.{}: ends of {other} {lie} over faces of {own}, whose nodes carry the law: as they slide, pressures of nodes near these ends may \
          be many times too large, though not the forces{worn}; {remedy}",

@@ -108,8 +108,9 @@ pub(super) fn resultants(table: &Table, [dimension, of_units]: [usize; 2]) -> Re
                 (rotation, "rotation of the obstacle", &[rotation], "time"),
                 ("moment_over_rotation", "moment about the origin", &moments, rotation),
             ] {
-                let Some(first) = columns.first() else { continue };
-                let unit = RESULTANTS.unit(first, of_units);
+                // In two dimensions there is a moment about z only.
+                let Some(last) = columns.last() else { continue };
+                let unit = RESULTANTS.unit(last, of_units);
                 let name = format!("{name}_{number}");
                 let what = format!("{source}, {quantity}");
                 let drawn = ChartColumns { name: &name, what: &what, source, quantity, unit, columns, over };

@@ -52,7 +52,7 @@ use crate::laws::step::quantity;
 pub use crate::laws::step::{Blend, Evaluation, Moment, Quantity, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    ASTRAY, CONTACT, COUNTS, Carried, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy,
+    CONTACT, COUNTS, Carried, Closeness, Contact, ContactAreas, ContactConditions, ContactEnergy,
     ContactNode, EJECTED, Ejection, Freedom, Friction, Gaps, HeldNode, LoadedMotion, OBSTACLE_KINETIC,
     OBSTACLE_NUMERICAL, OBSTACLE_WORK, OVERRUN, PointCount, PointState, Quadrature, ReferenceValues,
     SLIP_BETWEEN_PAIRINGS, STORED_IN_CONTACT, Touch, choose_unknowns, contact_nodes, set_walls, tangents,

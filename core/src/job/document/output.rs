@@ -32,7 +32,8 @@ pub struct Output {
     /// Whether the errors of the state at the end are estimated, relative to the state in the norm of energy: that of the stress by
     /// the mesh, with the error indicator, and that of stress and velocity by the time steps. For the latter the run is repeated
     /// without output, with steps two and four times as long, which takes about three quarters of its time; where it can't have
-    /// longer steps, with steps half as long, which takes twice its time.
+    /// longer steps, with steps half as long, which takes twice its time. Not included is the error of bodies that slide along each other
+    /// with `sliding = "finite"`: what nodes face is found anew after a quarter of a facet, whatever the steps.
     pub error_estimate: bool,
     /// Further fields that are written with the others.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -21,7 +21,8 @@ pub struct Closeness {
     pub moved: f64,
     /// Largest change in m of the gap of such a point by that.
     pub shift: f64,
-    /// The same as a share of the spread of the normal displacements of the boundary.
+    /// The same as a share of the spread of the normal displacements of the boundary, or the standard deviation of these changes as a share of
+    /// that of the displacements under pressure, whichever is larger.
     pub shift_to_spread: f64,
     /// Largest inclination in rad of the resultant of the pressures to the obstacle where such changes are not negligible.
     pub inclination: f64,

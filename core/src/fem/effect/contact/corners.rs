@@ -13,7 +13,7 @@ use super::{
     Contact,
     edge::{ACROSS, ALONG, Edge, nearest_in_cone, sine},
     point::{Point, Vectors::Body},
-    tangential_point::{TangentialPoint, tangents_of},
+    tangential_point::TangentialPoint,
 };
 use crate::{
     fem::space::{Held, SurfacePoint, surface_points},
@@ -94,9 +94,7 @@ impl<const D: usize> Contact<D> {
             let mut friction = Cow::Borrowed(friction);
             let point = &self.normal.points[friction.at];
             if let Some(edge) = &point.edge {
-                let (point, friction) = (point.at_all_times(), friction.to_mut());
-                (friction.tangents, friction.count, friction.all) = tangents_of(&point, edge.frame);
-                friction.weight = point.weight;
+                friction.to_mut().turn(&point.at_all_times(), edge.frame);
             }
             friction
         })
@@ -112,8 +110,7 @@ impl<const D: usize> Contact<D> {
         for friction in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
             let point = &points[friction.at];
             if let Some(edge) = &point.edge {
-                (friction.tangents, friction.count, friction.all) = tangents_of(point, edge.frame);
-                friction.weight = point.weight;
+                friction.turn(point, edge.frame);
             }
         }
     }

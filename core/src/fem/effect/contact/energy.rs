@@ -68,7 +68,11 @@ impl<const D: usize> Contact<D> {
             let found_deeper = found_deeper(law, point);
             let lost = match energies {
                 Some(_) => lost_at_wall(law, pressure, [point.penetration_before - found_deeper, after]),
-                None => times(pressure, after - (before - found_deeper)),
+                // As the work on an obstacle that moves.
+                None => {
+                    let pressure = if point.growth == 0.0 { pressure } else { mean };
+                    times(pressure, after - (before - found_deeper))
+                }
             };
             let stored = energies.filter(|_| !self.follows_surface).map_or(0.0, |energies| {
                 point.weight * (energies.0 - energies.1) + (point.weight - point.weight_before) * energies.1

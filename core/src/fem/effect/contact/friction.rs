@@ -16,6 +16,10 @@
 //! Where a support holds a node along some of the tangents, the sliding velocity has a known part `w` there, and the law is a radial graph of
 //! the free part `r`: `q = g(V) r / V` with `V = |r + w|` ([`FrictionBound::resolve_beside`](crate::laws::contact::FrictionBound)). The
 //! support takes up `g(V) w / V`.
+//!
+//! In 2D a support may hold a direction `h` that is neither along the obstacle nor across it. A node at the surface of the obstacle then slides
+//! along the tangent `t` with the known velocity `(v - w) . h / (t . h)`, and friction has a part along the direction `m` in which the node
+//! moves: `g t . m` beside the part `p f` of the pressure. Its derivative by the pressure is the `drag` of the [`Point`].
 
 use super::{
     point::{
@@ -23,7 +27,7 @@ use super::{
         Vectors::{self, Body, Newton},
     },
     reference::{ReferenceValues, worst},
-    tangential_point::{ROUNDING, Tangent, TangentialPoint, held_part_of_normal, tangents_of},
+    tangential_point::{ROUNDING, Tangent, TangentialPoint},
 };
 use crate::{
     error::{Error, Result},
@@ -56,9 +60,6 @@ pub struct Friction<const D: usize> {
     pub(super) slip: Option<NodeHistory>,
     /// Nodes that this rank owns.
     pub(super) owned: usize,
-    /// Tangents that supports hold in part, because they hold a part of the normal, beside free ones, with the points of the contact;
-    /// empty where the obstacle does not move.
-    pub(super) partly_held: Vec<(usize, Vector<D>)>,
 }
 
 /// The state of a point with friction.
@@ -82,14 +83,8 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Applies the law to the points of a contact; refuses supports that leave no unique tangent, and missing pressure.
-    pub(super) fn new(
-        law: FrictionLaw,
-        points: &[Point<D>],
-        obstacle_moves: bool,
-        mesh: &Mesh<D>,
-        held: &Held<D>,
-    ) -> Result<Self> {
-        let (mut out, mut partly_held) = (Vec::new(), Vec::new());
+    pub(super) fn new(law: FrictionLaw, points: &[Point<D>], mesh: &Mesh<D>, held: &Held<D>) -> Result<Self> {
+        let mut out = Vec::new();
         for (at, point) in points.iter().enumerate() {
             let node = point.node();
             if held.frame(node).1 == 0 {
@@ -101,21 +96,15 @@ impl<const D: usize> Friction<D> {
                     "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, on which this friction law depends; free the normal component there, or use tresca"
                 )));
             }
-            let (tangents, count, all) = tangents_of(point, held.frame(node));
-            let (held_normal, size) = held_part_of_normal(point);
-            if obstacle_moves && count > 0 && size > 0.0 {
-                let tangent: Vector<D> =
-                    std::array::from_fn(|i| point.free_length * held_normal[i] - size * point.direction[i]);
-                partly_held.push((at, tangent));
-            }
-            out.push(TangentialPoint {
+            let mut new = TangentialPoint {
                 at,
                 numbers: [node; 2],
                 weight: point.weight,
-                tangents,
-                count,
+                tangents: [[0.0; D]; D],
+                count: 0,
+                leaning: [0.0; D],
                 follows: true,
-                all,
+                all: 0,
                 is_carried: false,
                 obstacle: [0.0; D],
                 obstacle_speed: 0.0,
@@ -128,7 +117,9 @@ impl<const D: usize> Friction<D> {
                 held_traction: [0.0; D],
                 tangent: Tangent::free(),
                 change: [0.0; D],
-            });
+            };
+            new.turn(point, held.frame(node));
+            out.push(new);
         }
         let follows = law.follows_pressure();
         let mut found = Self {
@@ -141,7 +132,6 @@ impl<const D: usize> Friction<D> {
             points: out,
             slip: None,
             owned: mesh.owned,
-            partly_held,
         };
         found.update_places(points);
         Ok(found)
@@ -427,6 +417,28 @@ impl<const D: usize> Friction<D> {
     /// Adds the forces of the last evaluation.
     pub(super) fn add_forces(&self, forces: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Newton, point.weight, &point.traction, forces));
+        for point in self.points.iter().filter(|point| point.leans()) {
+            point.add(Newton, point.weight, &point.leaning_traction(), forces);
+        }
+    }
+
+    /// Sets the drag of the points where friction leans toward the normal: its force there per pressure, at the known sliding velocity.
+    /// `values` are velocities or unknowns, which are the same in the directions that supports hold.
+    pub(super) fn set_drags(&self, points: &mut [Point<D>], vectors: Vectors, values: &[f64]) {
+        for sliding in self.points.iter().filter(|sliding| sliding.leans()) {
+            let (point, velocity) = (&mut points[sliding.at], sliding.held_sliding(vectors, values));
+            point.drag = if self.follows { self.drag(sliding, point, &velocity) } else { 0.0 };
+        }
+    }
+
+    /// The drag of a point with this known sliding velocity, if the bound follows the pressure.
+    pub(super) fn drag(&self, sliding: &TangentialPoint<D>, point: &Point<D>, velocity: &Vector<D>) -> f64 {
+        let speed = norm(velocity);
+        if speed == 0.0 || !self.law.follows_pressure() {
+            return 0.0;
+        }
+        let rise = self.law.by_pressure(speed, point.pressure, sliding.context);
+        rise * dot(velocity, &sliding.tangents[0]) / speed * dot(&sliding.leaning, &point.direction)
     }
 
     /// Adds the change of the forces along the last direction.
@@ -694,6 +706,7 @@ mod tests {
             weight: 1.0,
             tangents: [tangent, [0.0; 2]],
             count: 1,
+            leaning: [0.0; 2],
             follows: true,
             all: 1,
             obstacle: [0.0; 2],
@@ -718,7 +731,6 @@ mod tests {
             points: vec![point],
             slip: None,
             owned: 1,
-            partly_held: Vec::new(),
         }
     }
 

@@ -80,7 +80,7 @@ pub use friction::Friction;
 pub use loaded_obstacle::{Freedom, LoadedMotion, OBSTACLE_KINETIC, OBSTACLE_NUMERICAL, OBSTACLE_WORK};
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
-pub use sweep::{ASTRAY, EJECTED, OVERRUN, SLIP_BETWEEN_PAIRINGS, Touch};
+pub use sweep::{EJECTED, OVERRUN, SLIP_BETWEEN_PAIRINGS, Touch};
 pub use tangential_point::tangents;
 pub use unknowns::{choose_unknowns, set_walls};
 
@@ -112,6 +112,8 @@ pub struct Contact<const D: usize> {
     pub closeness: Closeness,
     /// The speed in m/s of compression waves, of the slowest material at its points; none where they have no mass, or the law is no bound.
     pub wave_speed: Option<f64>,
+    /// The size in m of the smallest facets, where the points have no mass although the body has: constraints deform the cells there.
+    pub layer: Option<f64>,
     /// The blend of earlier states from which the current step starts.
     blend: Blend,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
@@ -183,6 +185,7 @@ impl<const D: usize> Contact<D> {
             shares_of_heat: [1.0, 0.0],
             closeness: Closeness::default(),
             wave_speed: None,
+            layer: None,
             blend: Blend::euler(0.0),
             reference,
             facets: facets.to_vec(),
@@ -213,8 +216,6 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &mut self.friction {
             friction.points.retain(|point| !given.contains(&point.at));
             friction.points.iter_mut().for_each(|point| point.at = after(point.at));
-            friction.partly_held.retain(|(at, _)| !given.contains(at));
-            friction.partly_held.iter_mut().for_each(|(at, _)| *at = after(*at));
         }
         let mut number = 0..;
         self.normal.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));

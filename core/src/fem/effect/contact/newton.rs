@@ -123,6 +123,7 @@ impl<const D: usize> Contact<D> {
         }
         if let Some(friction) = &mut self.friction {
             friction.linearise(&self.normal.points, unknowns);
+            friction.set_drags(&mut self.normal.points, Newton, unknowns);
             friction.keep_share_of_decreases(softening);
         }
     }
@@ -180,7 +181,7 @@ impl<const D: usize> Contact<D> {
         for point in self.normal.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let change = if point.theta == 0.0 {
                 point.share(Newton, open)
-                    / (self.normal.scale * point.weight * point.free_length * point.free_length)
+                    / (self.normal.scale * point.weight * point.free_length * point.resistance())
             } else {
                 (1.0 / point.theta - 1.0) * point.along(Newton, values)
             };
@@ -226,6 +227,6 @@ fn add_changes<const D: usize>(
             Unknown::Velocity => point.slope * point.normal_component(Newton, direction),
             Unknown::Held | Unknown::Stop => continue,
         };
-        point.add_force(Newton, change, forces);
+        point.add_change(change, forces);
     }
 }

@@ -144,6 +144,9 @@ pub(super) struct Point<const D: usize> {
     pub slope: f64,
     /// Change of the pressure along the last direction, in Pa.
     pub change: f64,
+    /// The force of friction along `direction` per pressure and weight, where friction leans toward the normal and follows the pressure, see
+    /// `friction.rs`; 0 elsewhere.
+    pub drag: f64,
 }
 
 impl<const D: usize> Point<D> {
@@ -192,6 +195,7 @@ impl<const D: usize> Point<D> {
             theta: 1.0,
             slope: 0.0,
             change: 0.0,
+            drag: 0.0,
         };
         let force =
             |node: u32, share: f64| held.free_part(node as usize, &normal).map(|n| weight * share * n);
@@ -501,6 +505,21 @@ impl<const D: usize> Point<D> {
         law.resolve_worn(scale * self.free_length * along + scale * self.carried, scale, self.context)
     }
 
+    /// The force along `direction` per pressure and weight, with friction that leans toward the normal.
+    pub(super) fn resistance(&self) -> f64 {
+        self.free_length + self.drag
+    }
+
+    /// Adds the force in N of the change of a pressure in Pa, with friction that leans toward the normal.
+    #[inline]
+    pub(super) fn add_change(&self, pressure: f64, forces: &mut [f64]) {
+        self.add_force(Vectors::Newton, pressure, forces);
+        if self.drag != 0.0 {
+            let target = &mut forces[self.first(Vectors::Newton) * D..][..D];
+            (0..D).for_each(|i| target[i] += pressure * self.weight * self.drag * self.direction[i]);
+        }
+    }
+
     /// Sets slope and ratio of changes, given the scale `c` and the derivative of the velocity with respect to the parameter of the graph in
     /// m/(Pa s). Where the graph has no slope, nothing holds the point: neither do rounding errors of the derivative.
     pub(super) fn linearise(&mut self, scale: f64, derivative: f64) {
@@ -590,7 +609,7 @@ impl<const D: usize> Point<D> {
             let at = self.first(Vectors::Newton) * D;
             let is_there = residual.get(at..at + D).is_some();
             return if is_there {
-                self.share(Vectors::Newton, residual) / (self.weight * self.free_length)
+                self.share(Vectors::Newton, residual) / (self.weight * self.resistance())
             } else {
                 0.0
             };

@@ -1,6 +1,10 @@
 //! Preparation of a step at the points of a contact. Vectors are those of the body.
 
-use super::{Contact, point::Vectors::Body, tangential_point::ROUNDING};
+use super::{
+    Contact,
+    point::Vectors::Body,
+    tangential_point::{ROUNDING, held_part_of_normal},
+};
 use crate::{
     error::{Error, Result},
     fem::effect::{Blend, Step},
@@ -106,12 +110,19 @@ impl<const D: usize> Contact<D> {
             point.pressure_before = point.pressure;
         }
         if let Some(friction) = &mut self.friction {
+            friction.points.iter().filter(|sliding| sliding.leans()).for_each(|sliding| {
+                let point = &mut self.normal.points[sliding.at];
+                point.pressure -= dot(&sliding.parts_of(traction).1, &point.direction);
+                point.pressure_before = point.pressure;
+                point.drag = 0.0;
+            });
             friction.restore_pressures(&self.normal.points, traction);
         }
     }
 
     /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that hold a part of the normal
     /// of a point where the obstacle moves across a free tangent: friction along this motion would also act on the free part of the normal.
+    /// Without a free tangent, in 2D, it does.
     pub(super) fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {
         self.obstacle.rate = rate;
         self.obstacle.set_arms(&self.normal.points);
@@ -130,9 +141,25 @@ impl<const D: usize> Contact<D> {
         for point in &mut friction.points {
             point.set_obstacle(&velocity(point.at));
         }
-        for (at, tangent) in &friction.partly_held {
-            let (point, velocity) = (&points[*at], velocity(*at));
-            let along = dot(tangent, &velocity);
+        for sliding in friction.points.iter().filter(|sliding| sliding.leans()) {
+            let point = &points[sliding.at];
+            let drag = friction.drag(sliding, point, &sliding.obstacle.map(|x| -x));
+            if point.context.penetration >= 0.0 && drag <= -point.free_length {
+                return Err(Error::Failed(format!(
+                    "friction at {:?} m: a support guides the node along {:?}, and friction on the obstacle, which moves past it at t = {} s and is inclined to this direction, holds the node fast there; free the component that the support holds, or take less friction or inclination",
+                    point.place, point.direction, rate.time
+                )));
+            }
+        }
+        // In 2D friction that leans toward the normal is part of the equations.
+        for sliding in friction.points.iter().filter(|sliding| sliding.is_free()) {
+            let (point, velocity) = (&points[sliding.at], velocity(sliding.at));
+            let (held_normal, size) = held_part_of_normal(point);
+            if size == 0.0 {
+                continue;
+            }
+            let along =
+                point.free_length * dot(&held_normal, &velocity) - size * dot(&point.direction, &velocity);
             if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
                 return Err(Error::Refused(format!(
                     "friction at {:?} m: a support holds a direction that is neither along the boundary nor across it, and the obstacle moves there (at {along} m/s at t = {} s); hold all components there, or exclude the facets around by the `where` of the contact",

@@ -106,17 +106,21 @@ impl<const D: usize> Contact<D> {
         for (at, point) in self.normal.points.iter().enumerate() {
             let mut state =
                 PointState { normal: point.normal, direction: point.direction, ..PointState::default() };
+            let mut leaning = 0.0;
             while let Some((number, (tangential, sliding))) = moving.next_if(|(_, (of, _))| of.at == at) {
                 state.slip = friction.map_or(0.0, |friction| friction.slip_of(number));
                 state.sliding = sliding.map(|speed| speed / point.stretch);
                 let (free, held) = tangential.parts_of(traction);
+                if tangential.leans() {
+                    leaning = dot(&held, &point.direction);
+                }
                 state.friction = add_scaled(&free, 1.0, &held);
                 state.sticks = motions.next().map(|(motion, _)| motion == FrictionStatus::Sticks);
             }
             if point.carries(&self.normal.law) {
                 let along = point.velocity_along_normal(Body, velocity);
                 if point.unknown.has_pressure() {
-                    state.pressure = point.pressure_in(traction);
+                    state.pressure = point.pressure_in(traction) - leaning;
                     let parameter = self.normal.scale * along + state.pressure;
                     state.branch =
                         self.normal.law.resolve_worn(parameter, self.normal.scale, point.context).branch;

@@ -32,8 +32,7 @@ impl<const D: usize> Contact<D> {
                 "friction is not available at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
-        self.friction =
-            Some(Friction::new(law, &self.normal.points, self.obstacle.surface_may_move(), mesh, held)?);
+        self.friction = Some(Friction::new(law, &self.normal.points, mesh, held)?);
         Ok(())
     }
 

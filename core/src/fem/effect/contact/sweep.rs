@@ -18,7 +18,13 @@ use crate::{
 /// A displacement of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
 /// Changes of gaps by motions along an obstacle are negligible up to this share of the body's size.
-pub const ASTRAY: f64 = 1e-4;
+const ASTRAY: f64 = 1e-4;
+/// Those of the shape of gaps under pressure are negligible up to this share of the size of the part under pressure.
+const LEAST_CHANGE: f64 = 1e-5;
+/// Points under pressure from which on their displacements show the shape of the obstacle.
+const LEAST_POINTS: f64 = 5.0;
+/// The share of the spread of the normal displacements of a boundary that their deviation under pressure counts as at least: there it may be flat.
+const LEAST_INDENTATION: f64 = 0.1;
 /// The part of such a motion along which the slope of the obstacle is taken.
 const NEARBY: f64 = 1e-3;
 
@@ -196,7 +202,7 @@ impl<const D: usize> Contact<D> {
 
     /// Whether points with mass that are inside of the obstacle are out of it at the end of a step, however short.
     pub fn ejects(&self) -> bool {
-        self.wave_speed.is_some()
+        self.wave_speed.is_some() && self.layer.is_none()
     }
 
     /// How the obstacle ejects a point in the step just solved. What overlaps before the first step is known before it.
@@ -277,6 +283,13 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// The nodes of its points in their order, with the pressure in Pa and the part of the surface in m^(D-1) for which each stands, in the
+    /// step just solved, at its velocities with ghosts.
+    pub fn pressures(&self, velocity: &[f64]) -> impl Iterator<Item = (usize, [f64; 2])> {
+        let pressure = |point: &Point<D>| point.pressure_at(&self.normal.law, Body, velocity);
+        self.normal.points.iter().map(move |point| (point.node(), [pressure(point), point.area()]))
+    }
+
     /// Keeps how far points with pressure have moved along an obstacle until the step just solved, and what that changes at their gaps, which
     /// are those of the undeformed body (`sliding = "small"`), and how the pressure is then inclined to the obstacle; at displacements and
     /// velocities at its end. Collective.
@@ -288,6 +301,8 @@ impl<const D: usize> Contact<D> {
         let mut most = [f64::NEG_INFINITY; 4];
         // The tangential part of the pressures, and their sum.
         let mut force = [0.0; 4];
+        // Of the points under pressure: their number, their area, and the integrals of the changes and the normal displacements and of their squares.
+        let mut under_pressure = [0.0; 6];
         for point in self.normal.points.iter().filter(|point| point.undeformed().is_none()) {
             let along = point.normal_component(Body, displacement);
             let (mut moved, mut shift) = (0.0, 0.0);
@@ -305,8 +320,13 @@ impl<const D: usize> Contact<D> {
                         force[3] += normal.abs();
                     }
                 }
-                shift = (self.obstacle.reach_from(point, &seen).unwrap_or(f64::INFINITY) - point.reach).abs();
-                shift = if shift.is_finite() { shift } else { moved };
+                let change = self.obstacle.reach_from(point, &seen).unwrap_or(f64::INFINITY) - point.reach;
+                shift = if change.is_finite() { change.abs() } else { moved };
+                if change.is_finite() {
+                    let w = point.weight;
+                    let terms = [1.0, w, w * change, w * change * change, w * along, w * along * along];
+                    under_pressure.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+                }
             }
             for (most, value) in most.iter_mut().zip([moved, shift, -along, along]) {
                 *most = larger(*most, value);
@@ -315,13 +335,22 @@ impl<const D: usize> Contact<D> {
         let [moved, shift, lowest, highest] = session.largest(most);
         let spread = (lowest + highest).max(ROUNDING * self.normal.body_size);
         let [x, y, z, normal] = session.sum(force);
+        let [count, area, changes @ .., displacements, of_squares] = session.sum(under_pressure);
+        let deviation =
+            |[sum, of_squares]: [f64; 2]| larger(of_squares / area - (sum / area) * (sum / area), 0.0).sqrt();
         let kept = &mut self.closeness;
         if shift > ASTRAY * self.normal.body_size && normal > 0.0 {
             kept.inclination = larger(kept.inclination, norm(&[x, y, z]) / normal);
+            kept.shift_to_spread = larger(kept.shift_to_spread, shift / spread);
+        }
+        // What a motion changes in the shape of the gaps under pressure, beside what the pressures have changed in it.
+        let extent = if D == 2 { area } else { area.sqrt() };
+        if count >= LEAST_POINTS && deviation(changes) > LEAST_CHANGE * extent {
+            let indented = larger(deviation([displacements, of_squares]), LEAST_INDENTATION * spread);
+            kept.shift_to_spread = larger(kept.shift_to_spread, deviation(changes) / indented);
         }
         kept.moved = larger(kept.moved, moved);
         kept.shift = larger(kept.shift, shift);
-        kept.shift_to_spread = larger(kept.shift_to_spread, shift / spread);
         Ok(())
     }
 

@@ -27,6 +27,10 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Orthonormal; of the `all` that are used, the first `count` are free, and supports hold the others.
     pub tangents: [Vector<D>; D],
     pub count: usize,
+    /// In 2D, where a support holds a direction that is neither along the surface of the obstacle nor across it: the part of the only tangent
+    /// along which the node moves, as it does along the normal. The tangent counts as held; friction along it also acts on the node. Zero
+    /// elsewhere.
+    pub leaning: Vector<D>,
     /// Whether its unknown is relative to the obstacle.
     pub follows: bool,
     pub all: usize,
@@ -105,8 +109,30 @@ impl<const D: usize> TangentialPoint<D> {
         let is_turned =
             self.tangents[..self.count].iter().any(|tangent| dot(tangent, &point.direction).abs() > ROUNDING);
         if is_turned {
-            (self.tangents, self.count, self.all) = tangents_of(point, held.frame(point.node()));
+            self.turn(point, held.frame(point.node()));
         }
+    }
+
+    /// Takes the tangents and the weight of a point, from an orthonormal basis at its node of which so many directions are free; these come
+    /// first.
+    pub(super) fn turn(&mut self, point: &Point<D>, (frame, free): ([Vector<D>; D], usize)) {
+        let (held_normal, size) = held_part_of_normal(point);
+        let (tangents, count) = span_without(&frame[..free], &[point.direction]);
+        (self.tangents, self.count, self.leaning, self.weight) = (tangents, count, [0.0; D], point.weight);
+        let (mut held_tangents, held_count) = span_without(&frame[free..], &[held_normal]);
+        self.all = count + held_count;
+        if D == 2 && self.all == 0 && size > 0.0 {
+            held_tangents[0] =
+                add_scaled(&held_normal.map(|x| point.free_length * x), -size, &point.direction);
+            self.leaning = point.direction.map(|x| -size * x);
+            self.all = 1;
+        }
+        self.tangents[count..self.all].copy_from_slice(&held_tangents[..self.all - count]);
+    }
+
+    /// Whether friction acts on it along its normal, too.
+    pub(super) fn leans(&self) -> bool {
+        self.leaning != [0.0; D]
     }
 
     /// Removes from the free tangents the components along this direction, which is free.
@@ -168,14 +194,27 @@ impl<const D: usize> TangentialPoint<D> {
         part(&self.tangents[..self.count], vector)
     }
 
-    /// The part of a vector along the tangents that supports hold.
+    /// The part of a vector along the tangents that supports hold. Of one that leans, the vector along it that has the same part in the
+    /// direction that a support holds: with this velocity it slides past a node that stays at the surface of the obstacle.
     pub(super) fn held_part(&self, vector: &Vector<D>) -> Vector<D> {
-        part(&self.tangents[self.count..self.all], vector)
+        let held = &self.tangents[self.count..self.all];
+        if !self.leans() {
+            return part(held, vector);
+        }
+        let direction = add_scaled(&held[0], -1.0, &self.leaning);
+        let share = dot(&direction, vector) / dot(&direction, &direction);
+        held[0].map(|x| share * x)
+    }
+
+    /// The part of the held traction in Pa that acts on the node where friction leans toward its normal.
+    pub(super) fn leaning_traction(&self) -> Vector<D> {
+        let along = dot(&self.held_traction, &self.tangents[self.count]);
+        self.leaning.map(|x| along * x)
     }
 
     /// Sets the velocity of the obstacle in m/s, given that of its material point.
     pub(super) fn set_obstacle(&mut self, velocity: &Vector<D>) {
-        self.obstacle = part(&self.tangents[..self.all], velocity);
+        self.obstacle = add_scaled(&self.free_part(velocity), 1.0, &self.held_part(velocity));
         self.obstacle_speed = norm(velocity);
     }
 
@@ -218,9 +257,14 @@ impl<const D: usize> TangentialPoint<D> {
         (self.free_part(&traction), self.held_part(&traction))
     }
 
-    /// The power in W/m2 of supports against friction, at a nodal velocity of the body.
+    /// The power in W/m2 of supports against friction, at a nodal velocity of the body; without what friction that leans does on the body.
     pub(super) fn power_of_supports(&self, velocity: &[f64]) -> f64 {
-        dot(&self.held_traction, &self.value(Body, velocity))
+        let velocity = self.value(Body, velocity);
+        if self.leans() {
+            return dot(&self.held_traction, &self.held_part(&velocity))
+                - dot(&self.leaning_traction(), &velocity);
+        }
+        dot(&self.held_traction, &velocity)
     }
 
     /// Adds to a nodal value.
@@ -247,19 +291,6 @@ impl<const D: usize> TangentialPoint<D> {
                 + (slopes[0] * ahead + coefficient * pressed) * toward[i]
         })
     }
-}
-
-/// The tangents of a point: those that are free, and then those that supports hold, with the numbers of the former and of all, from an
-/// orthonormal basis at its node of which so many directions are free; these come first.
-pub(super) fn tangents_of<const D: usize>(
-    point: &Point<D>,
-    (frame, free): ([Vector<D>; D], usize),
-) -> ([Vector<D>; D], usize, usize) {
-    let (mut tangents, count) = span_without(&frame[..free], &[point.direction]);
-    let (held_tangents, held_count) = span_without(&frame[free..], &[held_part_of_normal(point).0]);
-    let all = count + held_count;
-    tangents[count..all].copy_from_slice(&held_tangents[..held_count]);
-    (tangents, count, all)
 }
 
 /// The direction of the part of the normal at a point that supports hold, and its size; zero if it is a rounding error.
