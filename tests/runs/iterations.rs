@@ -75,7 +75,26 @@ fn multigrid_takes_as_many_iterations_as_it_did() {
         on = ['bottom']
         normal.graph = {points = [[0.0, -5.0], [0.0, 5.0]], slope_before = 10.0, slope_after = 10.0}",
     ));
+    let sliding = gamg(Case::written_as(
+        "
+        mesh.rectangle = [{name = 'lower', size = [1, 0.5], cells = [32, 16], grading = {x = 1.2, toward = ['left']}},
+                          {name = 'upper', corner = [0, 0.5], size = [1, 0.5], cells = [32, 16]}]
+        time = {scheme = 'bdf2', end = 0.125, step = 0.015625}
+        support = [{on = ['lower.bottom'], fix = 'all'}]
+        traction = [{on = ['upper.top'], value = ['min(40*t, 4)', -10]}]
+        [material]
+        hypothesis = 'plane_strain'
+        density = 1
+        elasticity = {youngs_modulus = 1000, poisson_ratio = 0.3}
+        [[contact]]
+        on = ['upper.bottom']
+        against = ['lower.top']
+        side = 'on'
+        normal.unilateral = {}
+        friction.coulomb.coefficient = 0.3",
+    ));
     assert_counts(&[
+        ("blocks that slide", &sliding.set("solver.tolerance", "1e-8"), 1, [31.0, 407.0]),
         ("sticking block", &sticking.set("solver.tolerance", "1e-10"), 1, [12.0, 145.0]),
         ("square", &square, 1, [66.0, 447.0]),
         ("cube", &cube, 2, [17.0, 98.0]),
