@@ -103,7 +103,7 @@ pub(super) fn warnings_of_edges<const D: usize, const S: usize>(
 }
 
 /// What lets the other side of a pair carry the law, if little presses at the ends of this one at the end of a run. Collective.
-fn exchange_of_sides<const D: usize, const S: usize>(
+pub(super) fn exchange_of_sides<const D: usize, const S: usize>(
     session: &Session,
     (body, pair): (&Body<D, S>, &Pair<D>),
     state: &State,
@@ -174,22 +174,21 @@ pub(super) fn warnings_of_carriers<const D: usize>(
 }
 
 /// The warning about a pair whose nodes were pressed by corners and edges of the other side in a run, or came under its ends, given the
-/// largest angle in rad of edges over them and 1 if there were ends; none if the warning before the run was the same. Collective.
-pub(super) fn warning_of_run<const D: usize, const S: usize>(
-    session: &Session,
+/// largest angle in rad of edges over them and 1 if there were ends; none if the warning before the run was the same. `remedy` finds what
+/// lets the other side carry the law, on all ranks alike.
+pub(super) fn warning_of_run<const D: usize>(
     job: &Job,
-    (body, pair): (&Body<D, S>, &Pair<D>),
-    state: &State,
+    (pair, contact): (&Pair<D>, &Contact<D>),
     [sharpness, ends]: [f64; 2],
+    remedy: impl FnOnce() -> Result<Option<String>>,
 ) -> Result<Option<String>> {
     if sharpness > EDGE {
         return Ok(Some(words_of_edges(job, pair, ("pressed", None))));
     }
-    if ends == 0.0 || pair.has_ends || !is_rigid(&body.contacts[pair.contact]) {
+    if ends == 0.0 || pair.has_ends || !is_rigid(contact) {
         return Ok(None);
     }
-    let remedy = exchange_of_sides(session, (body, pair), state)?;
-    Ok(Some(words_of_ends(job, pair, ("came to lie", remedy))))
+    Ok(Some(words_of_ends(job, pair, ("came to lie", remedy()?))))
 }
 
 /// Whether the law of a contact bounds the gap: pressures jump where nodes begin to carry it.

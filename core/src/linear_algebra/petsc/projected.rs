@@ -36,7 +36,8 @@ pub struct ProjectedKsp {
     reduced: Option<ReducedMatrix>,
     /// Work space for the columns of the projection of each node.
     columns: Vec<DistributedVector>,
-    /// Whether multigrid is restricted to the subspace of the solve.
+    /// Whether multigrid is to be restricted to the subspace of each solve, and whether it is to that of the present one.
+    restricts: bool,
     restricted: bool,
     block: usize,
     tolerances: (f64, f64, usize),
@@ -88,6 +89,7 @@ impl ProjectedKsp {
             stiffened: None,
             reduced: None,
             columns: Vec::new(),
+            restricts: true,
             restricted: false,
             block,
             tolerances: (1e-5, 0.0, 10_000),
@@ -130,6 +132,11 @@ impl ProjectedKsp {
     /// subspace.
     pub fn set_refresh_threshold(&mut self, iterations: usize) {
         self.refresh_threshold = iterations;
+    }
+
+    /// Lets multigrid act on the whole space in all solves.
+    pub fn keep_multigrid_whole(&mut self) {
+        self.restricts = false;
     }
 
     /// Sets the constant matrix and sets up its preconditioner. Collective.
@@ -243,7 +250,7 @@ impl ProjectedKsp {
 
     /// Restricts multigrid to the current subspace; returns whether it can be. Collective.
     fn restrict(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<bool> {
-        self.restricted = self.ksp.can_be_restricted() && operator.may_project();
+        self.restricted = self.restricts && self.ksp.can_be_restricted() && operator.may_project();
         if self.restricted {
             while self.columns.len() < self.block {
                 self.columns.push(like.like()?);

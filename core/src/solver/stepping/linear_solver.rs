@@ -96,14 +96,13 @@ impl Preconditioner {
         }
     }
 
-    /// Number of iterations that take as long as rebuilding it for the motions that contact leaves free; in 3D rebuilding never pays
-    /// (measured, see docs/contact-preconditioner.md), and GAMG is restricted to these motions instead.
+    /// Number of iterations that take as long as rebuilding it for the motions that contact leaves free, where it is not restricted to these;
+    /// in 3D rebuilding never pays (measured, see docs/contact-preconditioner.md).
     pub(super) fn refresh_threshold(self, dimension: usize) -> usize {
         match self {
             _ if dimension == 3 => usize::MAX,
             Self::Auto | Self::Cholesky => 5,
-            Self::Gamg => usize::MAX,
-            Self::Boomeramg => 40,
+            Self::Gamg | Self::Boomeramg => 40,
         }
     }
 

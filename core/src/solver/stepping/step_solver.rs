@@ -237,7 +237,7 @@ impl StepSolver {
             None
         };
         let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
-        let rigid_motions = if is_multigrid { body.common_rigid_motions() } else { None };
+        let rigid_motions = if is_multigrid && !has_coarse { body.common_rigid_motions() } else { None };
         let precision = self.precision;
         let assembled = Assembled { matrix, rows, precision, coordinates, rigid_motions, coarse };
         if !solver.prepare(session, assembled)? {

@@ -32,6 +32,9 @@ struct Kind {
     ranks: usize,
     /// Whether steps are linear, with neither contact nor flow.
     is_linear: bool,
+    /// Whether multigrid acts on the motions that contact leaves free: not on those of middle nodes relative to another body, which are
+    /// no part of linear fields.
+    restricts: bool,
     /// A factor that ranks share, not yet computed, if it is the preconditioner.
     factor: Option<SharedFactor>,
 }
@@ -53,13 +56,14 @@ impl Whole {
             order: body.mesh.order(),
             ranks: session.ranks(),
             is_linear: body.contacts.is_empty() && !body.flows(),
+            restricts: body.coupling.is_none() || body.mesh.order() == 1,
             factor,
         };
         Self::of(Rc::new(kind), like)
     }
 
     fn of(kind: Rc<Kind>, like: &DistributedVector) -> Result<Self> {
-        let Kind { preconditioner, dimension, order, ranks, is_linear, ref factor } = *kind;
+        let Kind { preconditioner, dimension, order, ranks, is_linear, restricts, ref factor } = *kind;
         let mut krylov = ProjectedKsp::new("", like, dimension)?;
         let ksp = krylov.linear_solver();
         preconditioner.configure([order, ranks], factor.as_ref(), ksp)?;
@@ -68,6 +72,9 @@ impl Whole {
         }
         ksp.apply_options()?;
         krylov.set_refresh_threshold(preconditioner.refresh_threshold(dimension));
+        if !restricts {
+            krylov.keep_multigrid_whole();
+        }
         if preconditioner == Preconditioner::Cholesky {
             krylov.set_stiffening_threshold(STIFFENING_THRESHOLD);
         }
