@@ -20,16 +20,26 @@ pub(super) struct BlockTransfer {
     coarse: Rc<OnLevel>,
 }
 
+/// A shell matrix with these products.
+#[derive(Debug)]
+pub(super) struct TransferShell {
+    pub shell: Shell,
+    /// Rows and columns of a block.
+    pub blocks: [usize; 2],
+    /// The columns of other ranks.
+    pub others: Option<Rc<Others>>,
+}
+
 /// The block sizes for which products are compiled.
 const SIZES: [[sys::PetscInt; 2]; 5] = [[2, 2], [2, 3], [3, 3], [3, 6], [6, 6]];
 
 impl BlockTransfer {
-    /// A shell matrix with the products of this matrix in compressed rows and of its transpose, between subspaces of the two levels, with
-    /// its block sizes and its columns of other ranks. `None`, on all ranks alike, for other formats and block sizes. Collective.
+    /// A shell matrix with the products of this matrix in compressed rows and of its transpose, between subspaces of the two levels. `None`, on
+    /// all ranks alike, for other formats and block sizes. Collective.
     pub(super) fn shell(
         matrix: sys::Mat,
         [fine, coarse]: [&Rc<OnLevel>; 2],
-    ) -> Result<Option<(Shell, [usize; 2], Option<Rc<Others>>)>> {
+    ) -> Result<Option<TransferShell>> {
         let mut blocks = [0; 2];
         let [rows, columns] = &mut blocks;
         // SAFETY: live matrix; PETSc writes numbers.
@@ -39,7 +49,8 @@ impl BlockTransfer {
         let Some(own) = own_rows(parts.own, |rows| transfer(sizes, rows))? else { return Ok(None) };
         let others = parts.others(matrix)?.map(Rc::new);
         let action = Self { own, others: others.clone(), fine: fine.clone(), coarse: coarse.clone() };
-        Ok(Some((Shell::new(matrix, Box::new(action))?, sizes, others)))
+        let shell = Shell::new(matrix, Box::new(action))?;
+        Ok(Some(TransferShell { shell, blocks: sizes, others }))
     }
 }
 

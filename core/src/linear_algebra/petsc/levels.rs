@@ -3,9 +3,8 @@
 
 use super::{
     block_product::BlockProduct,
-    block_transfer::BlockTransfer,
+    block_transfer::{BlockTransfer, TransferShell},
     check,
-    compressed_rows::Others,
     reference::Reference,
     shell::Shell,
     subspace::{Fields, OnLevel, Projections},
@@ -26,10 +25,8 @@ pub(super) struct Level {
 /// The interpolation from the coarser level.
 #[derive(Debug)]
 struct Interpolated {
-    shell: Shell,
+    copy: TransferShell,
     original: Reference<sys::_p_Mat>,
-    blocks: [usize; 2],
-    others: Option<Rc<Others>>,
     /// Read at the first solve on a subspace.
     fields: Option<Fields>,
 }
@@ -42,7 +39,9 @@ impl Level {
 
     /// Sets the projection of this level, and returns that of the coarser one. Collective.
     fn restrict(&mut self, projections: Projections) -> Result<Projections> {
-        let Some(Interpolated { original, blocks, others, fields, .. }) = &mut self.transfer else {
+        let Some(Interpolated { copy: TransferShell { blocks, others, .. }, original, fields }) =
+            &mut self.transfer
+        else {
             return Ok(projections);
         };
         let (raw, others) = (original.get(), others.as_deref());
@@ -60,7 +59,7 @@ impl Level {
     pub(super) fn bytes(&self) -> [Option<u64>; 2] {
         [
             self.smoother.as_ref().map(Shell::bytes),
-            self.transfer.as_ref().map(|transfer| transfer.shell.bytes()),
+            self.transfer.as_ref().map(|transfer| transfer.copy.shell.bytes()),
         ]
     }
 }
@@ -111,11 +110,10 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
             }
             let mut interpolation = ptr::null_mut();
             check(sys::PCMGGetInterpolation(pc, number, &mut interpolation))?;
-            let copy = BlockTransfer::shell(interpolation, [&level.fine, &level.coarse])?;
-            if let Some((shell, blocks, others)) = copy {
+            if let Some(copy) = BlockTransfer::shell(interpolation, [&level.fine, &level.coarse])? {
                 let original = Reference::to(interpolation)?;
-                set_interpolation(pc, number, shell.raw.get())?;
-                level.transfer = Some(Interpolated { shell, original, blocks, others, fields: None });
+                set_interpolation(pc, number, copy.shell.raw.get())?;
+                level.transfer = Some(Interpolated { copy, original, fields: None });
             }
             levels.push(level);
         }
