@@ -34,8 +34,10 @@ pub struct ProjectedKsp {
     /// The same with what was added for the preconditioner alone.
     stiffened: Option<Matrix>,
     reduced: Option<ReducedMatrix>,
-    /// Work space for the columns of the projection of each node.
-    columns: Vec<DistributedVector>,
+    /// The columns of the projection of each node, and those to which multigrid is restricted.
+    columns: Vec<[DistributedVector; 2]>,
+    /// Whether multigrid is restricted to any.
+    is_known: bool,
     /// Whether multigrid is to be restricted to the subspace of each solve, and whether it is to that of the present one.
     restricts: bool,
     restricted: bool,
@@ -89,6 +91,7 @@ impl ProjectedKsp {
             stiffened: None,
             reduced: None,
             columns: Vec::new(),
+            is_known: false,
             restricts: true,
             restricted: false,
             block,
@@ -184,7 +187,8 @@ impl ProjectedKsp {
 
     /// Sets up the preconditioner of a matrix on the whole space.
     fn restart_with(&mut self, matrix: &Matrix) -> Result<()> {
-        (self.reduced, self.reducing, self.first, self.restricted) = (None, false, true, false);
+        (self.reduced, self.reducing, self.first) = (None, false, true);
+        (self.restricted, self.is_known) = (false, false);
         self.precondition_with(matrix.raw.get())
     }
 
@@ -253,13 +257,21 @@ impl ProjectedKsp {
         self.restricted = self.restricts && self.ksp.can_be_restricted() && operator.may_project();
         if self.restricted {
             while self.columns.len() < self.block {
-                self.columns.push(like.like()?);
+                self.columns.push([like.like()?, like.like()?]);
             }
-            for (i, column) in self.columns.iter_mut().enumerate() {
+            let mut is_same = self.is_known;
+            for (i, [column, before]) in self.columns.iter_mut().enumerate() {
                 write_unit(column, i, self.block)?;
                 operator.project(column)?;
+                is_same &= column.equals(before)?;
             }
-            self.ksp.restrict(Projections::of(&self.columns)?)?;
+            if !is_same {
+                for [column, before] in &mut self.columns {
+                    before.copy_from(column)?;
+                }
+                self.ksp.restrict(Projections::of(self.columns.iter().map(|[column, _]| column))?)?;
+                self.is_known = true;
+            }
         }
         Ok(self.restricted)
     }

@@ -41,9 +41,9 @@ pub(super) struct Projections {
 
 impl Projections {
     /// The projection with these columns `P e_i`, for each component `i` of a node.
-    pub(super) fn of(columns: &[DistributedVector]) -> Result<Self> {
-        let block = columns.len();
-        let values = columns.iter().map(DistributedVector::owned).collect::<Result<Vec<_>>>()?;
+    pub(super) fn of<'a>(columns: impl Iterator<Item = &'a DistributedVector>) -> Result<Self> {
+        let values = columns.map(DistributedVector::owned).collect::<Result<Vec<_>>>()?;
+        let block = values.len();
         let mut found = Self { block, ..Self::default() };
         for node in 0..values.first().map_or(0, |column| column.len() / block) {
             let mut matrix = Block::default();
