@@ -407,7 +407,7 @@ impl StepMatrix for CondensedMatrix {
 
     fn forget_linearised(&self) {
         let subspace = &mut *self.subspace.borrow_mut();
-        subspace.linearised = None;
+        (subspace.linearised, subspace.is_active) = (None, false);
         if !subspace.additions.is_empty() {
             subspace.additions.clear();
             subspace.projection_blocks.clear();

@@ -72,7 +72,7 @@ pub trait StepMatrix {
         None
     }
 
-    /// Later solves are preconditioned without factors of linearised equations and without additions.
+    /// Later solves are preconditioned without factors of linearised equations, without additions and on the whole space.
     fn forget_linearised(&self) {}
 
     /// Preconditions later solves by factors of these linearised equations, as they are or with soft springs where contact alone holds a
