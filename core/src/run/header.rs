@@ -1,6 +1,6 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{setup::Setup, side_words, steps};
+use super::{sampled_loads, setup::Setup, side_words, steps};
 use crate::{
     error::Result,
     io::output::{
@@ -76,7 +76,8 @@ pub(super) fn lines<const D: usize, const S: usize>(
 /// Warnings about the job, its certificates and its initial state.
 pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &Setup<D, S>) -> Vec<String> {
     let given = loaded.warnings.iter().chain(&ready.verdict.warnings).chain(&ready.warnings).cloned();
-    given.chain(steps::warnings(&loaded.job)).collect()
+    let sampled = sampled_loads::warnings(&loaded.job, &steps::landings(&loaded.job));
+    given.chain(steps::warnings(&loaded.job)).chain(sampled).collect()
 }
 
 /// A residual as a share of the forces from which rounding errors are warned of.

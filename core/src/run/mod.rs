@@ -22,6 +22,7 @@ mod phases;
 mod reactions;
 mod restored;
 mod rotation;
+mod sampled_loads;
 mod scene;
 mod setup;
 mod shared_sides;

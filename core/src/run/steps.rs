@@ -42,20 +42,38 @@ pub(super) fn range(job: &Job) -> StepRange {
 }
 
 /// A value that may depend on time.
-struct TimeDependent<'a> {
+pub(super) struct TimeDependent<'a> {
     /// Its meaning, for the log.
     name: &'static str,
     /// Its place in the job.
-    key: String,
-    value: Cow<'a, Scalar>,
+    pub(super) key: String,
+    pub(super) value: Cow<'a, Scalar>,
 }
 
+impl TimeDependent<'_> {
+    /// Whether it is a force, a moment or a force of each unit of area, volume or mass.
+    pub(super) fn is_force(&self) -> bool {
+        !matches!(self.name, OF_SUPPORT | OF_HEAT) && !self.is_followed()
+    }
+
+    /// Whether steps follow it otherwise than by its values at their ends.
+    pub(super) fn is_followed(&self) -> bool {
+        matches!(self.name, OF_OBSTACLE | OF_FRICTION)
+    }
+}
+
+/// Names of values that are no forces.
+const OF_SUPPORT: &str = "a support";
+const OF_HEAT: &str = "heat at a boundary";
+const OF_OBSTACLE: &str = "an obstacle";
+const OF_FRICTION: &str = "a friction coefficient";
+
 /// The loads, motions of supports and obstacles, gaps and friction coefficients that depend on time.
-fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
+pub(super) fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
     let mut all: Vec<(&'static str, String, &[Scalar])> = Vec::new();
     for (at, support) in job.support.iter().enumerate() {
         for (key, values) in [("displacement", &support.displacement), ("velocity", &support.velocity)] {
-            all.push(("a support", format!("support.{at}.{key}"), values.as_deref().unwrap_or_default()));
+            all.push((OF_SUPPORT, format!("support.{at}.{key}"), values.as_deref().unwrap_or_default()));
         }
     }
     for (at, traction) in job.traction.iter().enumerate() {
@@ -64,9 +82,10 @@ fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
     }
     for (at, heat) in job.heat.iter().enumerate() {
         let expressions = heat.expressions();
-        all.extend(expressions.map(|(key, value)| {
-            ("heat at a boundary", format!("heat.{at}.{key}"), std::slice::from_ref(value))
-        }));
+        all.extend(
+            expressions
+                .map(|(key, value)| (OF_HEAT, format!("heat.{at}.{key}"), std::slice::from_ref(value))),
+        );
     }
     for (at, force) in job.body_force.iter().enumerate() {
         all.push(("a body force", format!("body_force.{at}.value"), &force.value));
@@ -77,10 +96,10 @@ fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
     for (at, contact) in job.contact.iter().enumerate() {
         if let Some(gap) = contact.normal.gap() {
             let key = format!("contact.{at}.{}.gap", contact.normal.table());
-            all.push(("an obstacle", key, std::slice::from_ref(gap)));
+            all.push((OF_OBSTACLE, key, std::slice::from_ref(gap)));
         }
         for values in contact.obstacle.iter().flat_map(|obstacle| obstacle.expressions()) {
-            all.push(("an obstacle", format!("contact.{at}.obstacle"), values));
+            all.push((OF_OBSTACLE, format!("contact.{at}.obstacle"), values));
         }
         if let Some(load) = &contact.obstacle_load {
             let [force, moment] = ["force", "moment"].map(|key| format!("contact.{at}.obstacle_load.{key}"));
@@ -102,7 +121,7 @@ fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
             contact.friction.as_ref().and_then(|friction| Some((friction.table(), friction.in_time()?)));
         let value = coefficient.filter(|(_, value)| value.depends_on_time());
         found.extend(value.map(|(table, value)| TimeDependent {
-            name: "a friction coefficient",
+            name: OF_FRICTION,
             key: format!("contact.{at}.{table}"),
             value: Cow::Owned(value),
         }));

@@ -459,7 +459,12 @@ impl StepMatrix for CondensedMatrix {
         projection_blocks.clear();
         let factor = factor.get_or_insert_with(|| ReducedFactor::with_capacity(&self.nodes));
         let product = self.product(product, complement, &workspace.world);
-        factor.set(product, &self.nodes, [additions, blocks], &Ranks(&workspace.world))?;
+        let ranks = Ranks(&workspace.world);
+        if factor.set(product, &self.nodes, [additions, blocks], &ranks).is_err() {
+            // Additions may be so large that their rounding errors exceed the matrix.
+            additions.clear();
+            factor.set(product, &self.nodes, [&[], blocks], &ranks)?;
+        }
         projection_blocks.clone_from(blocks);
         Ok(true)
     }

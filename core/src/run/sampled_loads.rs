@@ -1,0 +1,257 @@
+//! Loads against the steps that sample them: fixed steps see a load at one time in each step, adaptive ones end at kinks of tables no nearer
+//! to each other than the shortest step.
+
+use super::steps::{TimeDependent, shortest_step, time_dependent};
+use crate::{
+    job::{Job, Scalar},
+    laws::{
+        expression::Breakpoints,
+        step::{Blend, Step},
+    },
+    linear_algebra::tensor::larger,
+    solver::stepping::Landings,
+};
+
+/// Share of its largest value that a load must reach at times at which steps see it.
+const LEAST_SEEN: f64 = 0.5;
+/// Share of the largest impulse by which that over the steps may differ after the load has ended.
+const WRONG_IMPULSE: f64 = 0.1;
+/// Runs of more fixed steps are not examined.
+const MOST_STEPS: u64 = 50_000;
+/// Steps between the kinks of a load that resolve it.
+const STEPS_A_PIECE: f64 = 5.0;
+/// Points of Gauss's rule on [-1, 1], with weights.
+const GAUSS: [(f64, f64); 4] = [
+    (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+    (-0.339_981_043_584_856_26, 0.652_145_154_862_546_2),
+    (0.339_981_043_584_856_26, 0.652_145_154_862_546_2),
+    (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+];
+
+/// Warnings about loads and motions of a job, the same everywhere on their boundary, of which steps that end at these times see too little or
+/// too much.
+pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
+    let steps = if job.time.adaptive.is_none() { fixed_steps(landings) } else { Vec::new() };
+    let has_mass = job.materials().any(|(_, material)| material.density.is_some());
+    let mut found = Vec::new();
+    for load in time_dependent(job) {
+        if load.value.depends_on_position() || load.is_followed() {
+            continue;
+        }
+        let breakpoints = load.value.breakpoints();
+        let kinks = sorted_kinks(&breakpoints, landings.end);
+        let words = if job.time.adaptive.is_some() {
+            // Steps end at every jump.
+            passed_over(&load.value, &kinks, shortest_step(job)).filter(|_| breakpoints.switches.is_empty())
+        } else {
+            let sampled = Sampled::by(&load.value, job.time.scheme.formula(), &steps, &kinks);
+            sampled.missed(&kinks).or_else(|| sampled.wrong_impulse(&load, &kinks).filter(|_| has_mass))
+        };
+        found.extend(words.map(|words| format!("{}: {words}", load.key)));
+    }
+    found.dedup();
+    found
+}
+
+/// The fixed steps of a run; none if they are too many.
+fn fixed_steps(landings: &Landings) -> Vec<Step> {
+    if landings.steps_after(0.0, landings.length) > MOST_STEPS {
+        return Vec::new();
+    }
+    let (mut steps, mut at) = (Vec::new(), [0.0; 2]);
+    while at[0] < landings.end {
+        let step = landings.fixed_step(at, landings.next(at));
+        steps.push(step);
+        at = [step.time, step.length];
+    }
+    steps
+}
+
+/// The times within a run at which a value has kinks or may jump, ascending.
+fn sorted_kinks(breakpoints: &Breakpoints, end: f64) -> Vec<f64> {
+    let mut times = [&breakpoints.kinks[..], &breakpoints.switches].concat();
+    times.retain(|time| *time > 0.0 && *time < end);
+    times.sort_by(f64::total_cmp);
+    times
+}
+
+/// What the fixed steps of a run see of a value.
+struct Sampled {
+    /// Its largest magnitude, with the time, and the largest one at times at which steps see it.
+    largest: [f64; 2],
+    seen: f64,
+    /// The largest impulse up to the end of a step, that at the end of the run, and that over the steps.
+    impulses: [f64; 3],
+    /// The value at the end of the run, the longest step, and the last time before which the value is not zero.
+    last: f64,
+    longest: f64,
+    ended: f64,
+}
+
+impl Sampled {
+    fn by(value: &Scalar, formula: fn(Step) -> Blend, steps: &[Step], kinks: &[f64]) -> Self {
+        let mut found =
+            Self { largest: [0.0; 2], seen: 0.0, impulses: [0.0; 3], last: 0.0, longest: 0.0, ended: 0.0 };
+        let mut speeds = [0.0; 2];
+        let mut impulse = 0.0;
+        let mut kinks = kinks.iter().copied().peekable();
+        for step in steps {
+            let mut from = step.time - step.length;
+            let mut pieces = vec![];
+            while let Some(kink) = kinks.next_if(|kink| *kink <= step.time) {
+                pieces.push(kink);
+            }
+            pieces.push(step.time);
+            for to in pieces {
+                for (at, weight) in GAUSS {
+                    let time = 0.5 * (from + to + at * (to - from));
+                    let size = value.evaluate(time, &[]);
+                    impulse += 0.5 * (to - from) * weight * size;
+                    found.meet(size, time);
+                }
+                found.meet(value.evaluate(to, &[]), to);
+                from = to;
+            }
+            let blend = formula(*step);
+            let balanced = blend.balanced(*step).time;
+            let at_balance = value.evaluate(balanced, &[]);
+            found.seen = larger(found.seen, at_balance.abs());
+            let solved = blend.of(speeds[0], speeds[1]) + blend.length * at_balance;
+            speeds = [blend.end(speeds[0], solved), speeds[0]];
+            found.impulses = [larger(found.impulses[0], impulse.abs()), impulse, speeds[0]];
+            found.last = value.evaluate(step.time, &[]);
+            found.longest = larger(found.longest, step.length);
+        }
+        found
+    }
+
+    fn meet(&mut self, value: f64, time: f64) {
+        if value.abs() > self.largest[0] {
+            self.largest = [value.abs(), time];
+        }
+        if value != 0.0 {
+            self.ended = larger(self.ended, time);
+        }
+    }
+
+    /// Words where steps miss most of its largest values.
+    fn missed(&self, kinks: &[f64]) -> Option<String> {
+        let [largest, time] = self.largest;
+        (self.seen < LEAST_SEEN * largest).then(|| {
+            format!(
+                "of its largest magnitude {largest:.3e}, at t = {time:.6e} s, steps see at most {:.3e}: choose a time.step of at most {:.1e} s, \
+                 or [time.adaptive]",
+                self.seen,
+                resolving(kinks, self.longest)
+            )
+        })
+    }
+
+    /// Words where a load that has ended has not left its impulse.
+    fn wrong_impulse(&self, load: &TimeDependent<'_>, kinks: &[f64]) -> Option<String> {
+        let [largest, impulse, over_steps] = self.impulses;
+        let is_over = load.is_force() && self.last == 0.0 && self.ended > 0.0;
+        (is_over && (over_steps - impulse).abs() > WRONG_IMPULSE * largest).then(|| {
+            format!(
+                "the steps give its impulse wrong by {:.0} %, because they are too long while it acts: choose a time.step of at most {:.1e} s, or \
+                 let the time until t = {:.6e} s be a stage of its own with such steps",
+                100.0 * (over_steps - impulse).abs() / largest,
+                resolving(kinks, self.longest),
+                self.ended
+            )
+        })
+    }
+}
+
+/// The length in s of steps that resolve a value with these kinks, given the longest step.
+fn resolving(kinks: &[f64], longest: f64) -> f64 {
+    let gaps = kinks.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0);
+    gaps.fold(longest, f64::min) / STEPS_A_PIECE
+}
+
+/// Words where adaptive steps of at least this length in s pass over kinks between which a value has most of its size.
+fn passed_over(value: &Scalar, kinks: &[f64], shortest: f64) -> Option<String> {
+    let size = |time: f64| value.evaluate(time, &[]).abs();
+    let (mut seen, mut largest, mut landed) = (0.0, [0.0; 2], 0.0);
+    for &kink in kinks {
+        if size(kink) > largest[0] {
+            largest = [size(kink), kink];
+        }
+        if kink - landed >= shortest {
+            landed = kink;
+            // The next step ends no earlier.
+            seen = larger(seen, larger(size(kink), size(kink + shortest)));
+        }
+    }
+    let [largest, time] = largest;
+    (seen < LEAST_SEEN * largest).then(|| {
+        format!(
+            "of its largest magnitude {largest:.3e}, at t = {time:.6e} s, steps see at most {seen:.3e}, because they end at kinks no nearer to each \
+             other than [time.adaptive] smallest_step = {shortest} s: choose a smallest_step of at most {:.1e} s",
+            resolving(kinks, shortest)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::steps, *};
+    use std::path::Path;
+
+    /// Warnings about a traction with these values in a run of 2 s.
+    fn warned(time: &str, value: &str, density: &str) -> Vec<String> {
+        let text = format!(
+            "[mesh.rectangle]\nsize = [1.0, 1.0]\ncells = [1, 1]\n[material]\nhypothesis = \"plane_strain\"\n{density}\n[material.elasticity]\nyoungs_modulus = 1.0\n\
+             poisson_ratio = 0.0\n[[traction]]\non = [\"right\"]\nvalue = [\"{value}\", 0.0]\n[time]\nend = 2.0\n{time}\n[[support]]\n\
+             on = [\"left\"]\nfix = \"all\"\n"
+        );
+        let job =
+            Job::from_text(&text, "job.toml", Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}")).job;
+        warnings(&job, &steps::landings(&job))
+    }
+
+    fn triangle(start: f64, width: f64) -> String {
+        format!("interpolate(t, 0, 0, {start}, 0, {start} + 0.5*{width}, 1, {start} + {width}, 0, 3, 0)")
+    }
+
+    fn fixed(scheme: &str) -> String {
+        format!("scheme = \"{scheme}\"\nstep = 0.1")
+    }
+
+    const ADAPTIVE: &str = "scheme = \"bdf2\"\nstep = 0.1\nadaptive = { tolerance = 1e-3, smallest_step = 1e-4, largest_step = 0.1 }";
+
+    #[track_caller]
+    fn expect(warned: &[String], words: &str) {
+        assert!(
+            matches!(warned, [one] if one.starts_with("traction.0.value: ") && one.contains(words)),
+            "{warned:?}"
+        );
+    }
+
+    #[test]
+    fn a_load_whose_largest_values_lie_between_ends_of_steps_is_warned_of() {
+        let missed = warned(&fixed("implicit_euler"), &triangle(0.55, 1e-8), "");
+        expect(&missed, "of its largest magnitude 1.000e0, at t = 5.500000e-1 s, steps see at most 0.000e0");
+        expect(&warned(&fixed("bdf2"), "sin(10*pi*t)", ""), "steps see at most");
+        expect(&warned(ADAPTIVE, &triangle(0.55, 1e-5), ""), "choose a smallest_step of at most 1.0e-6 s");
+        let resolved = [triangle(0.55, 0.01), "sin(pi*t)".into(), "2*t".into(), "step(t - 0.513)".into()];
+        for value in resolved {
+            assert!(warned(&fixed("implicit_euler"), &value, "").is_empty(), "{value}");
+            assert!(warned(ADAPTIVE, &value, "").is_empty(), "{value}");
+        }
+    }
+
+    #[test]
+    fn a_load_that_ends_without_having_left_its_impulse_is_warned_of() {
+        let (short, dense) = (triangle(0.5, 2e-4), "density = 1.0");
+        expect(&warned(&fixed("bdf2"), &short, dense), "the steps give its impulse wrong by 33 %");
+        assert!(warned(&fixed("bdf2"), &short, "").is_empty(), "no inertia");
+        // A sum of the values at the ends of equal steps.
+        assert!(warned(&fixed("implicit_euler"), &short, dense).is_empty());
+        let counted_for_a_step = warned(&fixed("implicit_euler"), &triangle(0.5, 1e-8), dense);
+        assert_eq!(counted_for_a_step.len(), 1, "{counted_for_a_step:?}");
+        for value in [triangle(0.5, 1.0), "step(t - 0.5)".into(), "pulse(t, 0.3, 0.9)".into()] {
+            assert!(warned(&fixed("bdf2"), &value, dense).is_empty(), "{value}");
+        }
+    }
+}
