@@ -86,3 +86,23 @@ fn a_load_that_jumps_at_the_end_of_the_run_acts_until_then() {
         }
     }
 }
+
+#[test]
+fn a_support_of_a_body_without_mass_moves_by_the_integral_of_its_velocity_whatever_the_steps() {
+    let speed = "interpolate(t, 0, 0, 1, -0.0051, 2.1, 0, 3, 0) + 1e-3*sin(5*t)";
+    let way = -0.0051 * 0.5 * 2.1 + 1e-3 * (1.0 - (15.0f64).cos()) / 5.0;
+    for scheme in ["implicit_euler", "bdf2", "lagged_euler"] {
+        for adaptive in ["", "adaptive = { tolerance = 1e-2, smallest_step = 1e-4, largest_step = 1 }"] {
+            let case = Case::written_as(&format!(
+                "mesh.rectangle = {{ size = [1, 1], cells = [2, 2] }}
+                 material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e3, poisson_ratio = 0.3 }} }}
+                 material.viscosity = {{ volumetric = 1, shear = 1e3 }}
+                 support = [{{ on = ['top'], fix = 'all', velocity = [0, '{speed}'] }}]
+                 output.probe = [{{ name = 'top', point = [0.5, 1] }}]
+                 [time]\nend = 3\nscheme = '{scheme}'\n{adaptive}"
+            ));
+            let end = case.set("time.step", "0.4").run(1).table("probes.csv").last("displacement_y");
+            assert!((end - way).abs() <= 1e-9 * way.abs(), "{scheme} {adaptive}: {end} instead of {way}");
+        }
+    }
+}

@@ -1996,3 +1996,28 @@ fn a_quadratic_block_that_slides_over_the_end_of_another_one_rubs_with_its_weigh
         }
     }
 }
+
+#[test]
+fn a_body_that_stands_because_nodes_beyond_an_edge_bear_it_is_warned_of() {
+    let overhanging = |overhang: f64, side: &str| {
+        Case::written_as(&format!(
+            "mesh.rectangle = [{{ name = 'lower', size = [1, 0.5], cells = [5, 2] }},
+                               {{ name = 'upper', corner = [{overhang}, 0.5], size = [1, 0.5], cells = [4, 2] }}]
+             material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.3 }} }}
+             body_force = [{{ value = [0, -2e4] }}]
+             support = [{{ on = ['lower.bottom'], fix = 'all' }}]
+             contact = [{{ on = ['upper.bottom'], against = ['lower.top'], normal.unilateral = {{}}, side = '{side}',
+                          friction.coulomb.coefficient = 0.4 }}]
+             time = {{ end = 1, scheme = 'implicit_euler' }}"
+        ))
+        .set("time.step", "1")
+    };
+    let words = "nodes of upper.bottom up to 2.00e-1 m beyond the ends of lower.top bear";
+    for ranks in [1, 2] {
+        overhanging(0.7, "auto").run_with(ranks, &[]).expect(0).says(words).says("state side = \"against\"");
+    }
+    let stable = overhanging(0.3, "auto").run_with(1, &[]).expect(0);
+    assert!(!stable.stdout.contains("beyond the ends"), "{}", stable.stdout);
+    let tips = overhanging(0.7, "against").run_with(1, &[]).expect(1);
+    assert!(!tips.stdout.contains("beyond the ends"), "{}", tips.stdout);
+}

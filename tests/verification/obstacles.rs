@@ -339,7 +339,7 @@ fn interference(session: &Session) {
             (run.totals.energy, run.totals.energy_of_scheme())
         });
     for (energy, generated) in found {
-        assert!(energy[CONTACT] < 0.0 && generated == 0.0, "{energy:?}, {generated}");
+        assert!(energy[CONTACT] < 0.0 && generated <= 0.0, "{energy:?}, {generated}");
         let off =
             (energy[CONTACT] - found[0].0[CONTACT]).abs() + (energy[ELASTIC] - found[0].0[ELASTIC]).abs();
         assert!(off < 1e-9 * energy[ELASTIC], "{energy:?}, not {:?}", found[0].0);

@@ -44,6 +44,8 @@ pub struct PairedNode<const D: usize> {
     pub sharpness: f64,
     /// Whether the other side ends over the facets around it.
     pub meets_end: bool,
+    /// The distance in m of the node from the part of the facets around it that faces the other side; 0 where it is in it.
+    pub beyond: f64,
     /// How curved the own side is there: by how much its normal at a corner of a facet around it differs from that of the facet at most, as the
     /// length of the difference of these unit vectors.
     pub curvature: f64,
@@ -275,6 +277,7 @@ impl<const D: usize> Pair<D> {
                 stretch,
                 sharpness: 0.0,
                 meets_end: false,
+                beyond: 0.0,
                 curvature: f64::INFINITY,
             })
         });
@@ -353,6 +356,7 @@ impl<const D: usize> Pair<D> {
                     stretch,
                     sharpness,
                     meets_end: false,
+                    beyond: 0.0,
                     curvature,
                 }
             })
@@ -659,6 +663,7 @@ struct Sum<const D: usize> {
     facing: f64,
     gap: f64,
     passed: f64,
+    beyond: f64,
     normal: Vector<D>,
     normals: [Normals<D>; 2],
     masters: BTreeMap<u32, f64>,
@@ -675,6 +680,7 @@ impl<const D: usize> Sum<D> {
             facing,
             gap,
             passed,
+            beyond: f64::INFINITY,
             normal: [0.0; D],
             normals: [Normals::NONE; 2],
             masters,
@@ -731,9 +737,10 @@ fn sum_of_contributions<const D: usize>(
     for of_facet in all.chunks_exact(per_facet(mesh)) {
         let (of_facet, passed) = pass_on(of_facet, lawless);
         for contribution in of_facet.iter().filter(|one| !lawless.contains(&one.node)) {
-            let Contribution { node, normal, weight, whole, gap, corners, normals, masters } = contribution;
+            let Contribution { node, normal, weight, whole, gap, corners, beyond, normals, masters } =
+                contribution;
             let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*node)];
-            list.extend([f64::from(*node), *weight, *whole, *gap, passed + corners]);
+            list.extend([f64::from(*node), *weight, *whole, *gap, passed + corners, *beyond]);
             list.extend(normal.map(|n| weight * n));
             for normals in normals {
                 list.extend(normals.sum);
@@ -749,13 +756,14 @@ fn sum_of_contributions<const D: usize>(
     let records = exchange_lists(session.world(), &outgoing)?;
     let mut sums: BTreeMap<u32, Sum<D>> = BTreeMap::new();
     let mut rest = &records[..];
-    while let [node, weight, whole, gap, passed, after @ ..] = rest {
+    while let [node, weight, whole, gap, passed, beyond, after @ ..] = rest {
         let sum = sums.entry(*node as u32).or_insert_with(Sum::new);
         sum.weight += weight;
         sum.whole += whole;
         sum.facing += if *weight == 0.0 { 0.0 } else { *whole };
         sum.gap += gap;
         sum.passed += passed;
+        sum.beyond = sum.beyond.min(*beyond);
         (0..D).for_each(|i| sum.normal[i] += after[i]);
         let (of_sides, after) = after[D..].split_at(2 * (D + 1) * D);
         for (sum, given) in sum.normals.iter_mut().zip(of_sides.as_chunks::<D>().0.chunks_exact(D + 1)) {
@@ -844,6 +852,7 @@ fn paired<const D: usize>(
                 stretch: 1.0 + sum.passed / sum.weight,
                 sharpness,
                 meets_end,
+                beyond: sum.beyond,
                 curvature: curvatures[&node],
             }
         })
@@ -907,6 +916,7 @@ mod tests {
             whole: 0.5,
             gap: 1.5,
             corners: 0.0,
+            beyond: 0.0,
             normals: [Normals::NONE; 2],
             masters: vec![(master, 0.5)],
         };
@@ -986,6 +996,7 @@ mod tests {
             stretch: 1.0,
             sharpness: 0.0,
             meets_end: false,
+            beyond: 0.0,
             curvature,
         };
         for count in [3, 7, 40] {

@@ -96,6 +96,9 @@ pub(super) fn warning_of_rounding(summary: &Summary, job: &Job) -> Option<String
     })
 }
 
+/// Share of the supplied energy that a time scheme may dissipate without a word.
+const WORTH_SAYING: f64 = 0.05;
+
 /// Logs status, totals and times of a finished run, and what kept its adaptive steps short.
 pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Option<String>) {
     if let Some(error) = &summary.error {
@@ -116,8 +119,14 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
         _ => format!("inclusion residual at most {:.1e}, ", summary.max_inclusion_residual),
     };
     let heat = summary.max_heat_imbalance.map_or(String::new(), |most| format!(", of heat {most:.1e}"));
+    let lost = -summary.energy_of_scheme;
+    let scheme = match lost >= WORTH_SAYING && job.materials().any(|(_, material)| material.density.is_some())
+    {
+        true => format!(", {:.0} % of the supplied energy dissipated by the time scheme", 100.0 * lost),
+        false => String::new(),
+    };
     log.line(format!(
-        "checks     {inclusion}energy imbalance at most {:.1e}{heat}",
+        "checks     {inclusion}energy imbalance at most {:.1e}{heat}{scheme}",
         summary.max_energy_imbalance
     ));
     if summary.max_residual > job.solver.tolerance {

@@ -3,7 +3,7 @@
 
 use super::{
     inside::{Inside, nodes_of_bodies},
-    side_words::{exchange_of_sides, warning_of_run},
+    side_words::{exchange_of_sides, warning_of_overhang, warning_of_run},
     steps::shortest_step,
 };
 use crate::{
@@ -432,6 +432,9 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
         if let Some(pair) = pair_of(&body.pairs, number).filter(|pair| pair.slides) {
             let remedy = || exchange_of_sides(session, (body, pair), state);
             out.extend(warning_of_run(job, (pair, contact), [sharpness, ends], remedy)?);
+        }
+        if let Some(pair) = pair_of(&body.pairs, number).filter(|_| has_ended) {
+            out.extend(warning_of_overhang((session, job), (body, pair), state)?);
         }
         if !contact.normal.law.depends_on_displacement() {
             continue;

@@ -18,6 +18,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The angle in rad (10 degrees) of edges over faces whose nodes carry the law from which on the user is warned: forces along an inclined
 /// face are 18 % of those across.
 pub(super) const EDGE: f64 = 0.175;
+/// The share of the force of a contact at nodes beyond the ends of what they face from which on it is warned of.
+const OVERHANGING: f64 = 0.25;
 /// Most times the mean pressure at the ends of a side that can carry the law.
 const MANY: f64 = 3.0;
 
@@ -138,6 +140,39 @@ pub(super) fn exchange_of_sides<const D: usize, const S: usize>(
     Ok((at_own * area <= MANY * force).then(|| format!("state side = \"{side}\"")))
 }
 
+/// The warning about a pair of which nodes beyond the ends of the other side bear much of the force at the end of a run, where no surface
+/// supports them. Collective, the same on all ranks.
+pub(super) fn warning_of_overhang<const D: usize, const S: usize>(
+    (session, job): (&Session, &Job),
+    (body, pair): (&Body<D, S>, &Pair<D>),
+    state: &State,
+) -> Result<Option<String>> {
+    let velocity = session.agree(state.velocity.local())?;
+    let (mut forces, mut farthest) = ([0.0; 2], 0.0);
+    for (node, [pressure, area]) in body.contacts[pair.contact]
+        .pressures(&body.seen_by_contacts(&velocity))
+        .filter(|(_, [p, _])| *p > 0.0)
+    {
+        forces[0] += pressure * area;
+        if let Some(node) = pair.node(node).filter(|node| node.beyond > 0.0) {
+            forces[1] += pressure * area;
+            farthest = larger(farthest, node.beyond);
+        }
+    }
+    let [whole, beyond] = session.sum(forces);
+    let [farthest] = session.largest([farthest]);
+    let [own, other] = names_of_sides(job, pair);
+    let side = if pair.exchange.is_some() { "on" } else { "against" };
+    Ok((beyond > OVERHANGING * whole).then(|| {
+        format!(
+            "contact.{}: nodes of {own} up to {farthest:.2e} m beyond the ends of {other} bear {:.0} % of the force: a body that would tip over \
+             such an end stands; state side = \"{side}\", or take smaller facets of {own} there, until these nodes bear little",
+            pair.contact,
+            100.0 * beyond / whole
+        )
+    }))
+}
+
 /// Warnings about wear that stays with the nodes of the other body, and about facets of which contacts leave all nodes without a law.
 /// Collective, with the same warnings on all ranks.
 pub(super) fn warnings_of_carriers<const D: usize>(
@@ -230,7 +265,7 @@ fn words_of_ends<const D: usize>(job: &Job, pair: &Pair<D>, (lie, remedy): (&str
     });
     format!(
         "contact.{}: ends of {other} {lie} over faces of {own}, whose nodes carry the law: as they slide, pressures of nodes near these ends may \
-         be many times too large, though not the forces{worn}; {remedy}",
+         be many times too large, though not the forces, whose place may be off by a facet{worn}; {remedy}",
         pair.contact
     )
 }

@@ -5,6 +5,7 @@ use crate::{
     error::{Error, Result},
     fem::space::{Held, SurfacePoint, facets, surface_points},
     job::{Fix, FixedDirections, Scalar, Support},
+    laws::{quadrature::unit_rule, step::Step},
     linear_algebra::{
         petsc::DistributedVector,
         tensor::{Vector, add_scaled, dot, dual_basis, norm},
@@ -315,19 +316,35 @@ impl<const D: usize> SupportMotion<D> {
         })
     }
 
-    /// Writes to owned nodes the velocity of supports at the end of a step, 0 elsewhere: for prescribed displacements that with which
-    /// the displacement `start` at owned nodes changes in `length` in s.
-    pub fn write_velocity(&self, time: f64, start: &[f64], length: f64, velocity: &mut [f64]) -> Result<()> {
+    /// Writes to owned nodes the velocity of supports in a step, 0 elsewhere: that with which the displacement `start` at owned nodes changes
+    /// within `length` in s to the prescribed one, or to the `converged` one before the step and the integral of the prescribed velocity.
+    /// Without the converged one a prescribed velocity is that at the end of the step.
+    pub fn write_velocity(
+        &self,
+        step: Step,
+        (converged, start): (Option<&[f64]>, &[f64]),
+        length: f64,
+        velocity: &mut [f64],
+    ) -> Result<()> {
         velocity.fill(0.0);
         for moved in &self.nodes {
-            let along = |direction: &Vector<D>| {
-                let way = |i: usize| start[moved.node as usize * D + i] - moved.origin[i];
-                (0..D).map(|i| direction[i] * way(i)).sum::<f64>()
+            let at = |i: usize| moved.node as usize * D + i;
+            let along = |direction: &Vector<D>, from: &dyn Fn(usize) -> f64| {
+                (0..D).map(|i| direction[i] * (start[at(i)] - from(i))).sum::<f64>()
             };
             moved.add(velocity, |part, number| {
                 let Prescribed { value, is_displacement } = &self.values[number];
-                let value = finite(value, time, &moved.place, what)?;
-                Ok(if *is_displacement { (value - along(&part.direction)) / length } else { value })
+                let at_time = |time: f64| finite(value, time, &moved.place, what);
+                let end = at_time(step.time)?;
+                if *is_displacement {
+                    return Ok((end - along(&part.direction, &|i| moved.origin[i])) / length);
+                }
+                let Some(converged) = converged.filter(|_| value.depends_on_time()) else { return Ok(end) };
+                let mut way = 0.0;
+                for [share, weight] in unit_rule() {
+                    way += weight * step.length * at_time(step.time - (1.0 - share) * step.length)?;
+                }
+                Ok((way - along(&part.direction, &|i| converged[at(i)])) / length)
             })?;
         }
         Ok(())

@@ -28,7 +28,10 @@
 //! each of the two middles beside a corner takes over half of its psi_c, so that the sum remains 1.
 
 use crate::linear_algebra::tensor::{Vector, in_space};
-use geometry::{Plane, Point, Shape, clip, dot, measure_and_centroid, oriented, quadrature, sides, subtract};
+use geometry::{
+    Plane, Point, Shape, clip, distance_from, dot, measure_and_centroid, oriented, quadrature, sides,
+    subtract,
+};
 use rstar::{
     AABB, RTree, RTreeObject, SelectionFunction,
     primitives::{GeomWithData, Rectangle},
@@ -53,6 +56,8 @@ const SMALLEST_PART: f64 = 1e-12;
 const LARGEST_OVERLAP: f64 = 1e-6;
 /// The smallest covered share of a slave facet that contributes.
 const SMALLEST_SHARE: f64 = 1e-9;
+/// The distance of a node from the covered part of its facet that is a rounding error, as a share of the diameter of the facet.
+const ROUNDING: f64 = 1e-9;
 /// The width by which the space above a slave facet is searched in excess, as a share of its diameter.
 const SEARCH_MARGIN: f64 = 1e-6;
 
@@ -78,6 +83,8 @@ pub struct Contribution<const D: usize> {
     /// covered. With `weight` it is int psi_a: the part of the surface for which the node stands, which may be negative where the facet is
     /// covered in part.
     pub corners: f64,
+    /// The distance in m of the node from the covered part of the facet; infinite where nothing is covered.
+    pub beyond: f64,
     /// Over the covered part of the facet: its outward unit normal and those of the master facets, in the undeformed bodies.
     pub normals: [Normals<D>; 2],
     /// For each master node b, in ascending order, int psi_a phi_b in m^(D-1), with phi_b at the place on the
@@ -385,6 +392,16 @@ impl<'a, const D: usize> Slave<'a, D> {
         Self { facet, plane, corners, measure, diameter }
     }
 
+    /// The places of the nodes.
+    fn places(&self) -> impl Iterator<Item = Point> {
+        let corners = self.corners;
+        let middles = sides::<D>().iter().map(move |&(i, j)| {
+            let (a, b) = (corners[i], corners[j]);
+            std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+        });
+        corners.into_iter().chain(middles).take(self.facet.nodes.len())
+    }
+
     /// Appends the contributions to the nodes that carry a law.
     fn integrate(&self, parts: &[Part<D>], result: &mut Vec<Contribution<D>>) {
         let (facet, first) = (self.facet, result.len());
@@ -396,6 +413,7 @@ impl<'a, const D: usize> Slave<'a, D> {
             whole: self.measure * facet.share(i),
             gap: 0.0,
             corners: 0.0,
+            beyond: f64::INFINITY,
             normals: [Normals::NONE; 2],
             masters: Vec::new(),
         }));
@@ -424,7 +442,12 @@ impl<'a, const D: usize> Slave<'a, D> {
         normals[0].add(measure, &facet.undeformed);
         parts.iter().for_each(|part| normals[1].add(part.measure, &part.master.undeformed));
         let result = &mut result[first..];
-        result.iter_mut().for_each(|contribution| contribution.normals = normals);
+        for (contribution, place) in result.iter_mut().zip(self.places().skip(law.start)) {
+            contribution.normals = normals;
+            let distances = parts.iter().map(|part| distance_from::<D>(&part.polygon, place));
+            let beyond = distances.fold(f64::INFINITY, f64::min);
+            contribution.beyond = if beyond > ROUNDING * self.diameter { beyond } else { 0.0 };
+        }
         for (contribution, ((dual, m), &(i, j))) in
             result.iter_mut().zip(duals.iter().zip(law.clone()).zip(sides::<D>().iter().cycle()))
         {
@@ -464,15 +487,9 @@ impl<'a, const D: usize> Slave<'a, D> {
     /// The coefficients of the multipliers psi_a of the nodes that carry a law in the basis: diag(w) N^-1, and of quadratic triangles with
     /// half of those of the corners at the ends of its side.
     fn duals(&self, basis: &Basis<D>, own: &Products, covered: f64) -> Vec<[f64; MOST]> {
-        let facet = self.facet;
-        let middles = sides::<D>().iter().map(|&(i, j)| {
-            let (a, b) = (self.corners[i], self.corners[j]);
-            std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
-        });
-        let places = self.corners.into_iter().chain(middles).take(facet.nodes.len());
         let of_node = |(m, place)| basis.values(place).map(|value| own[0][m] * covered.sqrt() * value);
-        let mut all: Vec<[f64; MOST]> = places.enumerate().map(of_node).collect();
-        let law = all.split_off(facet.first_law());
+        let mut all: Vec<[f64; MOST]> = self.places().enumerate().map(of_node).collect();
+        let law = all.split_off(self.facet.first_law());
         let with_corners = |(mut dual, &(i, j)): ([f64; MOST], &(usize, usize))| {
             for corner in [i, j].iter().filter_map(|end| all.get(*end)) {
                 dual = std::array::from_fn(|k| dual[k] + 0.5 * corner[k]);

@@ -8,7 +8,11 @@
 use super::{flow::FlowStart, step_solver::StepSolver};
 use crate::{
     error::Result,
-    fem::{body::Body, effect::Step, state::State},
+    fem::{
+        body::Body,
+        effect::{Form, Step},
+        state::State,
+    },
     linear_algebra::petsc::DistributedVector,
     parallel::session::Session,
 };
@@ -58,19 +62,21 @@ impl MovingSupports {
         }))
     }
 
-    /// Finds the velocity of the supports, and subtracts `K g` from the forces of the step, which are then known. Collective.
+    /// Finds the velocity of the supports in a step from this state, and subtracts `K g` from the forces of the step, which are then known. Collective.
     pub(super) fn impose<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
-        step: Step,
+        (state, step): (&State, Step),
         FlowStart { displacement, length }: FlowStart<'_>,
         forces: &mut DistributedVector,
     ) -> Result<()> {
         let Some(motion) = &body.support_motion else { return Ok(()) };
         let written = {
-            let (start, mut velocity) = (displacement.owned()?, self.velocity.owned_mut()?);
-            motion.write_velocity(step.time, &start, length, &mut velocity)
+            let (converged, start) = (state.displacement.owned()?, displacement.owned()?);
+            // Mean velocities change suddenly where the lengths of steps do, and bodies with mass would vibrate.
+            let converged = (!body.has_form(Form::Mass)).then_some(&*converged);
+            motion.write_velocity(step, (converged, &start), length, &mut self.velocity.owned_mut()?)
         };
         session.agree(written)?;
         self.relative.copy_from(&self.velocity)?;

@@ -8,6 +8,7 @@ use super::step_length::{Landing, TIME_TOLERANCE};
 use crate::{
     fem::{body::Body, effect::Step},
     job::Scalar,
+    laws::expression::Breakpoints,
     linear_algebra::tensor::Vector,
     parallel::session::Session,
 };
@@ -129,10 +130,17 @@ impl<const D: usize> TimeDependentData<D> {
 }
 
 impl<const D: usize> TimeDependentExpression<D> {
-    /// The scale of its values during the run: the largest value of a load, the largest distance between positions of an obstacle.
+    /// The scale of its values during the run, pulses between samples among them: the largest value of a load, the largest distance between
+    /// positions of an obstacle.
     fn measure_scale(&self, end: f64, is_load: bool) -> f64 {
+        let Breakpoints { kinks, switches } = self.value.breakpoints();
+        let mut breaks = [&kinks[..], &switches, &[0.0, end]].concat();
+        breaks.retain(|time| (0.0..=end).contains(time));
+        breaks.sort_by(f64::total_cmp);
+        let between: Vec<f64> = breaks.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
         let scale_at = |point: &Vector<D>| {
             let times = (0..=SAMPLES_OF_RUN).map(|at| end * f64::from(at) / f64::from(SAMPLES_OF_RUN));
+            let times = times.chain(breaks.iter().chain(&between).copied());
             let values = times.map(|time| self.value.evaluate(time, point)).filter(|value| value.is_finite());
             let [min, max] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], value| {
                 [min.min(value), max.max(value)]
@@ -215,6 +223,16 @@ mod tests {
             TimeDependentExpression { name: "a load", value, points: vec![[0.5, 0.0]], scale: 0.0 };
         expression.scale = expression.measure_scale(2.0, true);
         expression
+    }
+
+    #[test]
+    fn the_scale_contains_pulses_between_samples() {
+        for text in
+            ["interpolate(t, 0, 0, 0.5, 0, 0.5005, -3, 0.501, 0, 9, 0)", "0.1 - 3*pulse(t, 0.5, 0.501)"]
+        {
+            let scale = expression(text).scale;
+            assert!((scale - 3.0).abs() <= 0.11, "{text}: {scale}");
+        }
     }
 
     #[test]

@@ -93,6 +93,23 @@ pub(super) fn measure_and_centroid<const D: usize>(polygon: &[Point]) -> (f64, P
     (area, std::array::from_fn(|i| first[i] + moment[i] / area))
 }
 
+/// The distance in m of a place from a convex polygon with corners in the order of [`measure_and_centroid`]; 0 within it.
+pub(super) fn distance_from<const D: usize>(polygon: &[Point], place: Point) -> f64 {
+    let sides = || polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let is_left = |(a, b): (&Point, &Point)| cross(subtract(b, a), subtract(&place, a)) >= 0.0;
+    if D == 3 && sides().all(is_left) {
+        return 0.0;
+    }
+    let from_side = |(a, b): (&Point, &Point)| {
+        let (side, way) = (subtract(b, a), subtract(&place, a));
+        let square = dot(&side, &side);
+        let along = if square > 0.0 { (dot(&side, &way) / square).clamp(0.0, 1.0) } else { 0.0 };
+        let beside: Point = std::array::from_fn(|i| way[i] - along * side[i]);
+        dot(&beside, &beside).sqrt()
+    };
+    sides().map(from_side).fold(f64::INFINITY, f64::min)
+}
+
 /// The corners in the order of [`measure_and_centroid`]: ascending in two dimensions, counterclockwise in
 /// three.
 pub(super) fn oriented<const D: usize>(mut corners: [Point; D]) -> [Point; D] {
