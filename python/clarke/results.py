@@ -23,6 +23,11 @@ if TYPE_CHECKING:
 TABLES = {"history": "", "resultant": "source", "probe": "probe", "profile": "profile"}
 
 
+def file_of(word: str) -> str:
+    """The file of a table."""
+    return "history.csv" if word == "history" else f"{word}s.csv"
+
+
 @dataclass(frozen=True)
 class Check:
     """An expected result of a job, in the unit of the quantity.
@@ -107,7 +112,7 @@ class Results:
         word = table.removesuffix("s") if table != "history" else table
         if word not in TABLES:
             raise Error(f"no table {table!r}; there are history, resultants, probes and profiles")
-        path = self.folder / ("history.csv" if word == "history" else f"{word}s.csv")
+        path = self.folder / file_of(word)
         if not path.exists():
             reasons = {"probe": "the job has no [[output.probe]]", "profile": "the job has no [[output.profile]]"}
             raise NoResults(f"{path} is not there: {reasons.get(word, 'the run has made no step yet')}")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from . import declared, jobs, program, tables
 from .commands import JobLike, PathLike
 from .errors import Damaged, Error, NoResults
-from .results import TABLES, Results
+from .results import TABLES, Results, file_of
 from .results import open as open_results
 
 if TYPE_CHECKING:
@@ -162,5 +162,4 @@ def _unit(response: str, is_plane: bool) -> str:
         return declared.unit_of_member(WINDOW.sub("", response), is_plane)
     if ".period." in rest or ".arrival." in rest:
         return "s"
-    file = "history.csv" if word == "history" else f"{word}s.csv"
-    return declared.unit(file, rest.rpartition(".")[2], is_plane)
+    return declared.unit(file_of(word), rest.rpartition(".")[2], is_plane)

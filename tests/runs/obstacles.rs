@@ -613,6 +613,34 @@ fn a_punch_as_wide_as_the_block_presses_as_a_plane_does() {
 }
 
 #[test]
+fn a_tilted_ring_that_moves_and_turns_presses_and_rubs_as_the_shape_of_its_distance() {
+    let mesh = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes/thick_plate_fine.msh");
+    let under = |obstacle: &str| {
+        let motion = "axis = [0.1, -0.2, 1.0], rotation = 2.0, centre = ['1.9 + 0.3*t', 1.4, '0.9 - 0.1*t']";
+        Case::of("verification/thick_plate")
+            .set("mesh.file", &format!("{mesh:?}"))
+            .set("support", "[{on = ['outer'], fix = 'all'}]")
+            .without("traction")
+            .set("contact", "[{on = ['top'], normal.compliance.stiffness = 1e10}]")
+            .set("contact.0.friction.coulomb.coefficient", "0.3")
+            .set("contact.0.obstacle", &obstacle.replace("..", motion))
+            .set("time", "{end = 0.3, step = 0.1, scheme = 'implicit_euler'}")
+    };
+    let height = "(0.1*x - 0.2*y + z)/sqrt(1.05)";
+    let across = "hypot(hypot(y + 0.2*z, 0.1*z - x), 0.2*x + 0.1*y)/sqrt(1.05)";
+    let distance = format!("hypot({across} - 0.6, {height}) - 0.5");
+    let shape = under(&format!("{{shape = {{distance = '{distance}', ..}}}}"));
+    let wanted = shape.run(1);
+    let contact = wanted.table("resultants.csv").only("source", "contact top");
+    assert!(contact.last("touching_area") > 0.4 && contact.last("force_x") > 1e7);
+    let ring = under("{torus = {major_radius = 0.6, minor_radius = 0.5, ..}}");
+    // On two ranks the iterations of friction end elsewhere within the tolerance.
+    for (ranks, share) in [(1, 1e-12), (2, 1e-7)] {
+        assert_same_answer(&ring.run(ranks), &wanted, share, &format!("{ranks} ranks"));
+    }
+}
+
+#[test]
 fn the_residual_of_a_step_that_only_adhesion_to_an_obstacle_loads_is_a_share_of_its_forces() {
     let case = under("{plane = {point = [0, '0.50005 + 1e-3*t'], normal = [0, -1]}}")
         .set("mesh.rectangle.cells", "[8, 2]")

@@ -32,9 +32,6 @@ fn laws() -> Vec<NormalResponse> {
     };
     let graph =
         |points, slope_before, slope_after| NormalLaw::Graph(Graph { points, slope_before, slope_after });
-    let springs = |stiffness, exponent, damping| {
-        NormalLaw::Compliance(Compliance { stiffness, exponent, damping, gap: None })
-    };
     let laws = [
         damped(Symmetry::Even),
         damped(Symmetry::Odd),
@@ -42,13 +39,17 @@ fn laws() -> Vec<NormalResponse> {
         graph(vec![[-0.4, -3.0], [0.0, -3.0], [0.3, 9.0]], 12.0, -8.0),
         graph(vec![[-0.4, -3.0], [-0.4, 20.0], [0.1, 2.0], [0.1, 40.0]], 12.0, f64::INFINITY),
         NormalLaw::ExponentialDamper(ExponentialDamper { limit: 30.0, velocity: 0.2 }),
-        springs(300.0, 1.0, 0.0),
-        springs(4000.0, 2.0, 6.0),
+        springs(),
+        NormalLaw::Compliance(Compliance { stiffness: 4000.0, exponent: 2.0, damping: 6.0, gap: None }),
         NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap: None }),
         written("30*v*exp(-v/0.3) + 2*sign(v)"),
         written("if(d < 0.002, 4e3*max(d, 0), 8 + 300*(d - 0.002)^1.5)"),
     ];
     laws.iter().map(|law| law.response().expect("a law")).collect()
+}
+
+fn springs() -> NormalLaw {
+    NormalLaw::Compliance(Compliance { stiffness: 300.0, exponent: 1.0, damping: 0.0, gap: None })
 }
 
 fn written(pressure: &str) -> NormalLaw {
@@ -289,7 +290,7 @@ fn columns<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
         rotation: None,
         axis: (D == 3).then(|| vec![0.3, 1.0, 0.0]),
     });
-    let law = laws()[6].clone();
+    let law = springs().response().expect("a law");
     let conditions = ContactConditions { quadrature: Quadrature::Nodal, law, gap, paired: None };
     let mut contact = Contact::new(session, &body.mesh, &facets, conditions, &body.held).expect("contact");
     let friction = friction_laws()[1].clone().expect("a law");
@@ -368,7 +369,7 @@ fn follows_belt(session: &Session) {
     let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
     let conditions = ContactConditions {
         quadrature: Quadrature::Nodal,
-        law: laws()[6].clone(),
+        law: springs().response().expect("a law"),
         gap: belt::<2>(),
         paired: None,
     };

@@ -10,9 +10,15 @@ use crate::{
 };
 
 /// Stored in stretched adhesive bonds.
-pub const STORED_IN_BONDS: EnergyKind = EnergyKind::new(9, Role::Stored, "adhesion_energy");
+pub const STORED_IN_BONDS: EnergyKind =
+    EnergyKind::new(9, Role::Stored, "adhesion_energy", "energy stored in bonds");
 /// Dissipated by bonds that break.
-pub const DEBONDING: EnergyKind = EnergyKind::new(10, Role::Dissipated, "adhesion_dissipation");
+pub const DEBONDING: EnergyKind = EnergyKind::new(
+    10,
+    Role::Dissipated,
+    "adhesion_dissipation",
+    "dissipated by breaking bonds since time 0",
+);
 
 /// Adhesion on contact boundaries, with one bonding `b` for each node.
 ///

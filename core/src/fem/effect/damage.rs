@@ -12,7 +12,8 @@ use crate::{
 };
 
 /// Dissipated by damage.
-pub const DAMAGE: EnergyKind = EnergyKind::new(8, Role::Dissipated, "damage_dissipation");
+pub const DAMAGE: EnergyKind =
+    EnergyKind::new(8, Role::Dissipated, "damage_dissipation", "dissipated by damage since time 0");
 
 /// Isotropic damage `d`, one number for each cell whose material has the law: the elastic and viscoplastic stress is multiplied by
 /// `1 - d`, viscous stress is not.

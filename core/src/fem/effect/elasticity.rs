@@ -12,7 +12,12 @@ use crate::{
 };
 
 /// Elastic energy.
-pub const ELASTIC: EnergyKind = EnergyKind::new(1, Role::Stored, "elastic_energy");
+pub const ELASTIC: EnergyKind = EnergyKind::new(
+    1,
+    Role::Stored,
+    "elastic_energy",
+    "energy stored by elasticity and in springs of supports",
+);
 
 /// Elastic stress `E e(u)`: of the converged displacement, `E e(u_{n-1})` in (24), or of that at the end of the step, `u_n = u~ + k' v_n`,
 /// where `E e(u~)` is known at the start of the step and `k' E` is part of the matrix.

@@ -37,6 +37,8 @@ const CAPACITY: usize = 24;
 pub struct EnergyKind {
     /// Its column in `history.csv`, and its key in checkpoints.
     pub column: &'static str,
+    /// The meaning of this column, in Markdown.
+    pub meaning: &'static str,
     /// Its side in the balance.
     pub role: Role,
     position: usize,
@@ -44,14 +46,19 @@ pub struct EnergyKind {
 
 impl EnergyKind {
     /// Declares an energy, given its position in the list of all energies.
-    pub const fn new(position: usize, role: Role, column: &'static str) -> Self {
+    pub const fn new(position: usize, role: Role, column: &'static str, meaning: &'static str) -> Self {
         assert!(position < CAPACITY, "increase CAPACITY");
-        Self { column, role, position }
+        Self { column, meaning, role, position }
     }
 }
 
 /// Terms of the time scheme.
-pub const NUMERICAL: EnergyKind = EnergyKind::new(6, Role::Numerical, "numerical_dissipation");
+pub const NUMERICAL: EnergyKind = EnergyKind::new(
+    6,
+    Role::Numerical,
+    "numerical_dissipation",
+    "dissipated by the time scheme since time 0, known exactly; negative if the scheme produces energy",
+);
 
 /// Whether each energy of a list is at its declared position.
 pub(super) const fn are_in_order(energies: &[EnergyKind]) -> bool {

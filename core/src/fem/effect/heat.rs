@@ -32,17 +32,40 @@ use std::collections::BTreeMap;
 const ROUNDING: f64 = 1e-10;
 
 /// Heat that the body has stored since the start of the run.
-pub const STORED_HEAT: EnergyKind = EnergyKind::new(14, Role::HeatSpent, "stored_heat");
+pub const STORED_HEAT: EnergyKind = EnergyKind::new(
+    14,
+    Role::HeatSpent,
+    "stored_heat",
+    "with `[material.heat]`, as all columns below: heat that the body has stored since time 0",
+);
 /// Heat of friction that has entered the body.
-pub const FRICTION_HEAT: EnergyKind = EnergyKind::new(17, Role::Heat, "friction_heat");
+pub const FRICTION_HEAT: EnergyKind = EnergyKind::new(
+    17,
+    Role::Heat,
+    "friction_heat",
+    "heat of friction that has entered the body since time 0",
+);
 /// Heat of viscosity and viscoplastic flow.
-pub const FLOW_HEAT: EnergyKind = EnergyKind::new(18, Role::Heat, "flow_heat");
+pub const FLOW_HEAT: EnergyKind =
+    EnergyKind::new(18, Role::Heat, "flow_heat", "heat of viscosity and viscoplastic flow since time 0");
 /// Work of thermal expansion on the stresses of the body.
-pub const THERMAL_WORK: EnergyKind = EnergyKind::new(19, Role::Work, "thermal_work");
+pub const THERMAL_WORK: EnergyKind = EnergyKind::new(
+    19,
+    Role::Work,
+    "thermal_work",
+    "work of thermal expansion on the stresses of the body since time 0; part of the balance of `energy_imbalance`",
+);
 /// Heat that has left through the boundary.
-pub const LOST_HEAT: EnergyKind = EnergyKind::new(15, Role::HeatSpent, "lost_heat");
+pub const LOST_HEAT: EnergyKind =
+    EnergyKind::new(15, Role::HeatSpent, "lost_heat", "heat that has left through the boundary since time 0");
 /// Heat that has entered through the boundary.
-pub const ENTERED_HEAT: EnergyKind = EnergyKind::new(16, Role::Heat, "entered_heat");
+pub const ENTERED_HEAT: EnergyKind = EnergyKind::new(
+    16,
+    Role::Heat,
+    "entered_heat",
+    "heat that has entered through the boundary since time 0, at each node the sum of flux, convection and what a \
+     given temperature takes",
+);
 
 /// The temperature in K at the nodes.
 pub const TEMPERATURE: Quantity = quantity!("temperature");

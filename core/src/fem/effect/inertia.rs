@@ -5,7 +5,8 @@ use crate::{
 };
 
 /// Kinetic energy.
-pub const KINETIC: EnergyKind = EnergyKind::new(0, Role::Stored, "kinetic_energy");
+pub const KINETIC: EnergyKind =
+    EnergyKind::new(0, Role::Stored, "kinetic_energy", "kinetic energy of the body at the end of the step");
 
 /// Inertia with consistent mass: `(1/k) M (v_n - v_{n-1})` in (25).
 #[derive(Debug)]

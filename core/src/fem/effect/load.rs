@@ -11,7 +11,13 @@ use crate::{
 };
 
 /// Work of loads and of obstacles that move.
-pub const WORK: EnergyKind = EnergyKind::new(5, Role::Work, "external_work");
+pub const WORK: EnergyKind = EnergyKind::new(
+    5,
+    Role::Work,
+    "external_work",
+    "work of loads, moving supports and obstacles whose motion is prescribed, on the body since time 0; with an \
+     obstacle that a force moves, also that of the guide that keeps it on its direction",
+);
 
 /// A force per area on facets of this rank.
 #[derive(Debug)]

@@ -6,7 +6,12 @@ use crate::{
 };
 
 /// Dissipated by viscosity.
-pub const VISCOUS: EnergyKind = EnergyKind::new(2, Role::Dissipated, "viscous_dissipation");
+pub const VISCOUS: EnergyKind = EnergyKind::new(
+    2,
+    Role::Dissipated,
+    "viscous_dissipation",
+    "dissipated by viscosity, `material.damping` and dashpots of supports since time 0",
+);
 
 /// Viscous stress `A e(v_n)` in (25), implicit.
 #[derive(Debug)]

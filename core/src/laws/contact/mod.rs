@@ -34,7 +34,7 @@ pub use normal_law::{NodeContext, NormalParameters, Resolved, Response};
 pub use obstacle_load::ObstacleLoad;
 pub use obstacle_motion::{ObstacleMotion, Rate};
 pub use obstacle_sweep::{GivenGap, Sweep};
-pub use obstacles::{Gap, Plane, Shape, Sphere};
+pub use obstacles::*;
 pub use polyline::Polyline;
 pub use steepness::{Decrease, LawsOfContact};
 pub use table::{Contact, Quadrature, Side, Sliding};

@@ -19,7 +19,7 @@ pub(super) struct Prescribed<'a> {
     pub axis: Option<&'a [f64]>,
 }
 
-/// A rigid obstacle that a job may choose. The defaults are those of one that turns about an axis through its centre.
+/// A rigid obstacle that a job may choose. The defaults are those of one without edges that turns about an axis through its centre.
 pub(super) trait Obstacle {
     /// Its motion.
     fn prescribed(&self) -> Prescribed<'_>;
@@ -44,6 +44,16 @@ pub(super) trait Obstacle {
     /// Whether a straight way may enter and leave the obstacle.
     fn has_other_side(&self) -> bool {
         true
+    }
+
+    /// Whether its surface is known to have no edges, so that a point touches it along one direction.
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
+    /// Whether it is in 3D only, with an axis whether it turns or not.
+    fn is_spatial(&self) -> bool {
+        false
     }
 
     /// Angular velocity in rad/s at the end of a step.

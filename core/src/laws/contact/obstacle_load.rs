@@ -30,7 +30,7 @@ pub struct ObstacleLoad {
     #[serde(default)]
     #[schemars(extend("unit" = "m/s"), example = 1.0)]
     pub velocity: f64,
-    /// The moment (torque) about the centre of a sphere or shape, counterclockwise; in 3D about its `axis`, as seen against its direction: a
+    /// The moment (torque) about the centre of an obstacle other than a plane, counterclockwise; in 3D about its `axis`, as seen against its direction: a
     /// number, or an expression in t. In a plane problem it is a moment per metre of thickness. It acts against friction only: the
     /// shape itself does not turn, and should be round about the axis. Absent: the obstacle turns by its key `rotation`, or not at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -1,10 +1,10 @@
 //! The velocity of the material of an obstacle, relative to which friction acts.
 //!
-//! An obstacle is a rigid body. With the point `x` of a plane or the centre `x` of a sphere or shape, and a point `y` of its surface, the
+//! An obstacle is a rigid body. With the point `x` of a plane or the centre `x` of another obstacle, and a point `y` of its surface, the
 //! velocity of its material at `y` is
 //!
 //! ```text
-//! w = x' + omega x (y - x),    omega = rotation axis          of a sphere or shape; in 2D the axis is z
+//! w = x' + omega x (y - x),    omega = rotation axis          of others; in 2D the axis is z
 //!                              omega = rotation m + m x m'    of a plane with the unit normal m
 //! ```
 //!

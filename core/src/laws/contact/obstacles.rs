@@ -10,11 +10,14 @@
 
 mod plane;
 mod shape;
+mod signed_distance;
 mod sphere;
+mod torus;
 
 pub use plane::Plane;
 pub use shape::Shape;
 pub use sphere::Sphere;
+pub use torus::Torus;
 
 use super::{
     obstacle::{Obstacle, Prescribed, obstacles, vector},
@@ -33,6 +36,8 @@ obstacles! {
     Plane = "plane",
     /// A sphere, in 2D a disc.
     Sphere = "sphere",
+    /// A ring with a round cross-section, in 3D.
+    Torus = "torus",
     /// Any shape, given by the distance from its surface, such as a cylinder, a cone or a punch with round edges, or by a
     /// triangulated surface.
     Shape = "shape",
@@ -125,7 +130,7 @@ impl Gap {
             && !axis.is_empty()
             && axis.iter().all(|&x| x == 0.0)
         {
-            let help = "give the direction of the axis of rotation";
+            let help = "give the direction of the axis";
             faults.push(LawFault::at_value(key, "the axis is the zero vector", help));
         }
         let [_, (key, normal)] = self.vectors();
@@ -199,21 +204,26 @@ impl Gap {
     /// Whether its prescribed motion may change the direction in which a place sees it.
     pub fn turns_as_seen(&self) -> bool {
         let Prescribed { centre, facing, .. } = self.prescribed();
-        let moves = if matches!(self, Self::Plane(_)) { facing } else { centre };
+        let moves = if facing.is_empty() { centre } else { facing };
         moves.iter().any(Scalar::depends_on_time)
     }
 
-    /// Whether its surface is known to have no edges, so that a point touches it along one direction.
+    /// See [`Obstacle::is_smooth`]; false without an obstacle.
     pub fn is_smooth(&self) -> bool {
-        matches!(self, Self::Plane(_) | Self::Sphere(_))
+        each_obstacle!(self, _ => false, obstacle => obstacle.is_smooth())
     }
 
-    /// The centre in m at `time` of a sphere or shape, the point of a plane; the origin without an obstacle.
+    /// See [`Obstacle::is_spatial`]; false without an obstacle.
+    pub(super) fn is_spatial(&self) -> bool {
+        each_obstacle!(self, _ => false, obstacle => obstacle.is_spatial())
+    }
+
+    /// The centre in m at `time`, the point of a plane; the origin without an obstacle.
     pub fn centre<const D: usize>(&self, time: f64) -> Vector<D> {
         vector(self.prescribed().centre, time)
     }
 
-    /// The direction of the axis of rotation of a sphere or shape; in the plane z.
+    /// The direction of the axis of rotation; in the plane z.
     pub fn axis(&self) -> Vector<3> {
         axis_of(self.prescribed().axis.unwrap_or_default())
     }

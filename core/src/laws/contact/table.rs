@@ -281,8 +281,8 @@ impl Contact {
     fn faults_of_moment(&self, obstacle: &Gap) -> impl Iterator<Item = LawFault> {
         let moment = self.moment().map(|_| obstacle);
         let of_plane = moment.filter(|obstacle| matches!(obstacle, Gap::Plane(_))).map(|_| {
-            let message = "a moment turns a sphere or a shape about its centre, not a plane";
-            let help = "use a sphere or a shape, or give the plane a `rotation`";
+            let message = "a moment turns an obstacle about its centre, and a plane has none";
+            let help = "use a sphere, a torus or a shape, or give the plane a `rotation`";
             LawFault::at_key("obstacle_load.moment", message, help)
         });
         let twice = moment.and_then(Gap::rotation_key).map(|key| {
@@ -293,7 +293,7 @@ impl Contact {
     }
 
     /// The fault of the rotation of the obstacle of a body of this dimension: in 2D a disc or shape rotates about its centre, and a line
-    /// does not rotate; in 3D a sphere or shape needs an axis.
+    /// does not rotate; in 3D a sphere or shape needs an axis, and a torus has one.
     pub fn fault_of_rotation(&self, dimension: usize) -> Option<LawFault> {
         let obstacle = self.obstacle.as_ref()?;
         let (rotation, axis) = (obstacle.rotation_key(), obstacle.given_axis().map(|(key, _)| key));
@@ -301,6 +301,11 @@ impl Contact {
             let message = "in 2D a plane cannot rotate about its normal";
             let help = "delete it; for a belt, let `point` move along the line; for a tilting line, let `normal` depend on t";
             return rotation.filter(|_| dimension == 2).map(|key| LawFault::at_value(key, message, help));
+        }
+        if obstacle.is_spatial() {
+            let message = format!("a {} is an obstacle in 3D only", obstacle.name());
+            let help = "in 2D a `sphere` is a disc, which beside a body of revolution is a ring";
+            return (dimension == 2).then(|| LawFault::at_key("obstacle", message, help));
         }
         let turning = rotation.or_else(|| self.moment().map(|_| "obstacle_load.moment".to_owned()));
         match (axis, turning) {

@@ -12,9 +12,17 @@ use crate::{
 };
 
 /// Dissipated by contact, or absorbed by contact memory.
-pub const CONTACT: EnergyKind = EnergyKind::new(4, Role::Dissipated, "contact_dissipation");
+pub const CONTACT: EnergyKind = EnergyKind::new(
+    4,
+    Role::Dissipated,
+    "contact_dissipation",
+    "dissipated by contact and friction since time 0, with an error of the time scheme in steps in which a rigid \
+     obstacle closes or opens; it decreases where foundations return energy (contact memory, `symmetry = \"even\"` in \
+     separation)",
+);
 /// Stored in contact (compliant foundations).
-pub const STORED_IN_CONTACT: EnergyKind = EnergyKind::new(7, Role::Stored, "contact_energy");
+pub const STORED_IN_CONTACT: EnergyKind =
+    EnergyKind::new(7, Role::Stored, "contact_energy", "energy stored by contact laws");
 
 /// Energies of a contact in a step, in J, and powers at its end, in W.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

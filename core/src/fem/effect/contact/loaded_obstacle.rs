@@ -25,12 +25,26 @@ use crate::{
 };
 
 /// Kinetic energy of the obstacles that forces and moments move.
-pub const OBSTACLE_KINETIC: EnergyKind = EnergyKind::new(11, Role::Stored, "obstacle_kinetic_energy");
+pub const OBSTACLE_KINETIC: EnergyKind = EnergyKind::new(
+    11,
+    Role::Stored,
+    "obstacle_kinetic_energy",
+    "kinetic energy of obstacles that forces and moments move (`obstacle_load`), of their translation and rotation",
+);
 /// Work of the forces and moments on obstacles.
-pub const OBSTACLE_WORK: EnergyKind = EnergyKind::new(12, Role::Work, "obstacle_work");
+pub const OBSTACLE_WORK: EnergyKind = EnergyKind::new(
+    12,
+    Role::Work,
+    "obstacle_work",
+    "work of these forces and moments on the obstacles since time 0",
+);
 /// Terms of the time scheme in the motions of obstacles.
-pub const OBSTACLE_NUMERICAL: EnergyKind =
-    EnergyKind::new(13, Role::Numerical, "obstacle_numerical_dissipation");
+pub const OBSTACLE_NUMERICAL: EnergyKind = EnergyKind::new(
+    13,
+    Role::Numerical,
+    "obstacle_numerical_dissipation",
+    "dissipated by the time scheme in the motion of these obstacles since time 0; negative if the scheme produces energy",
+);
 
 /// The distance between two places of an obstacle, relative to its size, of which the difference of gaps is taken.
 const NEAR: f64 = 1e-5;

@@ -15,7 +15,13 @@ use crate::{
 };
 
 /// Absorbed by viscoplastic flow: dissipated, or stored by hardening.
-pub const VISCOPLASTIC: EnergyKind = EnergyKind::new(3, Role::Dissipated, "viscoplastic_dissipation");
+pub const VISCOPLASTIC: EnergyKind = EnergyKind::new(
+    3,
+    Role::Dissipated,
+    "viscoplastic_dissipation",
+    "dissipated by viscoplastic flow since time 0, with the energy stored by hardening; falls where kinematic \
+     hardening gives it back",
+);
 
 /// The stress `H` that flow leaves.
 pub const STRESS_OF_FLOW: Quantity = quantity!("viscoplastic_history");
