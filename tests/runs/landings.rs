@@ -95,8 +95,8 @@ fn a_support_of_a_body_without_mass_moves_by_the_integral_of_its_velocity_whatev
         for adaptive in ["", "adaptive = { tolerance = 1e-2, smallest_step = 1e-4, largest_step = 1 }"] {
             let case = Case::written_as(&format!(
                 "mesh.rectangle = {{ size = [1, 1], cells = [2, 2] }}
-                 material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e3, poisson_ratio = 0.3 }} }}
-                 material.viscosity = {{ volumetric = 1, shear = 1e3 }}
+                 material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e3, poisson_ratio = 0.3 }},
+                              viscosity = {{ volumetric = 1, shear = 1e3 }} }}
                  support = [{{ on = ['top'], fix = 'all', velocity = [0, '{speed}'] }}]
                  output.probe = [{{ name = 'top', point = [0.5, 1] }}]
                  [time]\nend = 3\nscheme = '{scheme}'\n{adaptive}"
