@@ -22,7 +22,7 @@ const FUNCTIONS: &[&str] = &[
     "(VecEqual|PetscObject(Reference|Destroy|TypeCompare))",
     "Mat(GetBlockSize|GetBlockSizes|SetBlockSizes|GetLocalSize|GetRowIJ|RestoreRowIJ|MPIAIJGetSeqAIJ|SeqAIJGetArrayRead|SeqAIJRestoreArrayRead)",
     "PCMG(SetLevels|GetCoarseSolve|GetLevels|(Get|Set)Interpolation|SetRestriction|GetSmoother|SetResidual|ResidualDefault)",
-    "MatPtAP",
+    "Mat(PtAP|GetSize|GetDiagonal)",
     "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",
     "Mat(CreateShell|ShellSetContext|ShellGetContext|ShellSetOperation)",
     "MatNullSpace(Create|CreateRigidBody|SetFunction)",

@@ -104,6 +104,58 @@ fn multigrid_takes_as_many_iterations_as_it_did() {
     ]);
 }
 
+/// Layers of stiff and of soft material, and a stiff inclusion: aggregates of multigrid do not reach across.
+#[test]
+fn multigrid_takes_few_iterations_where_stiffness_jumps() {
+    for (modulus, most) in [
+        ("if(sin(8*pi*z) > 0, 1e5, 1e3)", 32.0),
+        ("if((abs(x - 0.5) < 0.25)*(abs(y - 0.5) < 0.25)*(abs(z - 0.5) < 0.25), 1e9, 1e3)", 24.0),
+    ] {
+        let case = Case::written_as(
+            "
+            mesh.box = {size = [1.0, 1.0, 1.0], cells = [16, 16, 16]}
+            time = {scheme = 'implicit_euler', end = 1.0, step = 1.0}
+            support = [{on = ['bottom'], fix = 'all'}]
+            traction = [{on = ['top'], value = ['4', '0', '-10*x']}]
+            solver = {preconditioner = 'gamg', tolerance = 1e-8}
+            [material]
+            density = 1e-3
+            elasticity = {youngs_modulus = 1e3, poisson_ratio = 0.3}",
+        );
+        let case = case.set("material.elasticity.youngs_modulus", &format!("'{modulus}'"));
+        let found = case.run(1).number("linear_iterations");
+        assert!(found <= most, "{modulus}: {found} iterations");
+    }
+}
+
+/// A block that slides on a plane: friction resists a change of the direction of slip far more than the block does.
+#[test]
+fn multigrid_takes_hardly_longer_where_a_block_slides_in_space_than_without_friction() {
+    let block = || {
+        Case::written_as(
+            "
+        mesh.box = {size = [1, 1, 1], cells = [12, 12, 12]}
+        time = {scheme = 'bdf2', end = 0.125, step = 0.015625}
+        traction = [{on = ['top'], value = ['min(40*t, 4)', 0, -10]}]
+        solver = {preconditioner = 'gamg', tolerance = 1e-8}
+        [material]
+        density = 1
+        elasticity = {youngs_modulus = 1000, poisson_ratio = 0.3}
+        [[contact]]
+        on = ['bottom']
+        normal.unilateral = {}
+        friction.coulomb.coefficient = 0.3",
+        )
+    };
+    let each = |coefficient: &str| {
+        let case = block().set("contact.0.friction.coulomb.coefficient", coefficient);
+        let results = case.run(1);
+        results.number("linear_iterations") / results.number("newton_iterations")
+    };
+    let [with, without] = ["0.3", "0"].map(each);
+    assert!(with <= 1.5 * without, "{with} iterations a solve, {without} without");
+}
+
 /// A pressed pair of curved blocks whose nodes touch and part in turn under full steps, where a line search takes fifty short ones.
 #[test]
 fn a_pair_of_quadratic_cells_that_full_steps_turn_round_takes_few_iterations() {

@@ -43,8 +43,10 @@ impl BlockProduct {
 
 impl Action for BlockProduct {
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        self.subspace
-            .restricted(x, |x| multiply(self.others.as_ref(), |x, y| self.own.multiply(x, y), x, y))?;
+        self.subspace.restricted(x, |x| {
+            multiply(self.others.as_ref(), |x, y| self.own.multiply(x, y), x, y)?;
+            self.subspace.add_slopes(x, y)
+        })?;
         self.subspace.project(y)
     }
 

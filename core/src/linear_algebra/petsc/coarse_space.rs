@@ -63,7 +63,7 @@ impl CoarseSpace {
             // The smoother may still have the matrix of the set-up before.
             check(sys::KSPSetOperators(smoother, fine, fine))?;
             levels::set_interpolation(pc, 1, self.interpolation.get())?;
-            levels::restore_interpolations(levels::preconditioner_of(coarse)?, &self.levels)?;
+            levels::restore(levels::preconditioner_of(coarse)?, &self.levels)?;
             let matrix = Reference::new(|raw| {
                 let (p, first) = (self.interpolation.get(), sys::MAT_INITIAL_MATRIX);
                 sys::MatPtAP(fine, p, first, f64::from(sys::PETSC_DEFAULT), raw)

@@ -6,7 +6,7 @@ use super::{
     library::communicator,
     own_preconditioner::{self, Own, OwnPreconditioner},
     reference::Reference,
-    subspace::Projections,
+    subspace::Restriction,
     sys,
 };
 use crate::error::Result;
@@ -199,7 +199,7 @@ impl Ksp {
     pub fn set_up(&mut self) -> Result<()> {
         let pc = self.preconditioner()?;
         let is_multigrid = levels::is_type(pc, c"mg")?;
-        levels::restore_interpolations(pc, &self.levels)?;
+        levels::restore(pc, &self.levels)?;
         if let Some(own) = &self.own
             && levels::is_type(pc, c"shell")?
         {
@@ -228,8 +228,8 @@ impl Ksp {
     }
 
     /// Restricts multigrid to a subspace, for the applications during which it is [used](Ksp::use_subspace). Collective.
-    pub(super) fn restrict(&mut self, projections: Projections) -> Result<()> {
-        let coarse = levels::restrict(&mut self.levels, projections)?;
+    pub(super) fn restrict(&mut self, restriction: Restriction) -> Result<()> {
+        let coarse = levels::restrict(&mut self.levels, restriction)?;
         if let Some(levels) = self.coarse.as_mut().map(|coarse| &mut coarse.levels) {
             levels::restrict(levels, coarse)?;
         }

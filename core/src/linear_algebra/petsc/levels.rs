@@ -5,9 +5,11 @@ use super::{
     block_product::BlockProduct,
     block_transfer::{BlockTransfer, TransferShell},
     check,
+    coarsest::Coarsest,
+    diagonal::InverseDiagonal,
     reference::Reference,
     shell::Shell,
-    subspace::{Fields, OnLevel, Projections},
+    subspace::{Fields, OnLevel, Restriction},
     sys,
 };
 use crate::error::Result;
@@ -17,6 +19,8 @@ use std::{ffi::CStr, ptr, rc::Rc};
 #[derive(Debug, Default)]
 pub(super) struct Level {
     smoother: Option<Shell>,
+    /// The preconditioner of the smoother, in place of PETSc's.
+    diagonal: Option<Box<InverseDiagonal>>,
     transfer: Option<Interpolated>,
     fine: Rc<OnLevel>,
     coarse: Rc<OnLevel>,
@@ -37,20 +41,20 @@ impl Level {
         self.smoother.is_some() && self.transfer.is_some()
     }
 
-    /// Sets the projection of this level, and returns that of the coarser one. Collective.
-    fn restrict(&mut self, projections: Projections) -> Result<Projections> {
+    /// Sets the subspace of this level, and returns that of the coarser one. Collective.
+    fn restrict(&mut self, restriction: Restriction) -> Result<Restriction> {
         let Some(Interpolated { copy: TransferShell { blocks, others, .. }, original, fields }) =
             &mut self.transfer
         else {
-            return Ok(projections);
+            return Ok(restriction);
         };
         let (raw, others) = (original.get(), others.as_deref());
         let fields = match fields {
             Some(fields) => fields,
             none => none.insert(Fields::new(raw, *blocks, others)?),
         };
-        let coarser = fields.coarser(raw, others, &projections)?;
-        self.fine.set(projections);
+        let coarser = fields.coarser(raw, others, &restriction)?;
+        self.fine.set(restriction);
         self.coarse.set(coarser.clone());
         Ok(coarser)
     }
@@ -85,6 +89,16 @@ pub(super) fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
     }
 }
 
+/// Whether a solver has this type.
+fn is_type_of_solver(solver: sys::KSP, name: &CStr) -> Result<bool> {
+    let mut kind = ptr::null();
+    // SAFETY: live solver; PETSc's names are NUL-terminated and live as long as their object.
+    unsafe {
+        check(sys::KSPGetType(solver, &mut kind))?;
+        Ok(!kind.is_null() && CStr::from_ptr(kind) == name)
+    }
+}
+
 /// Replaces the matrices of each level of a preconditioner that is set up by copies; the list is empty for preconditioners other
 /// than multigrid. The preconditioner must not be applied after the levels are dropped. Collective.
 pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
@@ -97,6 +111,12 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
     unsafe {
         check(sys::PCMGGetLevels(pc, &mut count))?;
         let mut coarser: Rc<OnLevel> = Rc::default();
+        if is_type(pc, c"gamg")? {
+            let (mut solver, mut matrix) = (ptr::null_mut(), ptr::null_mut());
+            check(sys::PCMGGetCoarseSolve(pc, &mut solver))?;
+            check(sys::KSPGetOperators(solver, ptr::null_mut(), &mut matrix))?;
+            coarser.set_coarsest(Coarsest::of(matrix)?);
+        }
         for number in 1..count {
             let mut level = Level { coarse: coarser, ..Level::default() };
             coarser = level.fine.clone();
@@ -105,6 +125,15 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
             check(sys::KSPGetOperators(smoother, ptr::null_mut(), &mut matrix))?;
             if let Some(shell) = BlockProduct::shell::<f32>(matrix, &level.fine)? {
                 check(sys::KSPSetOperators(smoother, shell.raw.get(), matrix))?;
+                // Chebyshev's bounds hold with what is added to both the matrix and its diagonal.
+                let jacobi = preconditioner_of(smoother)?;
+                if is_type(jacobi, c"jacobi")? && is_type_of_solver(smoother, c"chebyshev")? {
+                    // PETSc keeps the bounds that it knows from the set-up for its own preconditioner alone.
+                    check(sys::KSPSetUp(smoother))?;
+                    let diagonal = Box::new(InverseDiagonal::of(matrix, &level.fine)?);
+                    diagonal.attach(jacobi)?;
+                    level.diagonal = Some(diagonal);
+                }
                 check(sys::PCMGSetResidual(pc, number, Some(sys::PCMGResidualDefault), shell.raw.get()))?;
                 level.smoother = Some(shell);
             }
@@ -128,8 +157,8 @@ pub(super) fn can_be_restricted(levels: &[Level]) -> bool {
 
 /// Restricts levels to a subspace of the finest, the last of them, for solves during which they are [used](use_subspace); returns the
 /// projection of the coarsest level, which has none of these matrices. Collective.
-pub(super) fn restrict(levels: &mut [Level], finest: Projections) -> Result<Projections> {
-    levels.iter_mut().rev().try_fold(finest, |projections, level| level.restrict(projections))
+pub(super) fn restrict(levels: &mut [Level], finest: Restriction) -> Result<Restriction> {
+    levels.iter_mut().rev().try_fold(finest, |restriction, level| level.restrict(restriction))
 }
 
 /// Lets products be those on the subspace, or on the whole space. On all ranks alike.
@@ -140,12 +169,20 @@ pub(super) fn use_subspace(levels: &[Level], in_use: bool) {
     }
 }
 
-/// Restores PETSc's own interpolations, from which PETSc computes coarse matrices.
-pub(super) fn restore_interpolations(pc: sys::PC, levels: &[Level]) -> Result<()> {
+/// Restores PETSc's own interpolations, from which PETSc computes coarse matrices, and its smoothers.
+pub(super) fn restore(pc: sys::PC, levels: &[Level]) -> Result<()> {
     for (level, number) in levels.iter().zip(1..) {
         if let Some(Interpolated { original, .. }) = &level.transfer {
             // SAFETY: live objects of this preconditioner.
             unsafe { set_interpolation(pc, number, original.get())? };
+        }
+        if level.diagonal.is_some() {
+            let mut smoother = ptr::null_mut();
+            // SAFETY: as before; PETSc sets the matrices of the smoother anew.
+            unsafe {
+                check(sys::PCMGGetSmoother(pc, number, &mut smoother))?;
+                check(sys::PCSetType(preconditioner_of(smoother)?, c"jacobi".as_ptr()))?;
+            }
         }
     }
     Ok(())

@@ -8,7 +8,8 @@ use super::{
     reduced::{ReducedMatrix, block_rows, write_unit},
     reference::Reference,
     shell::symmetric_shell,
-    subspace::Projections,
+    slopes::Slopes,
+    subspace::{Projections, Restriction},
     sys,
 };
 use crate::error::Result;
@@ -34,7 +35,7 @@ pub struct ProjectedKsp {
     /// The same with what was added for the preconditioner alone.
     stiffened: Option<Matrix>,
     reduced: Option<ReducedMatrix>,
-    /// The columns of the projection of each node, and those to which multigrid is restricted.
+    /// The columns of the projection of each node, then of what is added there, and those to which multigrid is restricted.
     columns: Vec<[DistributedVector; 2]>,
     /// Whether multigrid is restricted to any.
     is_known: bool,
@@ -256,20 +257,30 @@ impl ProjectedKsp {
     fn restrict(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<bool> {
         self.restricted = self.restricts && self.ksp.can_be_restricted() && operator.may_project();
         if self.restricted {
-            while self.columns.len() < self.block {
+            while self.columns.len() < 2 * self.block {
                 self.columns.push([like.like()?, like.like()?]);
             }
             let mut is_same = self.is_known;
-            for (i, [column, before]) in self.columns.iter_mut().enumerate() {
+            let (projections, slopes) = self.columns.split_at_mut(self.block);
+            for (i, ([column, before], [slope, slope_before])) in
+                projections.iter_mut().zip(slopes).enumerate()
+            {
                 write_unit(column, i, self.block)?;
                 operator.project(column)?;
+                slope.fill(0.0)?;
+                operator.add_at_nodes(column, slope)?;
                 is_same &= column.equals(before)?;
+                is_same &= slope.equals(slope_before)?;
             }
             if !is_same {
                 for [column, before] in &mut self.columns {
                     before.copy_from(column)?;
                 }
-                self.ksp.restrict(Projections::of(self.columns.iter().map(|[column, _]| column))?)?;
+                let (projections, slopes) = self.columns.split_at(self.block);
+                self.ksp.restrict(Restriction {
+                    projections: Projections::of(projections.iter().map(|[column, _]| column))?,
+                    slopes: Slopes::of(slopes.iter().map(|[column, _]| column))?,
+                })?;
                 self.is_known = true;
             }
         }

@@ -15,6 +15,11 @@ pub trait ProjectedOperator {
     /// `x = P x`: the orthogonal projection on the subspace, node by node.
     fn project(&mut self, x: &mut DistributedVector) -> Result<()>;
 
+    /// `y += S x`: what is added to the constant matrix, as far as that can be told node by node. It serves to precondition.
+    fn add_at_nodes(&mut self, _x: &DistributedVector, _y: &mut DistributedVector) -> Result<()> {
+        Ok(())
+    }
+
     /// Whether the subspace may differ from the whole space.
     fn may_project(&self) -> bool {
         true

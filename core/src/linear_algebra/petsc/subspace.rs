@@ -8,13 +8,15 @@
 
 use super::{
     DistributedVector, check,
+    coarsest::Coarsest,
     compressed_rows::{Others, Parts, own_rows},
     reference::Reference,
+    slopes::{Block, MOST, Slopes, inverse_of_sum},
     sys,
 };
 use crate::{
     error::{Error, Result},
-    linear_algebra::small_eigen::{Small, eigenpairs},
+    linear_algebra::small_eigen::eigenpairs,
 };
 use std::{
     cell::{Cell, RefCell},
@@ -23,12 +25,6 @@ use std::{
 
 /// Largest share of the square of a coarse field that the finer projection may remove. Iterations are nearly the same between 0.05 and 0.2.
 const LARGEST_SHARE: f64 = 0.1;
-/// Most fields of a node.
-const MOST: usize = 6;
-
-/// A block of the fields of two nodes.
-type Block = Small<MOST>;
-
 /// The nodes of this rank at which a projection is not the identity.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Projections {
@@ -67,8 +63,13 @@ impl Projections {
         }
     }
 
+    /// Whether it removes nothing on this rank.
+    pub(super) fn is_identity(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
     /// `x = P x`.
-    fn apply(&self, x: &mut [f64]) {
+    pub(super) fn apply(&self, x: &mut [f64]) {
         for (node, matrix) in self.nodes.iter().zip(&self.matrices) {
             let x = &mut x[node * self.block..][..self.block];
             let mut before = [0.0; MOST];
@@ -77,6 +78,18 @@ impl Projections {
                 *x = row.iter().zip(before).map(|(entry, x)| entry * x).sum();
             }
         }
+    }
+
+    /// `P S P`.
+    fn restrict(&self, slopes: &mut Slopes) {
+        slopes.map(|node, slopes| match self.nodes.binary_search(&node) {
+            Ok(at) => {
+                let mut both = Block::default();
+                add_weighed(&mut both, slopes, &self.matrices[at]);
+                both
+            }
+            Err(_) => *slopes,
+        });
     }
 
     /// The nodes with the projections `I - P` on what is removed.
@@ -89,18 +102,73 @@ impl Projections {
     }
 }
 
+/// A subspace of a level, and what contact adds to its matrix there.
+#[derive(Debug, Default, Clone)]
+pub(super) struct Restriction {
+    pub projections: Projections,
+    pub slopes: Slopes,
+}
+
 /// The subspace on one level.
 #[derive(Debug, Default)]
 pub(super) struct OnLevel {
     projections: RefCell<Projections>,
+    /// What is added to the equations of nodes, where the smoother has the diagonal.
+    slopes: RefCell<Slopes>,
+    /// The diagonal of the matrix, if the smoother uses what is known here.
+    diagonal: RefCell<Vec<f64>>,
+    /// The inverse of the diagonal with the slopes, for the nodes that have some.
+    stiffened: RefCell<Slopes>,
+    /// The solver of the coarsest level.
+    coarsest: RefCell<Option<Coarsest>>,
     /// Whether products are those on the subspace, on all ranks alike.
     in_use: Cell<bool>,
     work: RefCell<Option<DistributedVector>>,
 }
 
 impl OnLevel {
-    pub(super) fn set(&self, projections: Projections) {
+    pub(super) fn set(&self, Restriction { projections, mut slopes }: Restriction) {
+        let (block, diagonal) = (projections.block, self.diagonal.borrow());
+        projections.restrict(&mut slopes);
+        if let Some(coarsest) = &mut *self.coarsest.borrow_mut() {
+            let is_trivial = projections.is_identity();
+            coarsest.set((!is_trivial).then_some(|x: &mut [f64]| projections.apply(x)), &slopes);
+        }
+        if diagonal.is_empty() {
+            slopes = Slopes::none(block);
+        }
+        let mut stiffened = Slopes::none(block);
+        for (node, slopes) in slopes.iter() {
+            stiffened.push(node, inverse_of_sum(&diagonal[node * block..][..block], &slopes));
+        }
+        self.stiffened.replace(stiffened);
+        self.slopes.replace(slopes);
         self.projections.replace(projections);
+    }
+
+    /// Lets the smoother's diagonal, and with it its products, have what is added.
+    pub(super) fn set_diagonal(&self, diagonal: Vec<f64>) {
+        self.diagonal.replace(diagonal);
+    }
+
+    /// Makes this the coarsest level.
+    pub(super) fn set_coarsest(&self, coarsest: Option<Coarsest>) {
+        self.coarsest.replace(coarsest);
+    }
+
+    /// `y += S x`.
+    pub(super) fn add_slopes(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        if self.in_use.get() {
+            self.slopes.borrow().add_product(&x.owned()?, &mut y.owned_mut()?);
+        }
+        Ok(())
+    }
+
+    /// Solves with the diagonal and the slopes of the nodes that have some.
+    pub(super) fn solve_stiffened(&self, x: &[f64], y: &mut [f64]) {
+        if self.in_use.get() {
+            self.stiffened.borrow().set_product(x, y);
+        }
     }
 
     pub(super) fn set_in_use(&self, in_use: bool) {
@@ -115,7 +183,7 @@ impl OnLevel {
         Ok(())
     }
 
-    /// Calls a function with `P x`. Collective.
+    /// Calls a function with `P x`, or on the coarsest level with the solution of its equations. Collective.
     pub(super) fn restricted(
         &self,
         x: &DistributedVector,
@@ -130,7 +198,13 @@ impl OnLevel {
             none => none.insert(x.like()?),
         };
         work.copy_from(x)?;
-        self.projections.borrow().apply(&mut work.owned_mut()?);
+        {
+            let (projections, mut work) = (self.projections.borrow(), work.owned_mut()?);
+            match &mut *self.coarsest.borrow_mut() {
+                Some(coarsest) => coarsest.correct(|x| projections.apply(x), &mut work),
+                None => projections.apply(&mut work),
+            }
+        }
         act(work)
     }
 }
@@ -164,22 +238,25 @@ impl Fields {
         Ok(fields)
     }
 
-    /// The projection on the coarse level for one on the fine level. Collective.
+    /// The projection and the slopes on the coarse level for those on the fine level. Collective.
     pub(super) fn coarser(
         &mut self,
         interpolation: sys::Mat,
         others: Option<&Others>,
-        fine: &Projections,
-    ) -> Result<Projections> {
+        fine: &Restriction,
+    ) -> Result<Restriction> {
         let block = self.blocks[1];
-        let removed = self.weighed(interpolation, others, fine.removed())?;
+        let mut slopes = Slopes::none(block);
+        let weighed = self.weighed(interpolation, others, fine.slopes.iter())?;
+        weighed.into_iter().enumerate().for_each(|(node, matrix)| slopes.push(node, matrix));
+        let removed = self.weighed(interpolation, others, fine.projections.removed())?;
         let mut coarse = Projections { block, ..Projections::default() };
         for (node, (removed, square)) in removed.iter().zip(&self.squares).enumerate() {
             if (0..block).any(|i| removed[i][i] > 0.0) {
                 coarse.push(node, kept(removed, square, block));
             }
         }
-        Ok(coarse)
+        Ok(Restriction { projections: coarse, slopes })
     }
 
     /// `sum_i I_ij^T W_i I_ij` of each coarse node `j` of this rank, for fine nodes `i` with a weight. Collective.

@@ -101,6 +101,13 @@ impl DistributedVector {
         }
     }
 
+    /// A vector with the layout of the rows of a matrix. Collective.
+    pub(super) fn of_rows(matrix: sys::Mat) -> Result<Self> {
+        // SAFETY: live matrix.
+        let raw = unsafe { Reference::new(|raw| sys::MatCreateVecs(matrix, ptr::null_mut(), raw))? };
+        Ok(Self { raw })
+    }
+
     /// Sets every owned value.
     pub fn fill(&mut self, value: f64) -> Result<()> {
         // SAFETY: live vector, no array of which is borrowed, as in all calls below that write.

@@ -891,6 +891,10 @@ impl<const D: usize> ProjectedOperator for ReducedJacobian<'_, D> {
         Ok(())
     }
 
+    fn add_at_nodes(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)
+    }
+
     fn may_project(&self) -> bool {
         self.contacts
             .iter()

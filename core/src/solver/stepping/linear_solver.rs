@@ -45,6 +45,8 @@ pub struct ProblemSize {
 
 /// Size in bytes above which factors are made on request only.
 const LARGEST_FACTOR: f64 = 4e9;
+/// The mean inverse of the shape quality from which cells count as flat: they are about three times as long as thick.
+const FLAT: f64 = 3.0;
 /// Krylov iterations after which a linear solve fails.
 pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 
@@ -125,7 +127,8 @@ impl Preconditioner {
     /// `factor` is the one that ranks share, if their interface allows it.
     pub(super) fn configure(
         self,
-        [order, ranks]: [usize; 2],
+        [dimension, order, ranks]: [usize; 3],
+        inverse_quality: f64,
         factor: Option<&SharedFactor>,
         ksp: &mut Ksp,
     ) -> Result<()> {
@@ -148,13 +151,14 @@ impl Preconditioner {
                     set_default_option("matptap_via", "allatonce")?;
                 }
                 set_smoother("")?;
+                let threshold = aggregation_threshold(dimension, inverse_quality);
                 if order == 1 {
                     ksp.set_preconditioner("gamg", None)?;
-                    return set_aggregation("");
+                    return set_aggregation("", threshold);
                 }
                 ksp.precondition_on_two_levels()?;
                 set_smoother("mg_coarse_")?;
-                set_aggregation("mg_coarse_")
+                set_aggregation("mg_coarse_", threshold)
             }
             Self::Boomeramg => {
                 require(HAS_HYPRE, "[solver] preconditioner = \"boomeramg\"", "hypre", "use \"gamg\"")?;
@@ -178,9 +182,20 @@ fn set_smoother(prefix: &str) -> Result<()> {
     Ok(())
 }
 
+/// The coupling of two nodes, relative to their own stiffness, from which they may be in one aggregate, on the finest level and on coarser
+/// ones. Couplings across a jump of the stiffness by a factor of 10 or more are weaker than 0.05, and aggregates across it would double the iterations.
+/// Those across flat cells are weaker, too: aggregates along lines would make coarse matrices large, in space as large as the matrix itself.
+fn aggregation_threshold(dimension: usize, inverse_quality: f64) -> &'static str {
+    match dimension {
+        _ if inverse_quality > FLAT => "0.01",
+        2 => "0.05",
+        _ => "0.05,0.02",
+    }
+}
+
 /// Sets how algebraic multigrid with this prefix of its options aggregates nodes.
-fn set_aggregation(prefix: &str) -> Result<()> {
-    for (name, value) in [("threshold", "0.01"), ("agg_nsmooths", "1"), ("reuse_interpolation", "true")] {
+fn set_aggregation(prefix: &str, threshold: &str) -> Result<()> {
+    for (name, value) in [("threshold", threshold), ("agg_nsmooths", "1"), ("reuse_interpolation", "true")] {
         set_default_option(&format!("{prefix}pc_gamg_{name}"), value)?;
     }
     Ok(())

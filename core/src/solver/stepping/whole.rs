@@ -30,6 +30,8 @@ struct Kind {
     dimension: usize,
     order: usize,
     ranks: usize,
+    /// The mean of the inverse shape quality of the cells.
+    inverse_quality: f64,
     /// Whether steps are linear, with neither contact nor flow.
     is_linear: bool,
     /// Whether multigrid acts on the motions that contact leaves free: not on those of middle nodes relative to another body, which are
@@ -55,6 +57,7 @@ impl Whole {
             dimension: D,
             order: body.mesh.order(),
             ranks: session.ranks(),
+            inverse_quality: body.mesh.quality_summary(session).mean_inverse,
             is_linear: body.contacts.is_empty() && !body.flows(),
             restricts: body.coupling.is_none() || body.mesh.order() == 1,
             factor,
@@ -63,10 +66,19 @@ impl Whole {
     }
 
     fn of(kind: Rc<Kind>, like: &DistributedVector) -> Result<Self> {
-        let Kind { preconditioner, dimension, order, ranks, is_linear, restricts, ref factor } = *kind;
+        let Kind {
+            preconditioner,
+            dimension,
+            order,
+            ranks,
+            inverse_quality,
+            is_linear,
+            restricts,
+            ref factor,
+        } = *kind;
         let mut krylov = ProjectedKsp::new("", like, dimension)?;
         let ksp = krylov.linear_solver();
-        preconditioner.configure([order, ranks], factor.as_ref(), ksp)?;
+        preconditioner.configure([dimension, order, ranks], inverse_quality, factor.as_ref(), ksp)?;
         if is_linear {
             ksp.start_from_solution()?;
         }
