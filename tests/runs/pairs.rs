@@ -2012,12 +2012,12 @@ fn a_body_that_stands_because_nodes_beyond_an_edge_bear_it_is_warned_of() {
         ))
         .set("time.step", "1")
     };
-    let words = "nodes of upper.bottom up to 2.00e-1 m beyond the ends of lower.top bear";
+    let words = "nodes of upper.bottom up to 2.00e-1 m beyond the end of lower.top bear";
     for ranks in [1, 2] {
         overhanging(0.7, "auto").run_with(ranks, &[]).expect(0).says(words).says("state side = \"against\"");
     }
     let stable = overhanging(0.3, "auto").run_with(1, &[]).expect(0);
-    assert!(!stable.stdout.contains("beyond the ends"), "{}", stable.stdout);
+    assert!(!stable.stdout.contains("beyond the end"), "{}", stable.stdout);
     let tips = overhanging(0.7, "against").run_with(1, &[]).expect(1);
-    assert!(!tips.stdout.contains("beyond the ends"), "{}", tips.stdout);
+    assert!(!tips.stdout.contains("beyond the end"), "{}", tips.stdout);
 }

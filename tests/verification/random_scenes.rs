@@ -23,10 +23,11 @@ fn chosen() -> Vec<Range<u64>> {
         return [0..JOBS].into_iter().chain(KEPT.map(|kept| kept..kept + 1)).collect();
     };
     let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("CLARKE_RANDOM_SCENES={words}"));
-    vec![match words.split_once("..") {
+    let range = match words.split_once("..") {
         Some((first, end)) => number(first)..number(end),
         None => 0..number(&words),
-    }]
+    };
+    Vec::from([range])
 }
 
 /// The scenario of the jobs whose numbers follow the name of the test.

@@ -4,7 +4,7 @@ use super::coupling::{Inclined, MasterShare};
 use crate::{
     fem::space::{
         Held, SurfacePoint, longest_side,
-        mortar::{Contribution, Facet, Normals, contributions, direction, smooth_direction},
+        mortar::{Contribution, Facet, Normals, contributions, direction, shorter, smooth_direction},
         smooth_points, surface_points,
     },
     linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, larger, norm, outside},
@@ -44,8 +44,8 @@ pub struct PairedNode<const D: usize> {
     pub sharpness: f64,
     /// Whether the other side ends over the facets around it.
     pub meets_end: bool,
-    /// The distance in m of the node from the part of the facets around it that faces the other side; 0 where it is in it.
-    pub beyond: f64,
+    /// The way in m to the node from the nearest place of the facets around it that faces the other side; 0 where it faces it itself.
+    pub beyond: Vector<D>,
     /// How curved the own side is there: by how much its normal at a corner of a facet around it differs from that of the facet at most, as the
     /// length of the difference of these unit vectors.
     pub curvature: f64,
@@ -277,7 +277,7 @@ impl<const D: usize> Pair<D> {
                 stretch,
                 sharpness: 0.0,
                 meets_end: false,
-                beyond: 0.0,
+                beyond: [0.0; D],
                 curvature: f64::INFINITY,
             })
         });
@@ -356,7 +356,7 @@ impl<const D: usize> Pair<D> {
                     stretch,
                     sharpness,
                     meets_end: false,
-                    beyond: 0.0,
+                    beyond: [0.0; D],
                     curvature,
                 }
             })
@@ -663,7 +663,7 @@ struct Sum<const D: usize> {
     facing: f64,
     gap: f64,
     passed: f64,
-    beyond: f64,
+    beyond: Vector<D>,
     normal: Vector<D>,
     normals: [Normals<D>; 2],
     masters: BTreeMap<u32, f64>,
@@ -680,7 +680,7 @@ impl<const D: usize> Sum<D> {
             facing,
             gap,
             passed,
-            beyond: f64::INFINITY,
+            beyond: [f64::INFINITY; D],
             normal: [0.0; D],
             normals: [Normals::NONE; 2],
             masters,
@@ -740,7 +740,8 @@ fn sum_of_contributions<const D: usize>(
             let Contribution { node, normal, weight, whole, gap, corners, beyond, normals, masters } =
                 contribution;
             let list: &mut Vec<f64> = &mut outgoing[mesh.owner(*node)];
-            list.extend([f64::from(*node), *weight, *whole, *gap, passed + corners, *beyond]);
+            list.extend([f64::from(*node), *weight, *whole, *gap, passed + corners]);
+            list.extend(beyond);
             list.extend(normal.map(|n| weight * n));
             for normals in normals {
                 list.extend(normals.sum);
@@ -756,14 +757,15 @@ fn sum_of_contributions<const D: usize>(
     let records = exchange_lists(session.world(), &outgoing)?;
     let mut sums: BTreeMap<u32, Sum<D>> = BTreeMap::new();
     let mut rest = &records[..];
-    while let [node, weight, whole, gap, passed, beyond, after @ ..] = rest {
+    while let [node, weight, whole, gap, passed, after @ ..] = rest {
+        let (beyond, after) = after.split_at(D);
         let sum = sums.entry(*node as u32).or_insert_with(Sum::new);
         sum.weight += weight;
         sum.whole += whole;
         sum.facing += if *weight == 0.0 { 0.0 } else { *whole };
         sum.gap += gap;
         sum.passed += passed;
-        sum.beyond = sum.beyond.min(*beyond);
+        sum.beyond = shorter(sum.beyond, std::array::from_fn(|i| beyond[i]));
         (0..D).for_each(|i| sum.normal[i] += after[i]);
         let (of_sides, after) = after[D..].split_at(2 * (D + 1) * D);
         for (sum, given) in sum.normals.iter_mut().zip(of_sides.as_chunks::<D>().0.chunks_exact(D + 1)) {
@@ -916,7 +918,7 @@ mod tests {
             whole: 0.5,
             gap: 1.5,
             corners: 0.0,
-            beyond: 0.0,
+            beyond: [0.0; 2],
             normals: [Normals::NONE; 2],
             masters: vec![(master, 0.5)],
         };
@@ -996,7 +998,7 @@ mod tests {
             stretch: 1.0,
             sharpness: 0.0,
             meets_end: false,
-            beyond: 0.0,
+            beyond: [0.0; 2],
             curvature,
         };
         for count in [3, 7, 40] {

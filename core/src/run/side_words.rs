@@ -10,7 +10,7 @@ use crate::{
         state::State,
     },
     job::{self, Job, Side},
-    linear_algebra::tensor::{Vector, larger},
+    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,8 +18,6 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The angle in rad (10 degrees) of edges over faces whose nodes carry the law from which on the user is warned: forces along an inclined
 /// face are 18 % of those across.
 pub(super) const EDGE: f64 = 0.175;
-/// The share of the force of a contact at nodes beyond the ends of what they face from which on it is warned of.
-const OVERHANGING: f64 = 0.25;
 /// Most times the mean pressure at the ends of a side that can carry the law.
 const MANY: f64 = 3.0;
 
@@ -140,35 +138,44 @@ pub(super) fn exchange_of_sides<const D: usize, const S: usize>(
     Ok((at_own * area <= MANY * force).then(|| format!("state side = \"{side}\"")))
 }
 
-/// The warning about a pair of which nodes beyond the ends of the other side bear much of the force at the end of a run, where no surface
-/// supports them. Collective, the same on all ranks.
+/// The warning about a pair whose pressures have their centre beyond an end of the other side at the end of a run, where no surface supports
+/// it: nodes beyond the end bear it. Collective, the same on all ranks.
 pub(super) fn warning_of_overhang<const D: usize, const S: usize>(
     (session, job): (&Session, &Job),
     (body, pair): (&Body<D, S>, &Pair<D>),
     state: &State,
 ) -> Result<Option<String>> {
-    let velocity = session.agree(state.velocity.local())?;
-    let (mut forces, mut farthest) = ([0.0; 2], 0.0);
-    for (node, [pressure, area]) in body.contacts[pair.contact]
-        .pressures(&body.seen_by_contacts(&velocity))
-        .filter(|(_, [p, _])| *p > 0.0)
-    {
-        forces[0] += pressure * area;
-        if let Some(node) = pair.node(node).filter(|node| node.beyond > 0.0) {
-            forces[1] += pressure * area;
-            farthest = larger(farthest, node.beyond);
+    let mut seen: Vec<(usize, f64)> = {
+        let velocity = session.agree(state.velocity.local())?;
+        let velocity = body.seen_by_contacts(&velocity);
+        let pressures = body.contacts[pair.contact].pressures(&velocity);
+        pressures.map(|(node, [pressure, area])| (node, pressure * area)).collect()
+    };
+    seen.retain(|(_, force)| *force > 0.0);
+    let place = |node: usize| body.mesh.nodes[node];
+    let [whole] = session.sum([seen.iter().map(|(_, force)| force).sum()]);
+    let moments = seen.iter().fold([0.0; D], |sum, (node, force)| add_scaled(&sum, *force, &place(*node)));
+    let centre = session.sum(moments).map(|moment| moment / whole);
+    let (mut borne, mut farthest) = (0.0, 0.0);
+    for (node, force) in &seen {
+        let Some(beyond) = pair.node(*node).map(|node| node.beyond) else { continue };
+        // From the end that is nearest to the node.
+        let from_end = add_scaled(&add_scaled(&centre, -1.0, &place(*node)), 1.0, &beyond);
+        if dot(&from_end, &beyond) > 0.0 {
+            borne += force;
+            farthest = larger(farthest, norm(&beyond));
         }
     }
-    let [whole, beyond] = session.sum(forces);
+    let [borne] = session.sum([borne]);
     let [farthest] = session.largest([farthest]);
     let [own, other] = names_of_sides(job, pair);
     let side = if pair.exchange.is_some() { "on" } else { "against" };
-    Ok((beyond > OVERHANGING * whole).then(|| {
+    Ok((borne > 0.0).then(|| {
         format!(
-            "contact.{}: nodes of {own} up to {farthest:.2e} m beyond the ends of {other} bear {:.0} % of the force: a body that would tip over \
-             such an end stands; state side = \"{side}\", or take smaller facets of {own} there, until these nodes bear little",
+            "contact.{}: nodes of {own} up to {farthest:.2e} m beyond the end of {other} bear {:.0} % of the force, whose centre lies beyond this end: \
+             the body would tip over it; state side = \"{side}\", or take smaller facets of {own} there",
             pair.contact,
-            100.0 * beyond / whole
+            100.0 * borne / whole
         )
     }))
 }

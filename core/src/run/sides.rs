@@ -417,7 +417,7 @@ mod tests {
             stretch: 1.0,
             sharpness: 0.0,
             meets_end: false,
-            beyond: 0.0,
+            beyond: [0.0; 2],
             curvature: if is_curved { 1.0 } else { 0.0 },
         };
         conflict(&node, &held, rubs, |direction| vec![(1.0, norm(&held.free_part(1, direction)))])

@@ -28,9 +28,9 @@
 //! each of the two middles beside a corner takes over half of its psi_c, so that the sum remains 1.
 
 use crate::linear_algebra::tensor::{Vector, in_space};
+pub use geometry::shorter;
 use geometry::{
-    Plane, Point, Shape, clip, distance_from, dot, measure_and_centroid, oriented, quadrature, sides,
-    subtract,
+    Plane, Point, Shape, clip, dot, measure_and_centroid, oriented, quadrature, sides, subtract, way_from,
 };
 use rstar::{
     AABB, RTree, RTreeObject, SelectionFunction,
@@ -83,8 +83,8 @@ pub struct Contribution<const D: usize> {
     /// covered. With `weight` it is int psi_a: the part of the surface for which the node stands, which may be negative where the facet is
     /// covered in part.
     pub corners: f64,
-    /// The distance in m of the node from the covered part of the facet; infinite where nothing is covered.
-    pub beyond: f64,
+    /// The way in m to the node from the nearest place of the covered part of the facet; infinite where nothing is covered.
+    pub beyond: Vector<D>,
     /// Over the covered part of the facet: its outward unit normal and those of the master facets, in the undeformed bodies.
     pub normals: [Normals<D>; 2],
     /// For each master node b, in ascending order, int psi_a phi_b in m^(D-1), with phi_b at the place on the
@@ -413,7 +413,7 @@ impl<'a, const D: usize> Slave<'a, D> {
             whole: self.measure * facet.share(i),
             gap: 0.0,
             corners: 0.0,
-            beyond: f64::INFINITY,
+            beyond: [f64::INFINITY; D],
             normals: [Normals::NONE; 2],
             masters: Vec::new(),
         }));
@@ -444,9 +444,12 @@ impl<'a, const D: usize> Slave<'a, D> {
         let result = &mut result[first..];
         for (contribution, place) in result.iter_mut().zip(self.places().skip(law.start)) {
             contribution.normals = normals;
-            let distances = parts.iter().map(|part| distance_from::<D>(&part.polygon, place));
-            let beyond = distances.fold(f64::INFINITY, f64::min);
-            contribution.beyond = if beyond > ROUNDING * self.diameter { beyond } else { 0.0 };
+            let ways = parts.iter().map(|part| way_from::<D>(&part.polygon, place));
+            let way = ways.fold([f64::INFINITY; 2], shorter);
+            let is_beyond = dot(&way, &way).sqrt() > ROUNDING * self.diameter;
+            let [first, second] = self.plane.tangents;
+            let along = |i: usize| if is_beyond { way[0] * first[i] + way[1] * second[i] } else { 0.0 };
+            contribution.beyond = std::array::from_fn(along);
         }
         for (contribution, ((dual, m), &(i, j))) in
             result.iter_mut().zip(duals.iter().zip(law.clone()).zip(sides::<D>().iter().cycle()))

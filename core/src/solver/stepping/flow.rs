@@ -38,6 +38,8 @@ struct Part {
 pub(super) struct FlowStart<'a> {
     /// With ghosts, in m.
     pub displacement: &'a DistributedVector,
+    /// That before the step.
+    pub converged: &'a DistributedVector,
     /// In s.
     pub length: f64,
 }

@@ -161,7 +161,7 @@ impl Integrator {
     pub(super) fn flow_start<'a>(&'a self, state: &'a State) -> FlowStart<'a> {
         let displacement =
             self.implicit.as_ref().map_or(&state.displacement, |implicit| &implicit.displacement);
-        FlowStart { displacement, length: self.blend.length }
+        FlowStart { displacement, converged: &state.displacement, length: self.blend.length }
     }
 
     /// The residual norm in N due to rounding errors of the forces. Collective.

@@ -694,7 +694,7 @@ impl Stepper {
         let forces = &mut self.right_hand_side;
         if let Some(supports) = &mut self.moving_supports {
             let start = self.integrator.flow_start(state);
-            supports.impose(session, body, (state, step), start, forces)?;
+            supports.impose(session, body, step, start, forces)?;
         }
         body.held.clear(&mut forces.owned_mut()?);
         if let Some(supports) = &mut self.moving_supports {

@@ -67,13 +67,13 @@ impl MovingSupports {
         &mut self,
         session: &Session,
         body: &Body<D, S>,
-        (state, step): (&State, Step),
-        FlowStart { displacement, length }: FlowStart<'_>,
+        step: Step,
+        FlowStart { displacement, converged, length }: FlowStart<'_>,
         forces: &mut DistributedVector,
     ) -> Result<()> {
         let Some(motion) = &body.support_motion else { return Ok(()) };
         let written = {
-            let (converged, start) = (state.displacement.owned()?, displacement.owned()?);
+            let (converged, start) = (converged.owned()?, displacement.owned()?);
             // Mean velocities change suddenly where the lengths of steps do, and bodies with mass would vibrate.
             let converged = (!body.has_form(Form::Mass)).then_some(&*converged);
             motion.write_velocity(step, (converged, &start), length, &mut self.velocity.owned_mut()?)
@@ -178,7 +178,7 @@ impl MovingSupports {
         body: &mut Body<D, S>,
         step: Step,
         velocity: &DistributedVector,
-        FlowStart { displacement, length }: FlowStart<'_>,
+        FlowStart { displacement, length, .. }: FlowStart<'_>,
     ) -> Result<f64> {
         let mut flow = 0.0;
         if body.flows() {

@@ -93,21 +93,25 @@ pub(super) fn measure_and_centroid<const D: usize>(polygon: &[Point]) -> (f64, P
     (area, std::array::from_fn(|i| first[i] + moment[i] / area))
 }
 
-/// The distance in m of a place from a convex polygon with corners in the order of [`measure_and_centroid`]; 0 within it.
-pub(super) fn distance_from<const D: usize>(polygon: &[Point], place: Point) -> f64 {
+/// The way in m to a place from the nearest one of a convex polygon with corners in the order of [`measure_and_centroid`]; 0 within it.
+pub(super) fn way_from<const D: usize>(polygon: &[Point], place: Point) -> Point {
     let sides = || polygon.iter().zip(polygon.iter().cycle().skip(1));
     let is_left = |(a, b): (&Point, &Point)| cross(subtract(b, a), subtract(&place, a)) >= 0.0;
     if D == 3 && sides().all(is_left) {
-        return 0.0;
+        return [0.0; 2];
     }
     let from_side = |(a, b): (&Point, &Point)| {
         let (side, way) = (subtract(b, a), subtract(&place, a));
         let square = dot(&side, &side);
         let along = if square > 0.0 { (dot(&side, &way) / square).clamp(0.0, 1.0) } else { 0.0 };
-        let beside: Point = std::array::from_fn(|i| way[i] - along * side[i]);
-        dot(&beside, &beside).sqrt()
+        std::array::from_fn(|i| way[i] - along * side[i])
     };
-    sides().map(from_side).fold(f64::INFINITY, f64::min)
+    sides().map(from_side).fold([f64::INFINITY; 2], shorter)
+}
+
+/// The shorter one of two vectors.
+pub fn shorter<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
+    if dot(&b, &b) < dot(&a, &a) { b } else { a }
 }
 
 /// The corners in the order of [`measure_and_centroid`]: ascending in two dimensions, counterclockwise in
