@@ -181,23 +181,32 @@ fn bonds_break_as_accurately_in_a_body_under_a_large_stress_along_them() {
     assert!((with / 2.375 - 1.0).abs() < 0.02, "{with} J under tension, {without} J without");
 }
 
-/// A block without mass that a support takes along after a while.
-fn carried() -> Case {
-    Case::written_as(
+/// A block without mass that a support takes along after a while, until this time.
+fn carried(until: f64) -> Case {
+    Case::written_as(&format!(
         "[mesh.rectangle]\nsize = [0.4, 0.1]\ncells = [4, 2]\n[material]\nhypothesis = \"plane_strain\"\n\
-         elasticity = { youngs_modulus = 1e9, poisson_ratio = 0.3 }\n\
-         viscosity = { volumetric = 1e5, shear = 1e5 }\n\
-         [[support]]\non = [\"left\"]\nfix = [\"x\"]\ndisplacement = [\"1e-2*max(t - 0.0333, 0)\"]\n\
+         elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.3 }}\n\
+         viscosity = {{ volumetric = 1e5, shear = 1e5 }}\n\
+         [[support]]\non = [\"left\"]\nfix = [\"x\"]\n\
+         displacement = [\"interpolate(t, 0, 0, 0.0333, 0, {until}, 1e-2*({until} - 0.0333), 1, 1e-2*({until} - 0.0333))\"]\n\
          [[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n\
          [time]\nend = 0.2\nstep = 0.01\n[time.adaptive]\nsmallest_step = 1e-6\nlargest_step = 0.02\n",
-    )
+    ))
 }
 
 #[test]
 fn a_body_that_moves_as_a_whole_has_no_errors_but_rounding() {
-    for scheme in ["implicit_euler", "bdf2"] {
-        let steps = [1, 2]
-            .map(|ranks| carried().set("time.scheme", &format!("'{scheme}'")).run(ranks).number("steps"));
-        assert!(steps[0] < 60.0 && steps[0] == steps[1], "{scheme}: {steps:?} steps");
+    // In the second run it stops, and rests where it is, and the support moves it by steps whose rounding is that of its displacement.
+    for (until, tolerance) in [(0.3, 1e-3), (0.1, 1e-3), (0.1, 1e-5)] {
+        for scheme in ["implicit_euler", "bdf2"] {
+            let steps = [1, 2].map(|ranks| {
+                let case = carried(until).set("time.scheme", &format!("'{scheme}'"));
+                case.set("time.adaptive.tolerance", &format!("{tolerance}")).run(ranks).number("steps")
+            });
+            assert!(
+                steps[0] < 100.0 && steps[0] == steps[1],
+                "{scheme}, until {until} s at {tolerance}: {steps:?} steps"
+            );
+        }
     }
 }

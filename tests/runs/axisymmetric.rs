@@ -5,6 +5,7 @@ use crate::{
     launch,
     results::{Results, assert_same_answer, relative_difference},
 };
+use std::path::Path;
 
 /// A cylinder under uniform tension along its axis: with crossed diagonals, on the axis.
 fn cylinder() -> Case {
@@ -244,4 +245,52 @@ fn a_mesh_beyond_the_axis_and_what_acts_on_the_axis_are_refused() {
     launch::run(2, &["check", text.to_str().expect("a path")]).expect(0).says(&words);
     let moved = cylinder().set("initial", "{ displacement = [0.001, 0] }");
     moved.run_with(2, &[]).expect(2).says("on the axis of the body of revolution, where it is 0");
+}
+
+/// A ring of this many cells across and through its thickness, whose section of 50 mm x 10 mm is inclined by 0.03 rad, as a mesh for Abaqus;
+/// gives the lowest and the highest y in m.
+fn write_disc_spring(path: &Path, [across, through]: [usize; 2]) -> [f64; 2] {
+    let ends = |count: usize| (0..=count).map(move |at| at as f64 / count as f64 - 0.5);
+    let (sine, cosine) = (-0.03_f64).sin_cos();
+    let (mut text, mut bounds, mut count) = ("*NODE\n".to_owned(), [f64::MAX, f64::MIN], 0);
+    for y in ends(through).map(|y| 0.01 * y) {
+        for x in ends(across).map(|x| 0.05 * x) {
+            let place = [0.075 + cosine * x - sine * y, 0.005 + sine * x + cosine * y];
+            count += 1;
+            bounds = [bounds[0].min(place[1]), bounds[1].max(place[1])];
+            text += &format!("{count}, {}, {}, 0\n", place[0], place[1]);
+        }
+    }
+    text += "*ELEMENT, TYPE=CAX3, ELSET=spring\n";
+    for (j, i) in (0..through).flat_map(|j| (0..across).map(move |i| (j, i))) {
+        let (node, cell) = (|i: usize, j: usize| j * (across + 1) + i + 1, 2 * (j * across + i) + 1);
+        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+        text += &format!("{cell}, {a}, {b}, {c}\n{}, {a}, {c}, {d}\n", cell + 1);
+    }
+    std::fs::write(path, text).expect("written");
+    bounds
+}
+
+/// Rounding errors of gaps from an obstacle that a force moves exceed the tolerance before anything is known to press on the body.
+#[test]
+fn a_disc_spring_without_friction_is_pressed_by_a_plane_that_a_force_moves() {
+    let case = Case::written_as(
+        "mesh.file = 'spring.inp'\nmesh.order = 2\n[material]\nhypothesis = 'axisymmetric'\n\
+         elasticity = { youngs_modulus = 200e9, poisson_ratio = 0.3 }\n\
+         [[contact]]\non = ['surface']\nwhere = 'x > 0.09'\nnormal.unilateral = {}\n\
+         [[contact]]\non = ['surface']\nwhere = 'x < 0.06'\nnormal.unilateral = {}\n\
+         obstacle_load = { direction = [0, -1], force = 't' }\n\
+         [time]\nend = 1.0\nstep = 0.1\nscheme = 'implicit_euler'\n",
+    );
+    let [low, high] = write_disc_spring(&case.folder().join("spring.inp"), [12, 3]);
+    let case = case
+        .set("contact.0.obstacle", &format!("{{ plane = {{ point = [0, {low:?}], normal = [0, 1] }} }}"))
+        .set("contact.1.obstacle", &format!("{{ plane = {{ point = [0, {high:?}], normal = [0, -1] }} }}"))
+        .run_and_keep(1);
+    let iterations = case.results().table("history.csv").numbers("newton_iterations");
+    assert!(iterations[0] <= 10.0, "{iterations:?}");
+    for (source, force) in [("contact surface", 1.0), ("contact surface (2)", -1.0)] {
+        let found = last(&case, ("resultants.csv", "source", source), "force_y");
+        assert!((found / force - 1.0).abs() < 1e-5, "{source}: {found} N");
+    }
 }

@@ -1027,6 +1027,23 @@ fn parts_of_a_fault_with_laws_of_their_own_are_refused_with_a_remedy_that_works(
 }
 
 #[test]
+fn a_fault_is_noted_and_warned_of_only_where_its_name_is_on_the_surface_too() {
+    let words = "lies inside the body: 4 of its facets have a cell on both sides";
+    let fault = with_fault([2, 6]).set("time.end", "0.1");
+    let outcome = fault.run_with(1, &[]).expect(0);
+    let outcome = outcome.says(&format!("fault      \"fault\" {words}"));
+    assert!(!outcome.stdout.contains("correct this name"), "{}", outcome.stdout);
+    let both = with_fault([2, 6]).set("time.end", "0.1");
+    let file = both.folder().join("fault.msh");
+    let text = std::fs::read_to_string(&file).expect("a mesh");
+    std::fs::write(&file, text.replace("4 0 0 0 1 1 0 1 4 0\n", "4 0 0 0 1 1 0 1 3 0\n")).expect("written");
+    let outcome = both.run_with(1, &[]).expect(0);
+    outcome
+        .says("and 8 more on the surface, which the contact leaves out")
+        .says("correct this name in the mesh file");
+}
+
+#[test]
 fn a_fault_that_ends_at_a_support_is_warned_of_with_a_remedy_that_works() {
     let held = |part: &str| {
         let support = format!("[{{ on = ['bottom'], fix = 'all' }}, {{ on = ['left'], fix = 'all'{part} }}]");

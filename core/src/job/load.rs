@@ -28,6 +28,8 @@ pub struct Loaded {
     pub job: Job,
     /// Warnings.
     pub warnings: Vec<String>,
+    /// What the log says of the faults along which the mesh is split.
+    pub faults: Vec<String>,
     /// Whether options of PETSc may write files and load code.
     is_trusted: bool,
     root: Node,
@@ -146,7 +148,7 @@ impl Loaded {
             .map(|[key, message, help]| Fault::new(root.deepest(&key).at.clone(), message, "").help(help));
         let faults: Vec<Fault> = unread.collect();
         if faults.is_empty() {
-            Ok(Self { job, warnings: findings.warnings, is_trusted: false, root, texts })
+            Ok(Self { job, warnings: findings.warnings, faults: Vec::new(), is_trusted: false, root, texts })
         } else {
             Err(texts.refuse(faults))
         }

@@ -88,12 +88,15 @@ pub struct InnerGroup {
     pub facets: usize,
     /// The place of one of them, in words.
     pub place: String,
+    /// Number of its facets on the surface, which are left out.
+    #[serde(default)]
+    pub outer: usize,
 }
 
 impl InnerGroup {
     /// Its line in the description of a mesh.
     pub fn line(&self) -> String {
-        let Self { name, facets, place } = self;
+        let Self { name, facets, place, .. } = self;
         let plural = if *facets == 1 { "" } else { "s" };
         format!(
             "inside      {name}: {facets} facet{plural} inside the body, around {place}; it is not a boundary"

@@ -27,6 +27,6 @@ pub use distributed::{Mesh, distribute};
 pub use global::{Boundary, GlobalMesh, InnerGroup, Names, PointSet};
 pub use midsides::midpoint;
 pub use skeleton::{common_motions, count_free_motions, free_motions};
-pub use split::other_side;
+pub use split::{FoundFault, other_side};
 pub use tags::Tags;
 pub use touching::Meeting;

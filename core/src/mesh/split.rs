@@ -15,6 +15,15 @@ pub fn other_side(fault: &str) -> String {
     format!("other side of {fault}")
 }
 
+/// A fault along which a mesh has been split.
+#[derive(Debug)]
+pub struct FoundFault {
+    /// That its facets are inside the body, and between which cells.
+    pub words: String,
+    /// Number of the facets of its name on the surface, which are left out.
+    pub outer: usize,
+}
+
 /// The sorted nodes of a facet.
 type Sorted<const D: usize> = [u32; D];
 
@@ -185,9 +194,8 @@ impl<const D: usize> GlobalMesh<D> {
     /// Splits the mesh along the facets inside the body that have this name: their nodes become two, except on the edge of the surface
     /// inside the body, where cells stay joined. The sides become two boundaries: that below the surface, left of a vertical one, has this
     /// name, the other one that of [`other_side`]. Refused where the surface branches, meets another fault, has one side only, or has no
-    /// node that can become two. Gives what the user should know, who may have meant a part of the surface; `None` if there are no facets of
-    /// this name inside the body.
-    pub fn split_along(&mut self, name: &str) -> Result<Option<String>> {
+    /// node that can become two. `None` if there are no facets of this name inside the body.
+    pub fn split_along(&mut self, name: &str) -> Result<Option<FoundFault>> {
         let named = |name: &str| self.inner_groups.iter().position(|group| group.name == name);
         let Some(at) = named(name).or_else(|| named(number_of_group(name)?)) else { return Ok(None) };
         let facets = self.inner_facets[at].clone();
@@ -196,7 +204,7 @@ impl<const D: usize> GlobalMesh<D> {
             return Err(Error::Refused(format!("the fault \"{name}\", around {place}, meets another fault")));
         }
         let fault = Fault::new(self, name, facets)?;
-        let note = self.note_of(&fault);
+        let (words, outer) = (self.words_of(&fault), self.inner_groups[at].outer);
         let carriers = fault.carriers(self);
         let carries = |side: Side| carriers[&fault.group(side)];
         self.double_nodes(&fault, carries);
@@ -207,11 +215,11 @@ impl<const D: usize> GlobalMesh<D> {
         let meets =
             |facets: &Vec<Sorted<D>>| facets.iter().flatten().any(|node| fault.split.contains_key(node));
         self.inner_facets.iter_mut().filter(|facets| meets(facets)).for_each(Vec::clear);
-        Ok(Some(note))
+        Ok(Some(FoundFault { words, outer }))
     }
 
-    /// That facets of this name are inside the body, between which cells, and what to do if they were not meant.
-    fn note_of(&self, fault: &Fault<'_, D>) -> String {
+    /// That facets of this name are inside the body, and between which cells.
+    fn words_of(&self, fault: &Fault<'_, D>) -> String {
         let corners = fault.facets[0].map(|node| self.nodes[node as usize]);
         let regions: BTreeSet<&str> = fault.cells[0]
             .iter()
@@ -224,8 +232,7 @@ impl<const D: usize> GlobalMesh<D> {
         };
         format!(
             "\"{}\" lies inside the body: {} of its facets have a cell on both sides, for example {parted} around {}; the mesh is split there into two \
-             sides that touch each other. If you mean a part of the surface, correct this name in the mesh file, which may have the wrong \
-             number of a face of an element",
+             sides that touch each other",
             fault.name,
             fault.facets.len(),
             place(&centroid(&corners))
@@ -316,7 +323,7 @@ mod tests {
             cells.flat_map(|cell| (0..=D).map(|at| sorted(facet_of::<D>(cell, at))).collect::<Vec<_>>());
         let is_on = |facet: &[u32; D]| facet.iter().all(|node| on_it(&mesh.nodes[*node as usize]));
         let facets: BTreeSet<_> = all.filter(|facet| is_on(facet) && !outer.contains(facet)).collect();
-        let group = InnerGroup { name: "fault".into(), facets: facets.len(), place: String::new() };
+        let group = InnerGroup { name: "fault".into(), facets: facets.len(), ..InnerGroup::default() };
         mesh.inner_groups.push(group);
         mesh.inner_facets.push(facets.into_iter().collect());
         mesh

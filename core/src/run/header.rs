@@ -47,6 +47,7 @@ pub(super) fn lines<const D: usize, const S: usize>(
     if session.ranks() > 1 || has_details {
         lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
     }
+    lines.extend(loaded.faults.iter().map(|words| format!("fault      {words}")));
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
     lines.extend(side_words::lines(job, &body.pairs));
     let lengths = match &job.time.adaptive {

@@ -7,7 +7,7 @@ use crate::{
     io::partitioned::{self, PartitionedFile},
     job::{self, Job, Loaded, MeshSource, Partition},
     mesh::{
-        GlobalMesh, Mesh, distribute,
+        FoundFault, GlobalMesh, Mesh, distribute,
         file::{self, AnyMesh, MeshFile, Placement, Rotation},
         generate::{Blocks, Cuboid, Grading, Grid, Rectangle, Toward},
         other_side,
@@ -44,8 +44,9 @@ impl Scene {
             MeshSource::Box(of) => generated(session, blocks(of, cuboid), &loaded.job).map(Self::Three)?,
             MeshSource::File(path) => {
                 session.on_first(|| refuse_missing(path, loaded))?;
-                let (scene, is_second_order, notes) = from_file(session, path, loaded)?;
+                let (scene, is_second_order, [notes, faults]) = from_file(session, path, loaded)?;
                 loaded.warnings.extend(notes);
+                loaded.faults = faults;
                 if is_second_order && order == 1 {
                     loaded.warnings.push(
                         "the cells of the mesh file are of second order, but the run uses only their corners, joined by straight \
@@ -150,9 +151,16 @@ fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
     })
 }
 
+/// What to do where a part of the surface is meant and not a fault.
+const NO_FAULT: &str = "If you mean a part of the surface, correct this name in the mesh file, which may have the wrong number of a face of an element";
+
 /// The mesh of a file, split along boundaries of contacts that are inside the body, whether the file has cells of second order, and what
-/// the user should know about it.
-fn from_file(session: &Session, path: &Path, loaded: &Loaded) -> Result<(Scene, bool, Vec<String>), Agreed> {
+/// the user should know about it and about the faults.
+fn from_file(
+    session: &Session,
+    path: &Path,
+    loaded: &Loaded,
+) -> Result<(Scene, bool, [Vec<String>; 2]), Agreed> {
     let job = &loaded.job;
     let order = usize::from(job.mesh.order);
     let mut in_parts = session.is_first() && partitioned::is_meant(path);
@@ -164,25 +172,36 @@ fn from_file(session: &Session, path: &Path, loaded: &Loaded) -> Result<(Scene, 
             2 => file.mesh(session, order).map(Scene::Two)?,
             _ => file.mesh(session, order).map(Scene::Three)?,
         };
-        return Ok((scene, file.header.curved, Vec::new()));
+        return Ok((scene, file.header.curved, [Vec::new(), Vec::new()]));
     }
-    let read = || -> Result<MeshFile> {
+    let read = || -> Result<(MeshFile, Vec<String>)> {
+        let mut words_of_faults = Vec::new();
         let mut file = file::read(path, &placement(&job.mesh))?;
         let named = |error| Error::Refused(format!("{}: {error}", path.display()));
         let faults = job.contact.iter().filter(|contact| contact.against.is_empty());
         for (contact, fault) in faults.flat_map(|contact| contact.on.iter().map(move |name| (contact, name)))
         {
-            let Some(note) = file.mesh.split_along(fault).map_err(named)? else { continue };
+            let Some(FoundFault { words, outer }) = file.mesh.split_along(fault).map_err(named)? else {
+                continue;
+            };
             if contact.obstacle.is_some() {
                 return Err(named(Error::Refused(format!(
-                    "{note}. A contact with an obstacle is on the surface"
+                    "{words}. {NO_FAULT}. A contact with an obstacle is on the surface"
                 ))));
             }
-            file.notes.push(format!("{}: {note}", path.display()));
+            if outer > 0 {
+                file.notes.push(format!(
+                    "{}: {words}, and {outer} more on the surface, which the contact leaves out. {NO_FAULT}",
+                    path.display()
+                ));
+            } else {
+                words_of_faults.push(words);
+            }
         }
-        Ok(file)
+        Ok((file, words_of_faults))
     };
-    let (whole, notes) = session.on_first(read)?.map(|file| (file.mesh, file.notes)).unzip();
+    let (whole, words) =
+        session.on_first(read)?.map(|(file, faults)| (file.mesh, [file.notes, faults])).unzip();
     let mut facts = match &whole {
         Some(AnyMesh::Two(mesh)) => [2, u8::from(mesh.is_second_order)],
         Some(AnyMesh::Three(mesh)) => [3, u8::from(mesh.is_second_order)],
@@ -196,11 +215,11 @@ fn from_file(session: &Session, path: &Path, loaded: &Loaded) -> Result<(Scene, 
         (2, None) => Scene::Two(split(session, None, job)?),
         (_, None) => Scene::Three(split(session, None, job)?),
     };
-    let mut notes: Vec<String> = notes.unwrap_or_default();
+    let [mut notes, faults] = words.unwrap_or_default();
     if order == 2 {
         notes.iter_mut().for_each(|note| note.truncate(note.trim_end_matches(file::LINEAR_CELLS).len()));
     }
-    Ok((scene, is_second_order == 1, notes))
+    Ok((scene, is_second_order == 1, [notes, faults]))
 }
 
 fn placement(of: &job::Mesh) -> Placement {

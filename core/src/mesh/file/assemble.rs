@@ -368,15 +368,15 @@ fn name_boundaries<const D: usize>(
     for (name, Group { outer: mut facets, mut inner }) in by_name {
         inner.sort_unstable();
         inner.dedup_by_key(|(facet, _)| *facet);
+        facets.sort_unstable();
+        facets.dedup();
         if let Some((facet, _)) = inner.iter().min_by_key(|(_, element)| element) {
             let corners: Vec<Vector<D>> = facet.iter().map(|&node| mesh.nodes[node as usize]).collect();
             let at = place(&shape::centroid(&corners));
-            mesh.inner_groups.push(InnerGroup { name, facets: inner.len(), place: at });
+            mesh.inner_groups.push(InnerGroup { name, facets: inner.len(), place: at, outer: facets.len() });
             mesh.inner_facets.push(inner.iter().map(|(facet, _)| *facet).collect());
             continue;
         }
-        facets.sort_unstable();
-        facets.dedup();
         mesh.boundaries.push(Boundary { name, facets });
     }
     Ok(())

@@ -11,7 +11,7 @@ mod points;
 mod subdivide;
 mod vtu;
 
-use super::GlobalMesh;
+use super::{FoundFault, GlobalMesh};
 use crate::error::{Error, Result, regular_file};
 use document::Document;
 pub use inspect::inspect;
@@ -30,7 +30,7 @@ pub enum AnyMesh {
 
 impl AnyMesh {
     /// As [`GlobalMesh::split_along`].
-    pub fn split_along(&mut self, fault: &str) -> Result<Option<String>> {
+    pub fn split_along(&mut self, fault: &str) -> Result<Option<FoundFault>> {
         match self {
             Self::Two(mesh) => mesh.split_along(fault),
             Self::Three(mesh) => mesh.split_along(fault),

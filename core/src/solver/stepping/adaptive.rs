@@ -320,10 +320,13 @@ impl<const D: usize> Adaptive<D> {
         let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.step_level.velocity.max(size.velocity);
         let largest_stress = self.step_level.stress.max(size.stress);
-        let least_velocity = rounding.velocity.max(negligible.velocity * largest_stress);
+        // Errors of rounding are within any tolerance.
+        let [of_velocity, of_stress] =
+            [rounding.velocity, rounding.stress].map(|error| error / self.settings.tolerance);
+        let least_velocity = of_velocity.max(negligible.velocity * largest_stress);
         let velocity = ratio(error.velocity, largest_velocity.max(least_velocity));
         let present_stress = size.stress.max(LEAST_SHARE * largest_stress);
-        let least_stress = rounding.stress.max(negligible.stress * largest_velocity);
+        let least_stress = of_stress.max(negligible.stress * largest_velocity);
         let stress = ratio(error.stress, present_stress.max(least_stress));
         let mut ratios = [0.0; QUANTITIES];
         (ratios[0], ratios[1]) = (velocity, stress);
@@ -460,7 +463,14 @@ mod tests {
         for error in [[nan, 0.1], [0.1, nan], [infinite, nan]] {
             assert!(adaptive.relative(step_error(error, [1.0, 1.0])).is_nan(), "{error:?}");
         }
+        let rounding = StepError { rounding: norms([1e-3, 2e-3]), ..step_error([1e-3, 0.0], [1e-9, 1e-9]) };
         (adaptive.step_level.velocity, adaptive.step_level.stress) = (0.0, 0.0);
+        assert!(
+            (adaptive.relative(rounding) - 1e-2).abs() < 1e-15,
+            "rounding errors are within the tolerance"
+        );
+        let rounding = StepError { error: norms([0.0, 2e-3]), ..rounding };
+        assert!((adaptive.relative(rounding) - 1e-2).abs() < 1e-15, "those of stresses, too");
         assert_eq!(adaptive.relative(step_error([0.0, 0.0], [0.0, 0.0])), 0.0, "a body at rest");
         assert!(
             (adaptive.relative(step_error([1e-4, 0.0], [1e-9, 5.0])) - 0.02).abs() < 1e-15,

@@ -15,8 +15,9 @@ use crate::{
 
 /// Share of the root of the kinetic energy below which the root of the elastic energy is a rounding error, and vice versa.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Changes of displacements and velocities by this share from node to node are rounding errors.
-const ROUNDING: f64 = 1e4 * f64::EPSILON;
+/// Displacements that change by this share of themselves from node to node change by rounding errors: those of the forces in a smooth motion
+/// are as many times their own as the body has cells along an edge.
+const ROUNDING: f64 = 1e3 * f64::EPSILON;
 
 /// Norms of velocity and stress.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -47,7 +48,8 @@ pub struct StepError {
     pub size: Norms,
     /// A velocity below this multiple of the stress is a rounding error, and a stress below this multiple of the velocity.
     pub negligible: Norms,
-    /// Without inertia, velocities and stresses below these are rounding errors of a body that moves as a whole.
+    /// Without inertia, errors of velocities and stresses below these are rounding errors of displacements, as of a body that moves as a
+    /// whole.
     pub rounding: Norms,
     /// Norms of the quantities of contacts, squares in the calculation of the step.
     pub contact: [Deviation; CONTACT_QUANTITIES],
@@ -119,16 +121,15 @@ impl ErrorWorkspace {
         let stresses = [strains + histories.error, histories.size];
         let [velocity, all_velocity] = [square(form, curved), square(form, &trial)];
         let [error, size] = [surface.error, surface.size];
-        // Norms of the motion if its sign differs from node to node.
-        let mut scattered = |form: Option<Form>, motion: &[f64]| {
-            if body.has_form(Form::Mass) {
-                return 0.0;
-            }
-            write(strained, motion.iter().zip(signs(&body.mesh)).map(|(x, sign)| sign * x));
-            square(form, strained)
+        // Norms of displacements whose sign differs from node to node. Velocities follow from displacements, and have their rounding
+        // errors over the step, also at rest far from where the body was at the start.
+        let [of_velocity, of_stress] = if form == Some(Form::Mass) {
+            [0.0; 2]
+        } else {
+            let sizes = end.iter().zip(trial.iter()).map(|(u, v)| u.abs() + (blend.length * v).abs());
+            write(strained, sizes.zip(signs(&body.mesh)).map(|(size, sign)| sign * size));
+            [square(form, strained) / (blend.length * blend.length), square(elastic, strained)]
         };
-        let rounding = [scattered(form, &trial), scattered(elastic, end)];
-        let [of_velocity, of_stress] = rounding;
         let mut squares = session.sum([
             velocity,
             stresses[0],

@@ -161,19 +161,24 @@ fn a_group_with_facets_inside_the_body_is_no_boundary() {
     let inside = SQUARE.text().replace("1 1 4\n", "1 1 3\n");
     let AnyMesh::Two(mesh) = parse(inside.as_bytes()).unwrap() else { panic!("a mesh of the plane") };
     assert_eq!(mesh.boundaries.iter().map(|b| &*b.name).collect::<Vec<_>>(), ["7"]);
-    let group = |name: &str, place: &str| InnerGroup { name: name.into(), facets: 1, place: place.into() };
-    assert_eq!(mesh.inner_groups, [group("left", "(0.5, 0.5)")]);
+    let group = |name: &str, place: &str, outer| InnerGroup {
+        name: name.into(),
+        facets: 1,
+        place: place.into(),
+        outer,
+    };
+    assert_eq!(mesh.inner_groups, [group("left", "(0.5, 0.5)", 0)]);
     // Two names for one line, and a group with a facet inside and one on the surface.
     let entities = SQUARE.entities.replace("1 3 0\n2", "2 3 8 0\n2").replace("1 7 2 1 -2", "1 3 2 1 -2");
     let text = SQUARE.text().replace(SQUARE.entities, &entities).replace("1 1 4\n", "1 1 3\n");
     let AnyMesh::Two(mesh) = parse(text.as_bytes()).unwrap() else { panic!("a mesh of the plane") };
     assert_eq!(mesh.boundaries.iter().map(|b| &*b.name).collect::<Vec<_>>(), ["surface"]);
-    assert_eq!(mesh.inner_groups, [group("left", "(0.5, 0.5)"), group("8", "(0.5, 0.5)")]);
+    assert_eq!(mesh.inner_groups, [group("left", "(0.5, 0.5)", 1), group("8", "(0.5, 0.5)", 0)]);
     let AnyMesh::Three(mesh) = parse(TENT.text().replace("1 1 2 3\n", "1 2 3 4\n").as_bytes()).unwrap()
     else {
         panic!("a mesh in space")
     };
-    assert_eq!(mesh.inner_groups, [group("floor", "(0.333333, 0.333333, 0.333333)")]);
+    assert_eq!(mesh.inner_groups, [group("floor", "(0.333333, 0.333333, 0.333333)", 0)]);
 }
 
 #[test]

@@ -134,7 +134,8 @@ impl Newton {
         let tolerance = system.tolerance.max(self.settings.tolerance * self.counts.first);
         let enough = YIELDING_TOLERANCE * tolerance;
         // The first residual may be much larger than all forces.
-        let tolerance = if system.floor.largest > 0.0 { enough.min(system.floor.largest) } else { enough };
+        let bounds = system.floor.largest > 0.0 && !system.awaits_pressure;
+        let tolerance = if bounds { enough.min(system.floor.largest) } else { enough };
         System { tolerance, ..system }
     }
 

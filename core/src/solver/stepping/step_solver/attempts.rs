@@ -101,6 +101,8 @@ struct Accuracy {
     size: f64,
     /// The residual that rounding errors leave.
     floor: Floor,
+    /// The largest that counts as such before something is pressed on: rounding errors of a body that has moved farther might hide its loads.
+    near_floor: f64,
     /// Whether that holds only after something is pressed on: where contact alone holds a body, a direction may be any rigid motion, whose
     /// rounding errors hide that nothing holds it.
     awaits_pressure: bool,
@@ -479,12 +481,14 @@ impl StepSolver {
         let far = if self.springs.are_needed() { farthest(problem) } else { f64::INFINITY };
         let share = if self.springs.are_needed() { LARGEST_FLOOR_OF_FREE } else { LARGEST_FLOOR };
         let floor = Floor { slope, largest: (share * all).max(STAGNANT * product).min(slope * far) };
+        let near_floor = floor.largest.min(WANTED_FLOOR * all).min(slope * LARGEST_REST / FAR * far);
         let tries_rest = self.flowing.is_none()
             && self.newton.as_ref().is_some_and(|newton| newton.properties(problem).may_be_solved_at_rest());
         Ok(Accuracy {
             tolerance,
             size: all,
             floor,
+            near_floor,
             awaits_pressure: self.springs.are_needed(),
             fallbacks: if tries_rest { 1 } else { self.first_fallbacks() },
             tries_rest,
@@ -518,9 +522,12 @@ impl Accuracy {
         matrix: &'a dyn StepMatrix,
         scales: &'a [[f64; 2]],
     ) -> System<'a> {
-        let Self { tolerance, floor, awaits_pressure, fallbacks, .. } = self;
-        let [floor, hiding_floor] =
-            if awaits_pressure { [Floor::default(), hiding(floor)] } else { [floor, Floor::default()] };
+        let Self { tolerance, floor, near_floor, awaits_pressure, fallbacks, .. } = self;
+        let [floor, hiding_floor] = if awaits_pressure {
+            [Floor { largest: near_floor, ..floor }, hiding(floor)]
+        } else {
+            [floor, Floor::default()]
+        };
         let StepProblem { forces: right_hand_side, converged, .. } = *problem;
         System {
             matrix,
