@@ -20,14 +20,14 @@ const BATCH: u64 = 20;
 
 fn chosen() -> Vec<Range<u64>> {
     let Some(words) = std::env::var("CLARKE_RANDOM_SCENES").ok() else {
-        return [0..JOBS].into_iter().chain(KEPT.map(|kept| kept..kept + 1)).collect();
+        return std::iter::once(0..JOBS).chain(KEPT.map(|kept| kept..kept + 1)).collect();
     };
     let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("CLARKE_RANDOM_SCENES={words}"));
     let range = match words.split_once("..") {
         Some((first, end)) => number(first)..number(end),
         None => 0..number(&words),
     };
-    Vec::from([range])
+    std::iter::once(range).collect()
 }
 
 /// The scenario of the jobs whose numbers follow the name of the test.

@@ -33,12 +33,12 @@ impl InverseDiagonal {
     /// Becomes this preconditioner.
     ///
     /// # Safety
-    /// `pc` is a live preconditioner, which is not applied after this box is dropped.
-    pub(super) unsafe fn attach(self: &Box<Self>, pc: sys::PC) -> Result<()> {
-        // SAFETY: the caller's promises; the context stays in its box.
+    /// `pc` is a live preconditioner, which is not applied after this is moved or dropped.
+    pub(super) unsafe fn attach(&self, pc: sys::PC) -> Result<()> {
+        // SAFETY: the caller's promises; the context stays where it is.
         unsafe {
             check(sys::PCSetType(pc, c"shell".as_ptr()))?;
-            check(sys::PCShellSetContext(pc, ptr::from_ref(&**self).cast_mut().cast()))?;
+            check(sys::PCShellSetContext(pc, ptr::from_ref(self).cast_mut().cast()))?;
             check(sys::PCShellSetApply(pc, Some(apply)))
         }
     }
