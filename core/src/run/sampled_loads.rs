@@ -6,13 +6,13 @@ use crate::{
     job::{Job, Scalar},
     laws::{
         digits::Digits,
-        expression::Breakpoints,
         quadrature::unit_rule,
         step::{Blend, Step},
     },
     linear_algebra::tensor::larger,
     solver::stepping::Landings,
 };
+use std::cell::LazyCell;
 
 /// Share of its largest value that a load must reach at times at which steps see it.
 const LEAST_SEEN: f64 = 0.5;
@@ -22,10 +22,11 @@ const WRONG_IMPULSE: f64 = 0.1;
 const MOST_STEPS: u64 = 20_000;
 /// Steps between the kinks of a load that resolve it.
 const STEPS_A_PIECE: f64 = 5.0;
+
 /// Warnings about loads and motions of a job, the same everywhere on their boundary, of which steps that end at these times see too little or
 /// too much.
 pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
-    let steps = if job.time.adaptive.is_none() { fixed_steps(landings) } else { Vec::new() };
+    let steps = LazyCell::new(|| fixed_steps(landings));
     let has_mass = job.materials().any(|(_, material)| material.density.is_some());
     let mut found = Vec::new();
     for load in time_dependent(job) {
@@ -33,7 +34,7 @@ pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
             continue;
         }
         let breakpoints = load.value.breakpoints();
-        let kinks = sorted_kinks(&breakpoints, landings.end);
+        let kinks = breakpoints.within(landings.end);
         let words = if job.time.adaptive.is_some() {
             // Steps end at every jump.
             passed_over(&load.value, &kinks, shortest_step(job)).filter(|_| breakpoints.switches.is_empty())
@@ -59,14 +60,6 @@ fn fixed_steps(landings: &Landings) -> Vec<Step> {
         at = [step.time, step.length];
     }
     steps
-}
-
-/// The times within a run at which a value has kinks or may jump, ascending.
-fn sorted_kinks(breakpoints: &Breakpoints, end: f64) -> Vec<f64> {
-    let mut times = [&breakpoints.kinks[..], &breakpoints.switches].concat();
-    times.retain(|time| *time > 0.0 && *time < end);
-    times.sort_by(f64::total_cmp);
-    times
 }
 
 /// What the fixed steps of a run see of a value.

@@ -14,6 +14,16 @@ pub struct Breakpoints {
     pub kinks: Vec<f64>,
 }
 
+impl Breakpoints {
+    /// All of them between time 0 and the end of a run, ascending.
+    pub fn within(&self, end: f64) -> Vec<f64> {
+        let mut times = [&self.kinks[..], &self.switches].concat();
+        times.retain(|time| *time > 0.0 && *time < end);
+        times.sort_by(f64::total_cmp);
+        times
+    }
+}
+
 impl Program {
     /// The breakpoints that follow from arguments that are linear functions of time.
     pub(super) fn breakpoints(&self) -> Breakpoints {

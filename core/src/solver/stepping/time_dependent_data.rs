@@ -8,7 +8,6 @@ use super::step_length::{Landing, TIME_TOLERANCE};
 use crate::{
     fem::{body::Body, effect::Step},
     job::Scalar,
-    laws::expression::Breakpoints,
     linear_algebra::tensor::Vector,
     parallel::session::Session,
 };
@@ -133,10 +132,7 @@ impl<const D: usize> TimeDependentExpression<D> {
     /// The scale of its values during the run, pulses between samples among them: the largest value of a load, the largest distance between
     /// positions of an obstacle.
     fn measure_scale(&self, end: f64, is_load: bool) -> f64 {
-        let Breakpoints { kinks, switches } = self.value.breakpoints();
-        let mut breaks = [&kinks[..], &switches, &[0.0, end]].concat();
-        breaks.retain(|time| (0.0..=end).contains(time));
-        breaks.sort_by(f64::total_cmp);
+        let breaks = [&[0.0], &self.value.breakpoints().within(end)[..], &[end]].concat();
         let between: Vec<f64> = breaks.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
         let scale_at = |point: &Vector<D>| {
             let times = (0..=SAMPLES_OF_RUN).map(|at| end * f64::from(at) / f64::from(SAMPLES_OF_RUN));
