@@ -208,7 +208,7 @@ impl Gap {
         moves.iter().any(Scalar::depends_on_time)
     }
 
-    /// See [`Obstacle::is_smooth`]; false without an obstacle.
+    /// Whether the direction of the normal is continuous along the surface; false without an obstacle.
     pub fn is_smooth(&self) -> bool {
         each_obstacle!(self, _ => false, obstacle => obstacle.is_smooth())
     }
