@@ -15,7 +15,7 @@ use crate::{
         pairs::{Pair, PairedNode, inclined, is_exchanged, pair_of, shares},
         space::{Held, facets},
     },
-    job::{self, Job, Scalar, Side, Sliding},
+    job::{self, Job, Side, Sliding},
     linear_algebra::tensor::{Vector, norm},
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
@@ -245,7 +245,7 @@ pub(super) fn set_carried<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
 ) -> Result<(), Agreed> {
     let Body { mesh, held, support_motion: Some(motion), contacts, pairs, .. } = body else { return Ok(()) };
-    if pairs.is_empty() || !motion.expressions().any(Scalar::depends_on_time) {
+    if pairs.is_empty() || !motion.values().iter().any(|prescribed| prescribed.value.depends_on_time()) {
         return Ok(());
     }
     let bodies = mesh.bodies(session)?;

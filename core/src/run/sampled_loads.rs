@@ -1,7 +1,7 @@
 //! Loads against the steps that sample them: fixed steps see a load at one time in each step, adaptive ones end at kinks of tables no nearer
 //! to each other than the shortest step.
 
-use super::steps::{TimeDependent, shortest_step, time_dependent};
+use super::steps::{Kind, TimeDependent, shortest_step, time_dependent};
 use crate::{
     job::{Job, Scalar},
     laws::{
@@ -16,7 +16,7 @@ use std::cell::LazyCell;
 
 /// Share of its largest value that a load must reach at times at which steps see it.
 const LEAST_SEEN: f64 = 0.5;
-/// Share of the largest impulse by which that over the steps may differ after the load has ended.
+/// Share of the largest impulse by which that over the steps may differ after the load has ended; and of the largest way of a support.
 const WRONG_IMPULSE: f64 = 0.1;
 /// Runs of more fixed steps are not examined.
 const MOST_STEPS: u64 = 20_000;
@@ -30,7 +30,7 @@ pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
     let has_mass = job.materials().any(|(_, material)| material.density.is_some());
     let mut found = Vec::new();
     for load in time_dependent(job) {
-        if load.value.depends_on_position() || load.is_followed() {
+        if load.value.depends_on_position() || load.kind == Kind::Followed {
             continue;
         }
         let breakpoints = load.value.breakpoints();
@@ -40,7 +40,7 @@ pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
             passed_over(&load.value, &kinks, shortest_step(job)).filter(|_| breakpoints.switches.is_empty())
         } else {
             let sampled = Sampled::by(&load.value, job.time.scheme.formula(), &steps, &kinks);
-            sampled.missed(&kinks).or_else(|| sampled.wrong_impulse(&load, &kinks).filter(|_| has_mass))
+            sampled.missed(&kinks).or_else(|| sampled.wrong_integral(&load, &kinks).filter(|_| has_mass))
         };
         found.extend(words.map(|words| format!("{}: {words}", load.key)));
     }
@@ -135,20 +135,30 @@ impl Sampled {
         })
     }
 
-    /// Words where a load that has ended has not left its impulse.
-    fn wrong_impulse(&self, load: &TimeDependent<'_>, kinks: &[f64]) -> Option<String> {
-        let [largest, impulse, over_steps] = self.impulses;
-        let is_over = load.is_force() && self.last == 0.0 && self.ended > 0.0;
-        (is_over && (over_steps - impulse).abs() > WRONG_IMPULSE * largest).then(|| {
-            format!(
-                "its impulse over the steps is {} for {}, because they are too long while it acts: choose a time.step of at most {:.1e} s, or let the \
-                 time until t = {:.6e} s be a stage of its own with such steps",
-                Digits(over_steps),
-                Digits(impulse),
-                resolving(kinks, self.longest),
-                self.ended
-            )
-        })
+    /// Words where a load that has ended has not left its impulse, or a support has not gone the way of its velocity.
+    fn wrong_integral(&self, load: &TimeDependent<'_>, kinks: &[f64]) -> Option<String> {
+        let [largest, exact, over_steps] = self.impulses;
+        let error = (over_steps - exact).abs() / (WRONG_IMPULSE * largest);
+        let is_wrong = error > 1.0;
+        let [found, right] = [over_steps, exact].map(Digits);
+        let mut step = resolving(kinks, self.longest);
+        match load.kind {
+            Kind::Force => (is_wrong && self.last == 0.0 && self.ended > 0.0).then(|| {
+                format!(
+                    "its impulse over the steps is {found} for {right}, because they are too long while it acts: choose a time.step of at most {step:.1e} s, \
+                     or let the time until t = {:.6e} s be a stage of its own with such steps",
+                    self.ended
+                )
+            }),
+            Kind::Velocity => is_wrong.then(|| {
+                step = step.min(0.5 * self.longest / error);
+                format!(
+                    "over the steps the support moves by {found} m for {right} m, because they are too long for the scheme: choose scheme = \"bdf2\" or a \
+                     time.step of at most {step:.1e} s"
+                )
+            }),
+            Kind::State | Kind::Followed => None,
+        }
     }
 }
 
@@ -189,10 +199,14 @@ mod tests {
 
     /// Warnings about a traction with these values in a run of 2 s.
     fn warned(time: &str, value: &str, density: &str) -> Vec<String> {
+        warned_of(&format!("[[traction]]\non = [\"right\"]\nvalue = [\"{value}\", 0.0]\n"), time, density)
+    }
+
+    /// The same about these tables.
+    fn warned_of(tables: &str, time: &str, density: &str) -> Vec<String> {
         let text = format!(
             "[mesh.rectangle]\nsize = [1.0, 1.0]\ncells = [1, 1]\n[material]\nhypothesis = \"plane_strain\"\n{density}\n[material.elasticity]\nyoungs_modulus = 1.0\n\
-             poisson_ratio = 0.0\n[[traction]]\non = [\"right\"]\nvalue = [\"{value}\", 0.0]\n[time]\nend = 2.0\n{time}\n[[support]]\n\
-             on = [\"left\"]\nfix = \"all\"\n"
+             poisson_ratio = 0.0\n{tables}[time]\nend = 2.0\n{time}\n[[support]]\non = [\"left\"]\nfix = \"all\"\n"
         );
         let job =
             Job::from_text(&text, "job.toml", Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}")).job;
@@ -228,6 +242,23 @@ mod tests {
             assert!(warned(&fixed("implicit_euler"), &value, "").is_empty(), "{value}");
             assert!(warned(ADAPTIVE, &value, "").is_empty(), "{value}");
         }
+    }
+
+    #[test]
+    fn a_support_that_does_not_go_the_way_of_its_velocity_is_warned_of() {
+        let moved = |scheme: &str, density: &str| {
+            let support =
+                "[[support]]\non = [\"right\"]\nfix = \"all\"\nvelocity = [\"max(0, t - 1)\", 0.0]\n";
+            warned_of(support, &fixed(scheme).replace("0.1", "0.2"), density)
+        };
+        let found = moved("implicit_euler", "density = 1.0");
+        assert!(
+            matches!(&found[..], [one] if one.starts_with("support.0.velocity: over the steps the support moves by 0.6 m for 0.5 m")
+                && one.ends_with("a time.step of at most 4.0e-2 s")),
+            "{found:?}"
+        );
+        assert!(moved("bdf2", "density = 1.0").is_empty(), "second order");
+        assert!(moved("implicit_euler", "").is_empty(), "it moves by the integral");
     }
 
     #[test]

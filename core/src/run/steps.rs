@@ -45,83 +45,79 @@ pub(super) fn range(job: &Job) -> StepRange {
 pub(super) struct TimeDependent<'a> {
     /// Its meaning, for the log.
     name: &'static str,
+    pub(super) kind: Kind,
     /// Its place in the job.
     pub(super) key: String,
     pub(super) value: Cow<'a, Scalar>,
 }
 
-impl TimeDependent<'_> {
-    /// Whether it is a force, a moment or a force of each unit of area, volume or mass.
-    pub(super) fn is_force(&self) -> bool {
-        !matches!(self.name, OF_SUPPORT | OF_HEAT) && !self.is_followed()
-    }
-
-    /// Whether steps follow it otherwise than by its values at their ends.
-    pub(super) fn is_followed(&self) -> bool {
-        matches!(self.name, OF_OBSTACLE | OF_FRICTION)
-    }
+/// What steps make of a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// A force, a moment or a force of each unit of area, volume or mass: bodies with mass keep its impulse.
+    Force,
+    /// The velocity of a support: bodies keep its integral.
+    Velocity,
+    /// Only its values at the ends of steps matter.
+    State,
+    /// Steps follow it otherwise than by its values at their ends.
+    Followed,
 }
 
-/// Names of values that are no forces.
-const OF_SUPPORT: &str = "a support";
-const OF_HEAT: &str = "heat at a boundary";
-const OF_OBSTACLE: &str = "an obstacle";
-const OF_FRICTION: &str = "a friction coefficient";
-
 /// The loads, motions of supports and obstacles, gaps and friction coefficients that depend on time.
-pub(super) fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
-    let mut all: Vec<(&'static str, String, &[Scalar])> = Vec::new();
+pub(super) fn time_dependent<'a>(job: &'a Job) -> Vec<TimeDependent<'a>> {
+    let mut found = Vec::new();
+    let mut add = |name, kind, key: String, values: &'a [Scalar]| {
+        let values = values.iter().filter(|value| value.depends_on_time());
+        found.extend(values.map(|value| TimeDependent {
+            name,
+            kind,
+            key: key.clone(),
+            value: Cow::Borrowed(value),
+        }));
+    };
     for (at, support) in job.support.iter().enumerate() {
-        for (key, values) in [("displacement", &support.displacement), ("velocity", &support.velocity)] {
-            all.push((OF_SUPPORT, format!("support.{at}.{key}"), values.as_deref().unwrap_or_default()));
-        }
+        let [displacement, velocity] =
+            [&support.displacement, &support.velocity].map(|values| values.as_deref().unwrap_or_default());
+        add("a support", Kind::State, format!("support.{at}.displacement"), displacement);
+        add("a support", Kind::Velocity, format!("support.{at}.velocity"), velocity);
     }
     for (at, traction) in job.traction.iter().enumerate() {
-        all.push(("a traction", format!("traction.{at}.value"), &traction.value));
-        all.push(("a traction", format!("traction.{at}.pressure"), traction.pressure.as_slice()));
+        add("a traction", Kind::Force, format!("traction.{at}.value"), &traction.value);
+        add("a traction", Kind::Force, format!("traction.{at}.pressure"), traction.pressure.as_slice());
     }
     for (at, heat) in job.heat.iter().enumerate() {
-        let expressions = heat.expressions();
-        all.extend(
-            expressions
-                .map(|(key, value)| (OF_HEAT, format!("heat.{at}.{key}"), std::slice::from_ref(value))),
-        );
+        for (key, value) in heat.expressions() {
+            add("heat at a boundary", Kind::State, format!("heat.{at}.{key}"), std::slice::from_ref(value));
+        }
     }
     for (at, force) in job.body_force.iter().enumerate() {
-        all.push(("a body force", format!("body_force.{at}.value"), &force.value));
+        add("a body force", Kind::Force, format!("body_force.{at}.value"), &force.value);
     }
     if let Some(gravity) = &job.gravity {
-        all.push(("gravity", "gravity.acceleration".into(), &gravity.acceleration));
+        add("gravity", Kind::Force, "gravity.acceleration".into(), &gravity.acceleration);
     }
     for (at, contact) in job.contact.iter().enumerate() {
         if let Some(gap) = contact.normal.gap() {
             let key = format!("contact.{at}.{}.gap", contact.normal.table());
-            all.push((OF_OBSTACLE, key, std::slice::from_ref(gap)));
+            add("an obstacle", Kind::Followed, key, std::slice::from_ref(gap));
         }
         for values in contact.obstacle.iter().flat_map(|obstacle| obstacle.expressions()) {
-            all.push((OF_OBSTACLE, format!("contact.{at}.obstacle"), values));
+            add("an obstacle", Kind::Followed, format!("contact.{at}.obstacle"), values);
         }
         if let Some(load) = &contact.obstacle_load {
             let [force, moment] = ["force", "moment"].map(|key| format!("contact.{at}.obstacle_load.{key}"));
-            all.push(("the force on an obstacle", force, std::slice::from_ref(&load.force)));
-            all.push(("the moment on an obstacle", moment, load.moment.as_slice()));
+            add("the force on an obstacle", Kind::Force, force, std::slice::from_ref(&load.force));
+            add("the moment on an obstacle", Kind::Force, moment, load.moment.as_slice());
         }
-    }
-    let mut found = Vec::new();
-    for (name, key, values) in all {
-        let values = values.iter().filter(|value| value.depends_on_time());
-        found.extend(values.map(|value| TimeDependent {
-            name,
-            key: key.clone(),
-            value: Cow::Borrowed(value),
-        }));
     }
     for (at, contact) in job.contact.iter().enumerate() {
         let coefficient =
             contact.friction.as_ref().and_then(|friction| Some((friction.table(), friction.in_time()?)));
         let value = coefficient.filter(|(_, value)| value.depends_on_time());
         found.extend(value.map(|(table, value)| TimeDependent {
-            name: OF_FRICTION,
+            name: "a friction coefficient",
+            kind: Kind::Followed,
             key: format!("contact.{at}.{table}"),
             value: Cow::Owned(value),
         }));

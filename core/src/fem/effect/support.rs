@@ -289,9 +289,9 @@ impl<const D: usize> SupportMotion<D> {
         Ok(Self { values, nodes })
     }
 
-    /// The expressions of the values.
-    pub fn expressions(&self) -> impl Iterator<Item = &Scalar> {
-        self.values.iter().map(|prescribed| &prescribed.value)
+    /// All that is prescribed.
+    pub fn values(&self) -> &[Prescribed] {
+        &self.values
     }
 
     /// What is prescribed, by its number.

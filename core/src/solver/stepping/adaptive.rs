@@ -150,7 +150,8 @@ impl<const D: usize> Adaptive<D> {
         target: Landing,
     ) -> Result<StepOutcome, Agreed> {
         if self.time_dependent_data.is_none() {
-            self.time_dependent_data = Some(TimeDependentData::of(session, body, self.end));
+            self.time_dependent_data =
+                Some(TimeDependentData::of(session, body, stepper.scheme.formula(), self.end));
         }
         if self.is_at_rest() {
             self.estimate_reference_norms(session, stepper, body, state, target)?;
@@ -208,10 +209,8 @@ impl<const D: usize> Adaptive<D> {
             let landing = self.landing(session, state, target, length);
             let length = self.next_length(landing.time - state.time, state.step_length);
             let step = next_step(times_before(state, target), length, landing.time);
-            let deviation = self
-                .time_dependent_data
-                .as_ref()
-                .map_or(0.0, |data| data.deviation_from_linear(session, step));
+            let deviation =
+                self.time_dependent_data.as_ref().map_or(0.0, |data| data.deviation(session, step));
             if self.is_acceptable(step, deviation) {
                 return (step, landing);
             }

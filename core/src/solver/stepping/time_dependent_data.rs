@@ -2,12 +2,17 @@
 //!
 //! Each expression is sampled at a few points of the body's bounding box, the same on all ranks. Ends of smooth pieces
 //! (`min`, `max`, `abs`, `sign`, `floor`, `ceil`, `round`) between two samples are located by bisection, and a step ends there.
-//! Between the ends of a step an expression should be linear in time, up to the tolerance of a step.
+//! Between the ends of a step an expression should be linear in time, up to the tolerance of a step. So should the way of a support of a body
+//! with mass be the integral of its velocity, over the length of the step.
 
 use super::step_length::{Landing, TIME_TOLERANCE};
 use crate::{
-    fem::{body::Body, effect::Step},
+    fem::{
+        body::Body,
+        effect::{Blend, Form, Prescribed, Step},
+    },
     job::Scalar,
+    laws::quadrature::unit_rule,
     linear_algebra::tensor::Vector,
     parallel::session::Session,
 };
@@ -38,28 +43,37 @@ struct TimeDependentExpression<const D: usize> {
     points: Vec<Vector<D>>,
     /// The largest value of a load in the run, or the distance over which an obstacle moves.
     scale: f64,
+    /// The scheme by which the body moves at this velocity, if it has one.
+    moves_by: Option<fn(Step) -> Blend>,
 }
 
 impl<const D: usize> TimeDependentData<D> {
-    /// The expressions of a body, in a run to the time `end`. Collective.
-    pub(super) fn of<const S: usize>(session: &Session, body: &Body<D, S>, end: f64) -> Self {
+    /// The expressions of a body, in a run with this scheme to the time `end`. Collective.
+    pub(super) fn of<const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        formula: fn(Step) -> Blend,
+        end: f64,
+    ) -> Self {
         let lattice = sample_points(session, &body.mesh.nodes);
         let mut expressions = Vec::new();
+        let values = body.support_motion.iter().flat_map(|motion| motion.values());
+        for Prescribed { value, is_displacement } in values.filter(|found| found.value.depends_on_time()) {
+            let moves_by = (!is_displacement && body.has_form(Form::Mass)).then_some(formula);
+            expressions.push(TimeDependentExpression::new(
+                ("a support", value, true),
+                &lattice,
+                moves_by,
+                end,
+            ));
+        }
         let mut add = |name, values: &[Scalar], is_load: bool| {
             for value in values.iter().filter(|value| value.depends_on_time()) {
-                let points =
-                    if value.depends_on_position() { lattice.clone() } else { lattice[..1].to_vec() };
-                let mut expression =
-                    TimeDependentExpression { name, value: value.clone(), points, scale: 0.0 };
-                expression.scale = expression.measure_scale(end, is_load);
-                expressions.push(expression);
+                expressions.push(TimeDependentExpression::new((name, value, is_load), &lattice, None, end));
             }
         };
         for (name, value) in body.load.expressions() {
             add(name, std::slice::from_ref(value), true);
-        }
-        for value in body.support_motion.iter().flat_map(|motion| motion.expressions()) {
-            add("a support", std::slice::from_ref(value), true);
         }
         for value in body.heat.iter().flat_map(|heat| heat.expressions()) {
             add("heat at a boundary", std::slice::from_ref(value), true);
@@ -112,23 +126,37 @@ impl<const D: usize> TimeDependentData<D> {
         first.is_finite().then_some(Landing { time: -first, name, starts_anew: false })
     }
 
-    /// The largest deviation within a step from the linear function between its ends, relative to the largest value. Collective.
-    pub(super) fn deviation_from_linear(&self, session: &Session, step: Step) -> f64 {
+    /// The largest deviation within a step from the linear function between its ends, and of the mean velocity of a support from that with
+    /// which the scheme moves it, relative to the largest value. Collective.
+    pub(super) fn deviation(&self, session: &Session, step: Step) -> f64 {
         if self.expressions.is_empty() {
             return 0.0;
         }
         let start = step.start();
         let ends = [start + TIME_TOLERANCE * step.length, step.time];
-        let mine = self
+        let deviations = self
             .expressions
             .iter()
-            .map(|expression| expression.deviation_from_linear(ends))
-            .fold(0.0, f64::max);
+            .map(|expression| expression.deviation_from_linear(ends).max(expression.deviation_of_way(step)));
+        let mine = deviations.fold(0.0, f64::max);
         session.largest([mine])[0]
     }
 }
 
 impl<const D: usize> TimeDependentExpression<D> {
+    /// A value with its meaning and whether it is a load, at the points on which it depends.
+    fn new(
+        (name, value, is_load): (&'static str, &Scalar, bool),
+        lattice: &[Vector<D>],
+        moves_by: Option<fn(Step) -> Blend>,
+        end: f64,
+    ) -> Self {
+        let points = if value.depends_on_position() { lattice } else { &lattice[..1] };
+        let mut new = Self { name, value: value.clone(), points: points.to_vec(), scale: 0.0, moves_by };
+        new.scale = new.measure_scale(end, is_load);
+        new
+    }
+
     /// The scale of its values during the run, pulses between samples among them: the largest value of a load, the largest distance between
     /// positions of an obstacle.
     fn measure_scale(&self, end: f64, is_load: bool) -> f64 {
@@ -186,6 +214,29 @@ impl<const D: usize> TimeDependentExpression<D> {
         };
         self.points.iter().map(deviation_at).fold(0.0, f64::max)
     }
+
+    /// The largest error of the way of a step that follows exact ones, over its length and the scale; 0 where nothing moves at this velocity.
+    fn deviation_of_way(&self, step: Step) -> f64 {
+        let Some(formula) = self.moves_by.filter(|_| self.scale > 0.0) else { return 0.0 };
+        let blend = formula(step);
+        let before =
+            Step { time: step.time - step.length, length: step.previous_length, previous_length: 0.0 };
+        let deviation_at = |point: &Vector<D>| {
+            let velocity = |time: f64| self.value.evaluate(time, point);
+            let solved = blend.of(0.0, -integral(before, velocity))
+                + blend.length * velocity(blend.balanced(step).time);
+            let deviation =
+                (blend.end(0.0, solved) - integral(step, velocity)).abs() / (step.length * self.scale);
+            if deviation.is_finite() { deviation } else { 0.0 }
+        };
+        self.points.iter().map(deviation_at).fold(0.0, f64::max)
+    }
+}
+
+/// The integral of a value over a step.
+fn integral(step: Step, value: impl Fn(f64) -> f64) -> f64 {
+    let time = |share: f64| step.time - (1.0 - share) * step.length;
+    step.length * unit_rule().map(|[share, weight]| weight * value(time(share))).sum::<f64>()
 }
 
 /// The centre of the body's bounding box, its corners, and the centres of its sides, edges and faces. Collective.
@@ -211,14 +262,11 @@ fn sample_points<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::Expression;
+    use crate::{job::Expression, laws::schemes::Scheme};
 
     fn expression(text: &str) -> TimeDependentExpression<2> {
         let value = Scalar::Expression(Expression::parse(text).expect(text));
-        let mut expression =
-            TimeDependentExpression { name: "a load", value, points: vec![[0.5, 0.0]], scale: 0.0 };
-        expression.scale = expression.measure_scale(2.0, true);
-        expression
+        TimeDependentExpression::new(("a load", &value, true), &[[0.5, 0.0]], None, 2.0)
     }
 
     #[test]
@@ -273,6 +321,29 @@ mod tests {
             expression("sqrt(t - 9)").deviation_from_linear([0.5, 0.75]),
             0.0,
             "an undefined value is reported by the step"
+        );
+    }
+
+    #[test]
+    fn the_way_of_a_support_is_that_of_its_velocity_up_to_the_order_of_the_scheme() {
+        let deviation = |text: &str, scheme: Scheme, previous_length: f64| {
+            let moving = TimeDependentExpression { moves_by: Some(scheme.formula()), ..expression(text) };
+            moving.deviation_of_way(Step { time: 1.0, length: 0.2, previous_length })
+        };
+        // The last velocity is 1 and the mean one 0.9, of a largest one of 2.
+        for previous in [0.0, 0.1, 0.2] {
+            assert!(
+                (deviation("t", Scheme::ImplicitEuler, previous) - 0.05).abs() < 1e-14,
+                "after {previous}"
+            );
+            assert!(deviation("t", Scheme::Midpoint, previous) < 1e-14);
+            assert!(deviation("3", Scheme::ImplicitEuler, previous) < 1e-14);
+        }
+        assert!(deviation("t", Scheme::Bdf2, 0.1) < 1e-14);
+        assert!(deviation("t^2", Scheme::Bdf2, 0.1) > 1e-3);
+        assert_eq!(
+            expression("t").deviation_of_way(Step { time: 1.0, length: 0.2, previous_length: 0.2 }),
+            0.0
         );
     }
 }
