@@ -37,7 +37,7 @@ pub struct Support {
     #[schemars(extend("unit" = "m"), example = ["0.01*min(t/0.1, 1)"])]
     pub displacement: Option<Vec<Scalar>>,
     /// The velocity of the fixed components, in place of `displacement`. Without inertia they move by its integral over each step, whatever the
-    /// length of the step; with inertia by the velocity at its end.
+    /// length of the step; with inertia by the velocity at its end, which adaptive steps keep near its mean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m/s"), example = [0.02])]
     pub velocity: Option<Vec<Scalar>>,

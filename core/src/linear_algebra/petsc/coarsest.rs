@@ -6,7 +6,7 @@ use super::{
     slopes::Slopes,
     sys,
 };
-use crate::error::Result;
+use crate::{error::Result, linear_algebra::sparse::Real};
 
 /// Most unknowns; PETSc coarsens to about 50.
 const MOST_UNKNOWNS: usize = 300;
@@ -75,51 +75,20 @@ impl Coarsest {
             image[j] += mean + SHIFT * matrix[j * size + j];
             sum[j * size..][..size].copy_from_slice(&image);
         }
-        *factor = is_factored(&mut sum, size).then_some(sum);
+        *factor = f64::factor(&mut sum, size).map(|()| sum);
     }
 
     /// Replaces a solution for the matrix alone by that on the subspace with additions.
     pub(super) fn correct(&mut self, project: impl Fn(&mut [f64]), x: &mut [f64]) {
         let Self { size, matrix, factor, work } = self;
         let Some(factor) = factor else { return project(x) };
-        let size = *size;
-        for (value, row) in work.iter_mut().zip(matrix.chunks_exact(size)) {
+        for (value, row) in work.iter_mut().zip(matrix.chunks_exact(*size)) {
             *value = row.iter().zip(&*x).map(|(entry, x)| entry * x).sum();
         }
         project(work);
-        for i in 0..size {
-            let row = &factor[i * size..][..i];
-            let before: f64 = row.iter().zip(&*work).map(|(entry, x)| entry * x).sum();
-            work[i] = (work[i] - before) / factor[i * size + i];
-        }
-        for i in (0..size).rev() {
-            work[i] /= factor[i * size + i];
-            let value = work[i];
-            let row = &factor[i * size..][..i];
-            work[..i].iter_mut().zip(row).for_each(|(x, entry)| *x -= entry * value);
-        }
+        f64::forward(factor, *size, work);
+        f64::backward(factor, *size, work);
         x.copy_from_slice(work);
         project(x);
     }
-}
-
-/// Replaces the lower half of a matrix by its factor; false where it is not positive definite.
-fn is_factored(matrix: &mut [f64], size: usize) -> bool {
-    for i in 0..size {
-        for j in 0..=i {
-            let (above, row) = matrix.split_at_mut(i * size);
-            let other = if j < i { &above[j * size..][..=j] } else { &[][..] };
-            if j < i {
-                let before: f64 = row[..j].iter().zip(other).map(|(x, y)| x * y).sum();
-                row[j] = (row[j] - before) / other[j];
-            } else {
-                let square = row[j] - row[..j].iter().map(|x| x * x).sum::<f64>();
-                if square.is_nan() || square <= 0.0 {
-                    return false;
-                }
-                row[j] = square.sqrt();
-            }
-        }
-    }
-    true
 }

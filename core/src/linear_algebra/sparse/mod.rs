@@ -25,6 +25,7 @@ pub use cholesky::{Cholesky, Precision};
 pub use dense_factor::{DenseFactor, DensePanels, Factored, Team};
 pub use local_cholesky::LocalCholesky;
 pub use packed::{PackedSymmetric, add_times_own_transpose, bytes_of_columns, column, columns, share};
+pub(crate) use panel::Real;
 pub(crate) use rectangular_blocks::{Transfer, transfer};
 pub(crate) use symmetric_blocks::{Product, ScalarRows, Stored, product};
 pub(crate) use threads::one_unless_chosen;

@@ -13,7 +13,7 @@ use std::{
 };
 
 /// Single or double precision.
-pub(super) trait Real: Copy + Debug + Default + AddAssign + SubAssign + 'static {
+pub(crate) trait Real: Copy + Debug + Default + AddAssign + SubAssign + 'static {
     fn rounded(value: f64) -> Self;
 
     fn exact(self) -> f64;
