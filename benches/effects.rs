@@ -184,8 +184,8 @@ const FORMULAS: [Formula; 15] = [
         formula: "contact.0.friction={expression={coefficient=\"0.3\"}}",
     },
     Formula {
-        law: "`slip_weakening`",
-        job: "slip_weakening_block",
+        law: "`velocity_weakening`",
+        job: "velocity_weakening_block",
         set: &[STRIP, "time.end=0.35"],
         formula: "contact.0.friction={expression={coefficient=\"0.3 + 0.2*exp(-v/0.05)\"}}",
     },

@@ -994,7 +994,7 @@ const ELSEWHERE: &[(&str, &[&str])] = &[
     ("remembering_foundation", &["probe.foot.displacement_y", "history.contact_dissipation"]),
     ("sinking_block", &["probe.corner.velocity_y", "profile.bottom.max.contact_pressure"]),
     ("sliding_block", &["probe.centre.displacement_x"]),
-    ("slip_weakening_block", &["probe.centre.velocity_x"]),
+    ("velocity_weakening_block", &["probe.centre.velocity_x"]),
     ("stick_on_a_jump", &["profile.bottom.max.normal_velocity"]),
     ("strain_hardening_creep", &["probe.tip.displacement_x", "history.viscoplastic_dissipation"]),
     ("stress_relaxation", &["final_von_mises"]),

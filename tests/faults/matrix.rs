@@ -85,7 +85,7 @@ const EFFECTS: [Choice; 18] = [
             ("contact.0.normal", "{ unilateral = { bound = 'velocity' } }"),
             (
                 "contact.0.friction",
-                "{ slip_weakening = { static = 0.4, dynamic = 0.3, decay_velocity = 0.1 } }",
+                "{ velocity_weakening = { static = 0.4, dynamic = 0.3, decay_velocity = 0.1 } }",
             ),
         ],
         false,

@@ -90,9 +90,9 @@ fn check_says_how_contact_pressures_grow_with_the_velocity() {
     assert!(growth(&Case::square(8).without("contact")).is_null());
 }
 
-/// The block of `slip_weakening_block`, nearly rigid.
+/// The block of `velocity_weakening_block`, nearly rigid.
 fn rigid_block() -> Case {
-    Case::of("slip_weakening_block").set("material.viscosity", "{ volumetric = 1e9, shear = 1e9 }")
+    Case::of("velocity_weakening_block").set("material.viscosity", "{ volumetric = 1e9, shear = 1e9 }")
 }
 
 /// The pressure in Pa above which a step of a rigid block on slip weakening friction has several solutions, from its sliding and
@@ -104,7 +104,7 @@ fn bound_of_rigid_block(step: f64) -> f64 {
 }
 
 #[test]
-fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law() {
+fn velocity_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law() {
     let expected = bound_of_rigid_block(0.01);
     for ranks in [1, 2] {
         let unbounded = check(&rigid_block(), ranks);
@@ -141,7 +141,7 @@ fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law(
 #[test]
 fn friction_that_alone_holds_a_body_is_certified_for_no_pressure() {
     let held = |springs: &str, cells: &str| {
-        Case::of("slip_weakening_block")
+        Case::of("velocity_weakening_block")
             .without("material.density")
             .without("material.viscosity")
             .without("initial")
@@ -166,9 +166,9 @@ fn friction_that_alone_holds_a_body_is_certified_for_no_pressure() {
 }
 
 #[test]
-fn a_run_is_compared_with_the_pressure_that_slip_weakening_is_certified_for() {
+fn a_run_is_compared_with_the_pressure_that_velocity_weakening_is_certified_for() {
     for (step, beyond) in [("0.01", false), ("0.25", true)] {
-        let case = Case::of("slip_weakening_block").set("time.step", step).set("time.end", "0.5");
+        let case = Case::of("velocity_weakening_block").set("time.step", step).set("time.end", "0.5");
         let results = case.run(2);
         let bound = results.summary()["certificates"]["slip_pressure_bound"].as_f64().expect("a bound");
         let most = results.number("max_slip_pressure");

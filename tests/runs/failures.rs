@@ -197,7 +197,7 @@ fn weakening() -> Case {
         .set(
             "contact",
             "[{ on = ['bottom'], redistribute_mass = true, normal = { unilateral = { bound = 'velocity' } }, \
-             friction = { slip_weakening = { static = 0.4, dynamic = 0.2, decay_velocity = 0.5 } } }]",
+             friction = { velocity_weakening = { static = 0.4, dynamic = 0.2, decay_velocity = 0.5 } } }]",
         )
         .set("time", "{ scheme = 'midpoint', end = 0.004, step = 2e-4 }")
         .set("output.probe", "[]")

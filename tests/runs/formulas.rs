@@ -11,7 +11,7 @@ const PAIRS: [(&str, &str, &str); 6] = [
     ("stick_on_a_jump", "contact.0.normal", "10*v + 5*sign(v)"),
     ("sinking_block", "contact.0.normal", "if(v < 0, 0, 10*(1 - exp(-v/0.02)))"),
     ("compliant_foundation", "contact.0.normal", "1000*max(d, 0)"),
-    ("slip_weakening_block", "contact.0.friction", "0.3 + 0.2*exp(-v/0.05)"),
+    ("velocity_weakening_block", "contact.0.friction", "0.3 + 0.2*exp(-v/0.05)"),
     ("distance_weakening_block", "contact.0.friction", "0.3 + 0.3*max(1 - l/0.05, 0)"),
 ];
 

@@ -78,7 +78,7 @@ fn friction_keeps_the_direction_of_sliding_in_space() {
 
 #[test]
 fn friction_gives_the_same_answer_on_any_number_of_ranks() {
-    let jobs = ["sliding_block", "oblique_sliding", "slip_weakening_block", "conveyor_belt"];
+    let jobs = ["sliding_block", "oblique_sliding", "velocity_weakening_block", "conveyor_belt"];
     for (job, end) in jobs.into_iter().zip(["0.21", "0.5", "2.8", "0.21"]) {
         let make = || Case::of(job).set("time.end", end).set("solver.tolerance", "1e-11");
         let alone = make().run_and_keep(1);
@@ -92,7 +92,7 @@ fn friction_gives_the_same_answer_on_any_number_of_ranks() {
 
 #[test]
 fn the_fixed_point_finds_what_newtons_method_finds() {
-    for (job, end) in [("sliding_block", "0.21"), ("slip_weakening_block", "2.8")] {
+    for (job, end) in [("sliding_block", "0.21"), ("velocity_weakening_block", "2.8")] {
         let make = || Case::of(job).set("time.end", end);
         let newton = make().run_and_keep(1);
         let fixed = make().set("solver.friction", "'fixed_point'").run_and_keep(1);
@@ -782,7 +782,7 @@ fn friction_that_falls_with_the_speed_moves_a_block_without_mass_from_sticking_t
         [[contact]]
         on = ['bottom']
         normal.unilateral = {}
-        friction.slip_weakening = { static = 0.5, dynamic = 0.3, decay_velocity = 0.1 }
+        friction.velocity_weakening = { static = 0.5, dynamic = 0.3, decay_velocity = 0.1 }
         obstacle.plane = { point = ['0.5*t', 0], normal = [0, 1] }",
     );
     let table = case.run(1).table("resultants.csv").only("source", "contact bottom");

@@ -342,7 +342,7 @@ fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() 
     for law in [
         "tresca = { bound = 0.2 }",
         "coulomb = { coefficient = 0.4 }",
-        "slip_weakening = { static = 0.4, dynamic = 0.3, decay_velocity = 0.1 }",
+        "velocity_weakening = { static = 0.4, dynamic = 0.3, decay_velocity = 0.1 }",
         "distance_weakening = { static = 0.4, dynamic = 0.3, distance = 0.01, decay = 'exponential' }",
         "expression = { coefficient = '0.3 + 0.1*exp(-l/0.01) + 0.02*exp(-p)' }",
     ] {

@@ -35,7 +35,7 @@ const EXCEPTIONS: [(&str, u64); 10] = [
     ("two_arms.toml", 20),
     ("taylor_rod.toml", 2),
     // Multigrid with other slopes of friction.
-    ("slip_weakening_block.toml", 88),
+    ("velocity_weakening_block.toml", 88),
 ];
 
 const PAPER: &str = "papers/wang_cheng_2022.toml";
@@ -121,7 +121,7 @@ fn count(session: &Session) {
         (PAPER, &["time.scheme=\"implicit_euler\""]),
         (PAPER, &["time.scheme=\"implicit_euler\"", MULTIGRID]),
         (PAPER, &["time.scheme=\"bdf2\""]),
-        ("slip_weakening_block.toml", &[MULTIGRID]),
+        ("velocity_weakening_block.toml", &[MULTIGRID]),
     ];
     let all = [jobs("papers/"), jobs("")].concat();
     let all = all.iter().map(|job| (job.as_str(), &[][..])).chain(changed);

@@ -18,7 +18,7 @@ const COULOMB: &str = "[contact.friction.coulomb]\ncoefficient = 0.4\n";
 const FRICTION: [&str; 3] = [
     COULOMB,
     "[contact.friction.tresca]\nbound = 3\n",
-    "[contact.friction.slip_weakening]\nstatic = 0.5\ndynamic = 0.3\ndecay_velocity = 0.2\n",
+    "[contact.friction.velocity_weakening]\nstatic = 0.5\ndynamic = 0.3\ndecay_velocity = 0.2\n",
 ];
 
 fn vector<const D: usize>(values: &[&str; 3]) -> String {

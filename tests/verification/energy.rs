@@ -185,7 +185,7 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
         "tresca" => format!("[contact.friction.tresca]\nbound = {coefficient}\n"),
         "coulomb" => format!("[contact.friction.coulomb]\ncoefficient = {coefficient}\n"),
         _ => format!(
-            "[contact.friction.slip_weakening]\nstatic = {}\ndynamic = {coefficient}\ndecay_velocity = {}\n",
+            "[contact.friction.velocity_weakening]\nstatic = {}\ndynamic = {coefficient}\ndecay_velocity = {}\n",
             coefficient + 0.1,
             draw.between(0.5, 2.0)
         ),
@@ -249,7 +249,7 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
         } else {
             job += &contact;
             // Memory can be combined with laws without gap and friction that does not depend on the pressure, at nodes.
-            let strange = ["gauss", "gap", "obstacle", "unilateral", "coulomb", "slip_weakening"];
+            let strange = ["gauss", "gap", "obstacle", "unilateral", "coulomb", "velocity_weakening"];
             if !strange.iter().any(|word| contact.contains(word)) {
                 let (stiffness, time) = (weak.between(10.0, 200.0), weak.between(0.002, 0.5));
                 job += &format!(
@@ -339,7 +339,7 @@ const MET: [&str; 25] = [
     "quadrature = \"gauss\"",
     "tresca",
     "coulomb",
-    "slip_weakening",
+    "velocity_weakening",
     // Not under the midpoint rule.
     "damage",
     "adhesion",

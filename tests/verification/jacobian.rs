@@ -11,8 +11,8 @@ use clarke::{
     laws::{
         contact::{
             Bound, CoefficientFormula, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw,
-            Gap, Graph, NormalLaw, NormalResponse, ObstacleLoad, Plane, PressureFormula, SlipWeakening,
-            Sphere, Symmetry, Tresca, Unilateral,
+            Gap, Graph, NormalLaw, NormalResponse, ObstacleLoad, Plane, PressureFormula, Sphere, Symmetry,
+            Tresca, Unilateral, VelocityWeakening,
         },
         expression::Formula,
         material::{ByMaterial, Isotropic},
@@ -64,7 +64,11 @@ fn friction_laws() -> [Option<FrictionLaw>; 5] {
         None,
         Some(FrictionLaw::Tresca(Tresca { bound: 60.0 })),
         Some(FrictionLaw::Coulomb(Coulomb { coefficient: 0.6 })),
-        Some(FrictionLaw::SlipWeakening(SlipWeakening { at_rest: 0.9, dynamic: 0.4, decay_velocity: 0.5 })),
+        Some(FrictionLaw::VelocityWeakening(VelocityWeakening {
+            at_rest: 0.9,
+            dynamic: 0.4,
+            decay_velocity: 0.5,
+        })),
         Some(FrictionLaw::CoefficientFormula(CoefficientFormula::new(formula))),
     ]
 }

@@ -133,7 +133,7 @@ fn pad(session: &Session, decay: f64, step: f64, end: f64) {
          [[support]]\non = [\"left\"]\nstiffness.normal = 1e7\n[[traction]]\non = [\"top\"]\nvalue = [0, -1e5]\n\
          [[contact]]\non = [\"bottom\"]\nnormal.unilateral = {{}}\n\
          obstacle.plane = {{ point = [\"0.1*t\", 0], normal = [0, 1] }}\n\
-         friction.slip_weakening = {{ static = 0.6, dynamic = 0.3, decay_velocity = {decay} }}\n",
+         friction.velocity_weakening = {{ static = 0.6, dynamic = 0.3, decay_velocity = {decay} }}\n",
         any_mesh::<2>()
     );
     let what = format!("pad, decay {decay} m/s, step {step} s");

@@ -30,7 +30,8 @@ const FALL: f64 = 25.0;
 const LARGEST: f64 = 500.0;
 /// At rest the law is in the middle of its decreasing branch.
 const FALLING: &str = "[contact.normal.graph]\npoints = [[-10.0, 500.0], [10.0, 0.0]]\n";
-const SLIP: &str = "[contact.friction.slip_weakening]\nstatic = 0.5\ndynamic = 0.3\ndecay_velocity = 0.4\n";
+const SLIP: &str =
+    "[contact.friction.velocity_weakening]\nstatic = 0.5\ndynamic = 0.3\ndecay_velocity = 0.4\n";
 /// Steepest decrease of the coefficient in s/m.
 const SLIP_FALL: f64 = 0.2 / 0.4;
 

@@ -182,12 +182,9 @@ fn occurrences(kind: Kind, word: &str, others: &[Named]) -> Option<String> {
 fn unknown_table(kind: Kind, wanted: &str, all: &[DescribedTable]) -> Error {
     let help = match nearest(wanted, all.iter().map(|table| table.path.as_str())) {
         Some(near) => format!("did you mean `{near}`?"),
-        None => {
-            let names: Vec<&str> = all.iter().map(|table| table.path.as_str()).collect();
-            format!("tables: {}", names.join(", "))
-        }
+        None => "`solver describe` lists all tables".into(),
     };
-    Error::Refused(format!("no table of a {} is called `{wanted}`; {help}", kind.name))
+    Error::Refused(format!("no table of a {} is called `{wanted}`, and no text mentions it; {help}", kind.name))
 }
 
 /// What a key or a table of this name is where it belongs, as text.

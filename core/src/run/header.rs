@@ -51,14 +51,17 @@ pub(super) fn lines<const D: usize, const S: usize>(
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
     lines.extend(side_words::lines(job, &body.pairs));
     let lengths = match &job.time.adaptive {
-        Some(a) => format!("{} s to {} s, {} s first,", a.smallest_step, a.largest_step, job.time.step),
-        None => format!("{} s", job.time.step),
+        Some(a) => {
+            let [smallest, largest, first] = [a.smallest_step, a.largest_step, job.time.step].map(Digits);
+            format!("{smallest} s to {largest} s, {first} s first,")
+        }
+        None => format!("{} s", Digits(job.time.step)),
     };
     lines.push(format!(
         "scheme     {}, steps of {} to {} s; {}, tolerance {:.0e}",
         scheme.scheme.name(),
         lengths,
-        job.time.end,
+        Digits(job.time.end),
         match job.solver.method {
             Method::Vinewtonrsls => "PETSc's vinewtonrsls",
             Method::Newton if scheme.solver.is_nonlinear() => "Newton with line search",
@@ -110,7 +113,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
         summary.status,
         summary.steps,
         if summary.steps == 1 { "" } else { "s" },
-        summary.time,
+        Digits(summary.time),
         summary.newton_iterations,
         summary.linear_iterations
     ));

@@ -125,7 +125,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         }
         totals.single_precision_failed |=
             was_single && scheme.solver.factor_precision() == Some(Precision::Double);
-        // The largest contact pressure under slip weakening, which the certificate bounds.
+        // The largest contact pressure under velocity weakening, which the certificate bounds.
         if let Some(mine) = session.agree(body.slip_pressure(state))? {
             let [most] = session.largest([mine]);
             totals.max_slip_pressure = Some(totals.max_slip_pressure.map_or(most, |max| larger(max, most)));

@@ -62,6 +62,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let folder = job.output_folder();
     let mut log = Log::new(session.is_first(), clock.on_terminal);
     let claimed = session.on_first(|| claim_folder(job, start, &mut log))?.unwrap_or_default();
+    log.start_waiting();
     let began_on = job.output.error_estimate.then(|| (loaded, mesh.clone()));
     let is_restart = start.is_restart();
     let candidates = candidates(session, start, folder)?;
@@ -172,7 +173,9 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     fn advance(&mut self) -> Result<Ended> {
         let Simulation { state, landings, .. } = &self.simulation;
         let mut last = state.step + landings.steps_after(state.time, self.job.time.step);
-        if !self.clock.logs_every_step {
+        if self.clock.logs_every_step {
+            self.log.end_progress();
+        } else {
             self.log.start_progress(last, state.step);
         }
         let mut saved_at = Instant::now();

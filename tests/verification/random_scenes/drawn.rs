@@ -814,14 +814,14 @@ fn friction<const D: usize>(draw: &mut Draw<D>) {
         "tresca",
         "coulomb",
         "coulomb",
-        "slip_weakening",
+        "velocity_weakening",
         "distance_weakening",
         "rate_and_state",
     ]);
     let (coefficient, more) = (draw.between(0.05, 0.5), draw.between(0.0, 0.2));
     let weakening = match law {
         "coulomb" => Some("0".to_owned()),
-        "slip_weakening" => Some(format!("exp(-v/{:e})", draw.number(0.5, VELOCITY))),
+        "velocity_weakening" => Some(format!("exp(-v/{:e})", draw.number(0.5, VELOCITY))),
         "distance_weakening" => Some(format!("max(1 - l/{:e}, 0)", draw.number(0.002, LENGTH))),
         _ => None,
     };
@@ -847,7 +847,7 @@ fn friction<const D: usize>(draw: &mut Draw<D>) {
             draw.key("static", coefficient + more, ONE);
             draw.key("dynamic", coefficient, ONE);
             match law {
-                "slip_weakening" => draw.key("decay_velocity", 0.5, VELOCITY),
+                "velocity_weakening" => draw.key("decay_velocity", 0.5, VELOCITY),
                 _ => draw.key("distance", 0.002, LENGTH),
             }
         }

@@ -18,6 +18,9 @@ pub const WORDS: usize = 11;
 /// Least time between two lines of steps on the standard output.
 const BETWEEN_STEPS: Duration = Duration::from_secs(1);
 
+/// Time between two changes of a bar while nothing happens.
+const BETWEEN_TICKS: Duration = Duration::from_millis(500);
+
 /// Writes lines on rank 0 and nothing elsewhere.
 #[derive(Debug)]
 pub(crate) struct Log {
@@ -122,23 +125,36 @@ impl Log {
         }
     }
 
+    /// Shows that steps are being prepared, if the output is a terminal.
+    pub(crate) fn start_waiting(&mut self) {
+        self.start_bar("{spinner} preparing the first step  {elapsed}", ProgressBar::new_spinner);
+    }
+
     /// Shows a progress bar if the output is a terminal.
     pub(crate) fn start_progress(&mut self, steps: u64, taken: u64) {
+        let template = "{wide_bar} {pos}/{len} steps  {msg}  {elapsed} spent, {eta} left";
+        self.start_bar(template, || ProgressBar::new(steps));
+        if let Some(bar) = &self.bar {
+            bar.set_position(taken);
+            bar.reset_eta();
+        }
+    }
+
+    /// Shows a bar that moves also while steps take long, in place of another one.
+    fn start_bar(&mut self, template: &str, new: impl Fn() -> ProgressBar) {
+        self.end_progress();
         if !(self.is_active && self.on_terminal) {
             return;
         }
         let is_direct = std::io::stderr().is_terminal() && std::io::stdout().is_terminal();
         if is_direct || launcher_has_terminal() {
-            let bar = ProgressBar::new(steps);
+            let bar = new();
             if !is_direct {
                 bar.set_draw_target(ProgressDrawTarget::term_like_with_hz(Box::new(LauncherTerminal), 5));
             }
-            let style = ProgressStyle::with_template(
-                "{wide_bar} {pos}/{len} steps  {msg}  {elapsed} spent, {eta} left",
-            );
+            let style = ProgressStyle::with_template(template);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar.set_position(taken);
-            bar.reset_eta();
+            bar.enable_steady_tick(BETWEEN_TICKS);
             self.bar = Some(bar);
         }
     }

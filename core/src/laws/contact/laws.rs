@@ -10,7 +10,7 @@ mod exponential_damper;
 mod graph;
 mod pressure_formula;
 mod rate_and_state;
-mod slip_weakening;
+mod velocity_weakening;
 mod tresca;
 mod unilateral;
 
@@ -24,9 +24,9 @@ pub use exponential_damper::ExponentialDamper;
 pub use graph::Graph;
 pub use pressure_formula::{FormulaLaw, PressureFormula};
 pub use rate_and_state::{Evolution, RateAndState};
-pub use slip_weakening::SlipWeakening;
 pub use tresca::Tresca;
 pub use unilateral::{Bound, Unilateral};
+pub use velocity_weakening::VelocityWeakening;
 
 use super::{
     friction_law::{FrictionBound, FrictionHistory, SlidingContext, Slip, friction_laws},
@@ -65,9 +65,12 @@ friction_laws! {
     Tresca = "tresca",
     /// Coulomb's law: a bound proportional to the contact pressure.
     Coulomb = "coulomb",
-    /// A friction coefficient that decreases with the sliding velocity v: dynamic + (static - dynamic) exp(-v / decay_velocity).
-    SlipWeakening = "slip_weakening",
-    /// A friction coefficient that decreases with the accumulated slip distance of a point: the law of dynamic rupture.
+    /// A friction coefficient that decreases with the sliding velocity v: dynamic + (static - dynamic) exp(-v / decay_velocity). Before
+    /// version 0.3 its name was `slip_weakening`, which is still read.
+    #[serde(alias = "slip_weakening")]
+    VelocityWeakening = "velocity_weakening",
+    /// A friction coefficient that decreases with the accumulated slip distance of a point: slip weakening, the law of dynamic
+    /// rupture.
     DistanceWeakening = "distance_weakening",
     /// A friction coefficient that depends on the sliding velocity and on a state that evolves with slip and time: the law of faults.
     RateAndState = "rate_and_state",
@@ -215,7 +218,11 @@ mod tests {
     fn any_law() -> impl Strategy<Value = FrictionLaw> {
         let weakening =
             (0.0f64..1.0, 0.0f64..1.0, 0.01f64..2.0).prop_map(|(dynamic, more, decay_velocity)| {
-                FrictionLaw::SlipWeakening(SlipWeakening { at_rest: dynamic + more, dynamic, decay_velocity })
+                FrictionLaw::VelocityWeakening(VelocityWeakening {
+                    at_rest: dynamic + more,
+                    dynamic,
+                    decay_velocity,
+                })
             });
         prop_oneof![
             (0.0f64..5.0).prop_map(|bound| FrictionLaw::Tresca(Tresca { bound })),

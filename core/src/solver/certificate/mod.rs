@@ -31,7 +31,7 @@
 //! their worst step is the shortest. A run that makes a step outside of the range, as
 //! after a restart with other steps, renews its certificates.
 //!
-//! `m_j` is the steepest decrease of a contact graph, `m_t` that of a friction graph (slip weakening: the decrease of the
+//! `m_j` is the steepest decrease of a contact graph, `m_t` that of a friction graph (velocity weakening: the decrease of the
 //! coefficient times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. If the normal law has
 //! no largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1, `1 / sup of sum d S_tau(w)`
 //! over `(K w, w) - sum (m_j S_nu(w) + m_t S_tau(w))` with the decrease `d` of the coefficient, and 0 where nothing but the contact

@@ -23,6 +23,8 @@ const LAGGING_FALL: f64 = 2e-3;
 const LAGGING_STEP: f64 = 0.02;
 /// The share of a step below which the stability bound is a rounding error of 0.
 const NOTHING: f64 = 1e-9;
+/// What to do where several solutions are not excluded.
+const SEARCH: &str = "[solver] guesses = 10 searches each step for others";
 /// Why a supremum is infinite.
 const RIGID: &str = "(the supports do not prevent a rigid motion against the contact)";
 
@@ -32,7 +34,12 @@ impl Certificates {
     pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: &[Accept]) -> Verdict {
         let mut verdict = Verdict::default();
         verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
-        if let Some(fall) = self.monotonicity_constant {
+        if !self.not_covered.is_empty() && self.theta_step.is_some() {
+            verdict.words.push(format!("where several solutions are not excluded, {SEARCH}"));
+        }
+        // Laws that neither decrease nor are bounded have nothing to tell.
+        let decreases = |fall: &f64| *fall > 0.0 || self.growth_constants.is_some();
+        if let Some(fall) = self.monotonicity_constant.filter(decreases) {
             verdict.words.push(format!("m_j = {} Pa s/m, {}", Digits(fall), self.growth()));
         }
         let covered = if self.not_covered.is_empty() { "" } else { ", except for what is not covered" };
@@ -51,7 +58,8 @@ impl Certificates {
             };
             verdict.words.push(format!("theta = {size}, {meaning}{covered}"));
         }
-        let fall = self.monotonicity_constant.filter(|_| self.decrease_with_displacement.is_none());
+        let fall = self.monotonicity_constant.filter(decreases);
+        let fall = fall.filter(|_| self.decrease_with_displacement.is_none());
         if let (Some(modulus), Some(fall)) = (self.viscosity_modulus, fall) {
             let product = match self.trace_norm_squared {
                 Some(trace) => fall * trace,
@@ -87,9 +95,10 @@ impl Certificates {
             if let Some(flowing) = self.flowing_step_bound.filter(|flowing| (*flowing..bound).contains(&step))
             {
                 verdict.warnings.push(format!(
-                    "the step of {step} s exceeds {0} s: errors may grow where most of the body flows; a step below \
+                    "the step of {1} s exceeds {0} s: errors may grow where most of the body flows; a step below \
                      {0} s or an implicit scheme prevents this",
-                    Digits(flowing)
+                    Digits(flowing),
+                    Digits(step)
                 ));
             }
         }
@@ -122,10 +131,10 @@ impl Certificates {
         match reasons.as_slice() {
             [] => format!("each step{steps} has one solution{covered}"),
             _ if bound.is_none() => {
-                format!("several solutions of a step are not excluded: {}", reasons.join("; "))
+                format!("several solutions of a step are not excluded: {}; {SEARCH}", reasons.join("; "))
             }
             _ => format!(
-                "each step{steps} has one solution{covered}, which does not cover: {}",
+                "each step{steps} has one solution{covered}, which does not cover: {}; {SEARCH}",
                 reasons.join("; ")
             ),
         }
@@ -155,7 +164,7 @@ impl Verdict {
         accepted: bool,
     ) {
         let steps = if shortest == longest {
-            format!("a step of {longest} s")
+            format!("a step of {} s", Digits(longest))
         } else {
             format!("a step between {} and {} s", Digits(shortest), Digits(longest))
         };
@@ -208,18 +217,21 @@ impl Verdict {
         let accepts = "or accept it with [solver] accept = [\"explicit_stability\"]";
         let (found, remedy) = if bound < NOTHING * step {
             (
-                "no step is stable: lagged_euler takes the forces of springs and of the elastic stress at the start of the step, and nothing \
-                 viscous and no mass resists a motion that only they hold, such as a rigid motion of a body on springs"
-                    .to_owned(),
                 format!(
-                    "give supports with `stiffness` also `damping`, the material a `density`, use [time] scheme = \"implicit_euler\" or \
-                     \"bdf2\", {accepts}"
+                    "no step is stable: lagged_euler takes forces of springs and stresses at the start of the step, and nothing viscous and no \
+                     mass resists a motion that only they hold, such as a rigid motion of a body on springs, or flow relaxes stresses within \
+                     {least_bound} s"
+                ),
+                format!(
+                    "give supports with `stiffness` also `damping`, the material a `density` or flow a longer `relaxation`, use [time] scheme = \
+                     \"implicit_euler\" or \"bdf2\", {accepts}"
                 ),
             )
         } else {
             (
                 format!(
-                    "the step of {step} s exceeds {least_bound} s, above which explicit stresses amplify errors"
+                    "the step of {} s exceeds {least_bound} s, above which explicit stresses amplify errors",
+                    Digits(step)
                 ),
                 format!("use a step below {least_bound} s, [time] scheme = \"implicit_euler\", {accepts}"),
             )
@@ -284,7 +296,8 @@ mod tests {
         let known = Certificates { not_covered: both, slip_pressure_bound: Some(0.0), ..paper() };
         assert_eq!(
             brief(known)[0],
-            "several solutions of a step are not excluded: the friction traction decreases; damage may soften the body"
+            "several solutions of a step are not excluded: the friction traction decreases; damage may soften the body; [solver] guesses = 10 searches \
+             each step for others"
         );
         let known = Certificates { theta_step: Some(1.5), ..paper() };
         assert!(brief(known)[0].contains("may have several solutions"));
@@ -317,6 +330,13 @@ mod tests {
             "m_A = 50 Pa s > m_j |gamma|^2 = 0 Pa s: condition (13) of Wang and Cheng (2022) holds"
         );
         assert!(words(0.1).contains("<= m_j |gamma|^2 = infinite") && words(0.1).contains("does not hold"));
+    }
+
+    #[test]
+    fn laws_that_neither_decrease_nor_are_bounded_are_not_spoken_of() {
+        let rigid = Certificates { monotonicity_constant: Some(0.0), growth_constants: None, ..paper() };
+        let words = rigid.verdict(1.0 / 64.0, None, &[]).words;
+        assert!(words.len() > 1 && !words.iter().any(|words| words.contains("m_j")), "{words:?}");
     }
 
     #[test]

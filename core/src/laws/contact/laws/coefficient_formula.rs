@@ -265,7 +265,7 @@ impl FrictionBound for CoefficientFormula {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::contact::{Coulomb, Decay, DistanceWeakening, FrictionLaw, SlipWeakening};
+    use crate::laws::contact::{Coulomb, Decay, DistanceWeakening, FrictionLaw, VelocityWeakening};
 
     fn written(text: &str) -> FrictionLaw {
         FrictionLaw::CoefficientFormula(CoefficientFormula::new(Formula::parse(text).unwrap()))
@@ -277,7 +277,11 @@ mod tests {
         let pairs = [
             (FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 }), "0.3"),
             (
-                FrictionLaw::SlipWeakening(SlipWeakening { at_rest: 0.5, dynamic: 0.3, decay_velocity: 0.1 }),
+                FrictionLaw::VelocityWeakening(VelocityWeakening {
+                    at_rest: 0.5,
+                    dynamic: 0.3,
+                    decay_velocity: 0.1,
+                }),
                 "0.3 + 0.2*exp(-v/0.1)",
             ),
             (FrictionLaw::DistanceWeakening(weakening), "0.2 + 0.4*max(1 - l/0.5, 0)"),

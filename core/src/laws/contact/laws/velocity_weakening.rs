@@ -1,4 +1,4 @@
-//! Slip weakening: a friction coefficient that decreases with the sliding velocity, as in the friction of rocks.
+//! Velocity weakening: a friction coefficient that decreases with the sliding velocity, as in the friction of rocks.
 //!
 //! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact pressure. Its
 //! steepest decrease is `(static - dynamic) / decay_velocity p`.
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Friction whose coefficient decreases from static to dynamic with the sliding velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SlipWeakening {
+pub struct VelocityWeakening {
     /// Friction coefficient at rest. At least `dynamic`.
     #[serde(rename = "static")]
     #[schemars(range(min = 0), example = 0.5)]
@@ -24,7 +24,7 @@ pub struct SlipWeakening {
     pub decay_velocity: f64,
 }
 
-impl FrictionBound for SlipWeakening {
+impl FrictionBound for VelocityWeakening {
     fn coefficient(&self, speed: f64, _: SlidingContext) -> f64 {
         self.dynamic + (self.at_rest - self.dynamic) * (-speed / self.decay_velocity).exp()
     }
@@ -49,10 +49,24 @@ impl FrictionBound for SlipWeakening {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laws::contact::FrictionLaw;
+
+    #[test]
+    fn the_name_of_earlier_versions_is_read() {
+        let values = r#"{"static": 0.5, "dynamic": 0.3, "decay_velocity": 0.1}"#;
+        let read = |name: &str| serde_json::from_str::<FrictionLaw>(&format!("{{\"{name}\": {values}}}"));
+        let law = VelocityWeakening { at_rest: 0.5, dynamic: 0.3, decay_velocity: 0.1 };
+        for name in ["velocity_weakening", "slip_weakening"] {
+            assert_eq!(
+                read(name).unwrap_or_else(|e| panic!("{name}: {e}")),
+                FrictionLaw::VelocityWeakening(law)
+            );
+        }
+    }
 
     #[test]
     fn the_coefficient_falls_by_hand() {
-        let law = SlipWeakening { at_rest: 0.6, dynamic: 0.2, decay_velocity: 0.5 };
+        let law = VelocityWeakening { at_rest: 0.6, dynamic: 0.2, decay_velocity: 0.5 };
         assert!((law.bound(0.0, 10.0, SlidingContext::FIRST) - 6.0).abs() < 1e-15);
         assert!(
             (law.bound(0.5, 10.0, SlidingContext::FIRST) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14
