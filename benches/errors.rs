@@ -18,7 +18,7 @@ use clarke::{
     linear_algebra::tensor::{Mandel, Vector, add_scaled},
     mesh::{Mesh, shape::signed_measure},
     parallel::session::{Mpi, Session},
-    run::{EndState, Scene, Simulation, error_of_mesh, error_of_steps, vibrates, with_steps},
+    run::{Doubt, EndState, Scene, Simulation, error_of_mesh, error_of_steps, with_steps},
 };
 use jobs::jobs;
 use std::{
@@ -105,7 +105,7 @@ fn of_mesh<const D: usize, const S: usize>(
 ) -> Outcome<Measured> {
     let coarse = run::<D, S>(session, loaded, mesh, LONGEST[0])?;
     let estimate = error_of_mesh(session, &loaded.job, &coarse).map_err(words)?.ok_or("no estimate")?;
-    if vibrates(&coarse.totals) {
+    if estimate.doubt == Some(Doubt::Vibrates) {
         return Err("vibrates".into());
     }
     let fine = run::<D, S>(session, fine, fine_mesh, LONGEST[1])?;
@@ -126,7 +126,8 @@ fn of_mesh<const D: usize, const S: usize>(
             size += volume * tensor.inverse_square(&own);
         }
     }
-    Ok(Measured { estimate, actual: (error / size).sqrt(), is_trusted: true })
+    let actual = (error / size).sqrt();
+    Ok(Measured { estimate: estimate.relative, actual, is_trusted: estimate.doubt.is_none() })
 }
 
 /// The cell that contains a place or is nearest to it, with the barycentric coordinates there.

@@ -184,7 +184,10 @@ fn unknown_table(kind: Kind, wanted: &str, all: &[DescribedTable]) -> Error {
         Some(near) => format!("did you mean `{near}`?"),
         None => "`solver describe` lists all tables".into(),
     };
-    Error::Refused(format!("no table of a {} is called `{wanted}`, and no text mentions it; {help}", kind.name))
+    Error::Refused(format!(
+        "no table of a {} is called `{wanted}`, and no text mentions it; {help}",
+        kind.name
+    ))
 }
 
 /// What a key or a table of this name is where it belongs, as text.

@@ -173,6 +173,13 @@ impl Walk<'_> {
     fn one_of(&mut self, node: &mut Node, schema: Schema, path: &str) {
         let Node { value: Value::Table(table), key: place, .. } = node else { return };
         let tagged = schema.tagged();
+        for (name, branch) in &tagged {
+            // A name of earlier versions.
+            let former = branch.text("formerly").filter(|_| !table.contains_key(*name));
+            if let Some(child) = former.and_then(|former| table.remove(former)) {
+                table.insert((*name).to_owned(), child);
+            }
+        }
         let choices: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
         // Keys that each of the choices may have beside it.
         let common = schema.properties().map(|(key, _)| key.as_str());
@@ -582,6 +589,25 @@ mod tests {
             assert!(unread.iter().any(|path| path == table), "{table} is not in {unread:?}");
         }
         assert!(!unread.iter().any(|path| path == "solver" || path == "traction.0"), "{unread:?}");
+    }
+
+    #[test]
+    fn names_of_earlier_versions_are_read_unless_both_stand_there() {
+        let of = |friction: &str| {
+            let (job, _, faults) = filled(&format!(
+                "[mesh]\nrectangle = {{ size = [1, 1], cells = [1, 1] }}\n[material]\n[time]\nend = 1\nstep = 1\n\
+                 [[contact]]\non = [\"a\"]\nnormal.unilateral = {{}}\n{friction}"
+            ));
+            (job.contact[0].friction.as_ref().map(|friction| friction.table()), faults)
+        };
+        let law = |name: &str| {
+            format!("friction.{name} = {{ static = 0.5, dynamic = 0.3, decay_velocity = 0.1 }}\n")
+        };
+        let [new, old] = ["velocity_weakening", "slip_weakening"].map(law);
+        let known = of(&new);
+        assert_eq!(known.1, 0, "{known:?}");
+        assert_eq!(of(&old), known);
+        assert_eq!(of(&format!("{new}{old}")).1, 1, "one of them is unknown");
     }
 
     #[test]

@@ -25,7 +25,7 @@ use crate::{
         body::Body,
         effect::{ELASTIC, Form, KINETIC},
     },
-    io::output::{error_indicator::ErrorIndicator, history::Totals},
+    io::output::error_indicator::ErrorIndicator,
     job::{Job, Loaded, Material},
     laws::digits::Digits,
     linear_algebra::tensor::{Mandel, add_scaled, larger},
@@ -250,13 +250,48 @@ fn observed_order([near, far]: [f64; 2], [first, second]: [f64; 2]) -> f64 {
     low
 }
 
-/// Estimates the relative error of the stress at the end of a run by its mesh, at most 1; `None` where the stress has no norm of linear
-/// elasticity. In a body that vibrates, errors of waves add to it, which the indicator does not see. Collective.
+/// The estimated error of the stress at the end by the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorOfMesh {
+    /// Over the norm of the stress, at most 1.
+    pub relative: f64,
+    /// Why it is uncertain, if it is.
+    pub doubt: Option<Doubt>,
+}
+
+/// Why an error by the mesh is uncertain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Doubt {
+    /// The body vibrates: errors of waves add to it, which the indicator does not see.
+    Vibrates,
+    /// Most cells lie at the surface, where the indicator is poor.
+    Thin,
+    /// The indicator is so large that the stress is hardly known.
+    Coarse,
+}
+
+impl Doubt {
+    /// As a clause.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Vibrates => "the body vibrates, and errors of waves add to it",
+            Self::Thin => "most cells lie at the surface, where the indicator is poor",
+            Self::Coarse => "the mesh is too coarse",
+        }
+    }
+}
+
+/// Facets of the surface over cells above which a body counts as thin: those of five cells along each side, or of three across a long one.
+const THIN: f64 = 0.45;
+/// The largest error that is trusted.
+const COARSE: f64 = 0.5;
+
+/// Estimates the error of the stress at the end of a run by its mesh; `None` where the stress has no norm of linear elasticity. Collective.
 pub fn error_of_mesh<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
-    Simulation { body, state, .. }: &Simulation<D, S>,
-) -> Result<Option<f64>, Agreed> {
+    Simulation { body, state, totals, .. }: &Simulation<D, S>,
+) -> Result<Option<ErrorOfMesh>, Agreed> {
     let is_linear =
         |material: &Material| material.elasticity.as_ref().is_some_and(|law| law.expression.is_none());
     if !job.materials().all(|(_, material)| is_linear(material)) {
@@ -267,12 +302,15 @@ pub fn error_of_mesh<const D: usize, const S: usize>(
         ErrorIndicator::new(session, body)?.of(session, body, &stress)
     };
     let relative = SAFETY_OF_INDICATOR * session.agree(indicated())?.relative;
-    Ok(Some(relative.clamp(job.solver.tolerance, 1.0)))
-}
-
-/// Whether a body with these energies vibrates.
-pub fn vibrates(totals: &Totals) -> bool {
-    totals.energy[KINETIC] > VIBRATING * totals.energy[ELASTIC]
+    let [facets, cells] =
+        session.sum([body.mesh.facets.len(), body.mesh.cell_count()].map(|count| count as f64));
+    let doubts = [
+        (Doubt::Vibrates, totals.energy[KINETIC] > VIBRATING * totals.energy[ELASTIC]),
+        (Doubt::Thin, facets > THIN * cells),
+        (Doubt::Coarse, relative > COARSE),
+    ];
+    let doubt = doubts.into_iter().find_map(|(doubt, holds)| holds.then_some(doubt));
+    Ok(Some(ErrorOfMesh { relative: relative.clamp(job.solver.tolerance, 1.0), doubt }))
 }
 
 #[cfg(test)]

@@ -177,19 +177,15 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
 
 /// Logs the estimated errors, and what half of them would take.
 fn errors(log: &mut Log, job: &Job, summary: &Summary) {
-    let Errors { error_of_mesh, vibrates, error_of_steps, order_of_steps } = summary.errors;
+    let Errors { error_of_mesh, doubt_of_mesh, error_of_steps, order_of_steps } = summary.errors;
     let two_digits = |number: f64| {
         let unit = 10f64.powf(number.log10().floor() - 1.0);
         Digits((number / unit).round() * unit)
     };
     let percent = |error: f64| format!("{} %", two_digits(100.0 * error));
     if let Some(error) = error_of_mesh {
-        let (least, waves) = if vibrates {
-            ("at least ", ": the body vibrates, and errors of waves add to it")
-        } else {
-            ("", "")
-        };
-        log.line(format!("errors     by the mesh {least}{} of the stress at the end{waves}", percent(error)));
+        let doubt = doubt_of_mesh.map_or_else(String::new, |why| format!(", uncertain: {why}"));
+        log.line(format!("errors     by the mesh {} of the stress at the end{doubt}", percent(error)));
     }
     if let Some(error) = error_of_steps {
         let more = match order_of_steps {

@@ -37,7 +37,7 @@ mod touching;
 mod trial;
 mod units;
 
-pub use accuracy::{EndState, error_of_mesh, error_of_steps, vibrates, with_steps};
+pub use accuracy::{Doubt, EndState, ErrorOfMesh, error_of_mesh, error_of_steps, with_steps};
 pub use build::normal_law;
 pub use check::Report;
 pub use scene::Scene;

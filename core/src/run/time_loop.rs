@@ -2,7 +2,7 @@
 
 use super::{
     Clock, Simulation, Start,
-    accuracy::{error_of_mesh, error_of_steps, vibrates},
+    accuracy::{Doubt, error_of_mesh, error_of_steps},
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
     header, obstacles,
@@ -508,8 +508,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             log.line(format!("errors     those of the steps are unknown: {reason}"));
         }
         Ok(Errors {
-            error_of_mesh: of_mesh,
-            vibrates: vibrates(&simulation.totals),
+            error_of_mesh: of_mesh.map(|error| error.relative),
+            doubt_of_mesh: of_mesh.and_then(|error| error.doubt).map(Doubt::words),
             error_of_steps: of_steps.as_ref().ok().map(|error| error.relative),
             order_of_steps: of_steps.ok().and_then(|error| error.order),
         })

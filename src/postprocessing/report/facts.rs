@@ -3,7 +3,7 @@
 use super::{
     artifacts::RunFiles,
     colour::{LINES, hex},
-    markup::{escape, facts, paragraph, table},
+    markup::{capital, escape, facts, paragraph, table},
     picture::Picture,
     scale::{number, size},
     svg::{LETTERS, WIDTH, open_svg, text, text_width},
@@ -49,7 +49,8 @@ pub(super) fn ending(summary: &Value) -> String {
         "failed" => "Failed",
         _ => "Ended",
     };
-    format!("{ended}: {} steps to t = {} s on {ranks}{took}.", value("steps"), value("time"))
+    let steps = if value("steps") == "1" { "1 step" } else { &format!("{} steps", value("steps")) };
+    format!("{ended}: {steps} to t = {} s on {ranks}{took}.", value("time"))
 }
 
 /// That steps passed unstable states, if any did.
@@ -86,13 +87,14 @@ pub(super) fn warnings(summary: &Value) -> String {
     format!("<div class=\"missing\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</div>\n")
 }
 
-/// The certificates and their meaning for the run.
-pub(super) fn certificates(found: &RunFiles) -> String {
+/// What the certificates say of the run in a few words, and the certificates with their meaning.
+pub(super) fn certificates(found: &RunFiles) -> [String; 2] {
+    let unknown = |words: &str| [paragraph(words), String::new()];
     let Some(object) = found.summary.as_ref().and_then(|summary| summary.get("certificates")) else {
-        return paragraph("No certificates: summary.json is missing or does not contain them.");
+        return unknown("No certificates: summary.json is missing or does not contain them.");
     };
     let Ok(known) = serde_json::from_value::<Certificates>(object.clone()) else {
-        return paragraph("The certificates in summary.json cannot be read.");
+        return unknown("The certificates in summary.json cannot be read.");
     };
     let growth = |which: usize| known.growth_constants.map(|constants| constants[which]);
     let rows = [
@@ -122,13 +124,15 @@ pub(super) fn certificates(found: &RunFiles) -> String {
     });
     let rows: Vec<Vec<String>> = rows.collect();
     if rows.is_empty() {
-        return paragraph("No certificate applies to this problem.");
+        return unknown("No certificate applies to this problem.");
     }
+    let mut brief = String::new();
     let mut out = table("Constants of the problem", &["certificate", "value", "meaning"], &rows);
     let steps = found.history.as_ref().and_then(|history| history.column("dt"));
     let longest = steps.and_then(|steps| steps.into_iter().reduce(f64::max));
     if let Some(step) = longest.or_else(|| found.job.as_ref().map(|job| job.time.step)) {
         let verdict = known.verdict(step, None, &[Accept::Uniqueness, Accept::ExplicitStability]);
+        brief.extend(verdict.brief.iter().map(|words| paragraph(&format!("{}.", capital(words)))));
         let _ = writeln!(out, "<h3>Verdict for steps of {} s</h3>\n<ul>", number(step));
         for words in &verdict.words {
             let _ = writeln!(out, "<li>{}</li>", escape(words));
@@ -138,7 +142,7 @@ pub(super) fn certificates(found: &RunFiles) -> String {
             out += &paragraph("The job accepts that a limit of a certificate is exceeded.");
         }
     }
-    out
+    [brief, out]
 }
 
 /// The seconds of each phase as a bar chart.

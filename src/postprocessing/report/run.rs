@@ -28,6 +28,9 @@ use std::fmt::Write;
 /// Heading of the section with pictures of the body.
 const BODY: &str = "Body";
 
+/// The most constant quantities that are named where the page does not fold them.
+const MOST_CONSTANT: usize = 3;
+
 /// What a report draws.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Options {
@@ -67,8 +70,13 @@ pub(super) fn page(found: &RunFiles, options: Options) -> Result<Page> {
     if let Some(summary) = &found.summary {
         page.section("Summary", &facts::summary(summary), vec![]);
     }
-    let certificates = facts::certificates(found);
-    page.section("Certificates", &folded("Uniqueness and growth of solutions", &certificates), vec![]);
+    let [brief, certificates] = facts::certificates(found);
+    let certificates = if certificates.is_empty() {
+        certificates
+    } else {
+        folded("Uniqueness and growth of solutions", &certificates)
+    };
+    page.section("Certificates", &(brief + &certificates), vec![]);
     if let Some(phases) = found.summary.as_ref().and_then(facts::phases) {
         page.section("Wall time", "", vec![phases]);
     }
@@ -277,7 +285,13 @@ fn not_drawn(constant: &[String]) -> String {
     if constant.is_empty() {
         return String::new();
     }
-    paragraph(&format!("Not drawn, because constant: {}.", constant.join(", ")))
+    let words = "Not drawn, because constant:";
+    let all = paragraph(&format!("{words} {}.", constant.join(", ")));
+    if constant.len() > MOST_CONSTANT {
+        folded(&format!("{words} {} quantities", constant.len()), &all)
+    } else {
+        all
+    }
 }
 
 fn time_sections(sections: &mut Sections, found: &RunFiles) -> Result<()> {

@@ -172,14 +172,15 @@ pub struct Summary {
 /// The estimated errors of the state at the end of a run; only with `[output] error_estimate`, and where they are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Errors {
-    /// Estimated error of the stress at the end by the mesh, relative: twice the relative error indicator, at most 1, or its least value
-    /// where the body vibrates; only with `[output] error_estimate`, and where it is known.
+    /// Estimated error of the stress at the end by the mesh, relative: twice the relative error indicator, at most 1; only with `[output]
+    /// error_estimate`, and where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of the stress at the end by the mesh, relative")]
     pub error_of_mesh: Option<f64>,
-    /// Whether the body vibrates.
-    #[serde(skip)]
-    pub vibrates: bool,
+    /// Why `error_of_mesh` is uncertain; missing where it is not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(title = "why the error by the mesh is uncertain")]
+    pub doubt_of_mesh: Option<&'static str>,
     /// Estimated error of stress and velocity at the end by the time steps, likewise; uncertain where `order_of_steps` is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of stress and velocity at the end by the steps, relative")]

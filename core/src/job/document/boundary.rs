@@ -34,12 +34,12 @@ pub struct Support {
     /// after `initial.from` it applies from the end of the first step. The work of the support is part of `external_work`. Absent:
     /// the components do not move.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "m"), example = ["0.01*min(t/0.1, 1)"])]
+    #[schemars(extend("also" = "displacement control, prescribed displacement", "unit" = "m"), example = ["0.01*min(t/0.1, 1)"])]
     pub displacement: Option<Vec<Scalar>>,
     /// The velocity of the fixed components, in place of `displacement`. Without inertia they move by its integral over each step, whatever the
     /// length of the step; with inertia by the velocity at its end, which adaptive steps keep near its mean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("unit" = "m/s"), example = [0.02])]
+    #[schemars(extend("also" = "earthquake, shaking, base motion, seismic, prescribed velocity", "unit" = "m/s"), example = [0.02])]
     pub velocity: Option<Vec<Scalar>>,
     /// Springs to the ground, per area: the traction on the body is minus the stiffness times the displacement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -130,7 +130,7 @@ pub struct Traction {
     /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
     /// x, y, z, integrated by their values at points within the facets.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(extend("unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
+    #[schemars(extend("also" = "load, distributed load, surface load", "unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
     pub value: Vec<Scalar>,
     /// A pressure on the undeformed boundary, against its outward normal, in place of `value`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -143,7 +143,7 @@ pub struct Traction {
 #[serde(deny_unknown_fields)]
 pub struct Gravity {
     /// The acceleration, one component per axis: numbers, or expressions in the time t and the undeformed coordinates x, y, z.
-    #[schemars(extend("unit" = "m/s^2"), example = [0.0, -9.81])]
+    #[schemars(extend("also" = "weight, self-weight, dead load", "unit" = "m/s^2"), example = [0.0, -9.81])]
     pub acceleration: Vec<Scalar>,
 }
 

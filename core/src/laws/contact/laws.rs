@@ -67,7 +67,7 @@ friction_laws! {
     Coulomb = "coulomb",
     /// A friction coefficient that decreases with the sliding velocity v: dynamic + (static - dynamic) exp(-v / decay_velocity). Before
     /// version 0.3 its name was `slip_weakening`, which is still read.
-    #[serde(alias = "slip_weakening")]
+    #[schemars(extend("formerly" = "slip_weakening"))]
     VelocityWeakening = "velocity_weakening",
     /// A friction coefficient that decreases with the accumulated slip distance of a point: slip weakening, the law of dynamic
     /// rupture.

@@ -36,6 +36,7 @@ pub enum Decay {
 /// checkpoints contain the slip as `slip`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "slip weakening, rupture, earthquake, fault"))]
 pub struct DistanceWeakening {
     /// Friction coefficient before any slip. At least `dynamic`.
     #[serde(rename = "static")]

@@ -53,6 +53,7 @@ pub enum Evolution {
 /// whose creep is too slow to matter count as sticking.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "Dieterich, Ruina, earthquake, fault, rock"))]
 pub struct RateAndState {
     /// Friction coefficient of steady sliding at the velocity `velocity`.
     #[schemars(extend("exclusiveMinimum" = 0), example = 0.6)]

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Friction whose coefficient decreases from static to dynamic with the sliding velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "slip_weakening, stick-slip"))]
 pub struct VelocityWeakening {
     /// Friction coefficient at rest. At least `dynamic`.
     #[serde(rename = "static")]
@@ -49,20 +50,6 @@ impl FrictionBound for VelocityWeakening {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::contact::FrictionLaw;
-
-    #[test]
-    fn the_name_of_earlier_versions_is_read() {
-        let values = r#"{"static": 0.5, "dynamic": 0.3, "decay_velocity": 0.1}"#;
-        let read = |name: &str| serde_json::from_str::<FrictionLaw>(&format!("{{\"{name}\": {values}}}"));
-        let law = VelocityWeakening { at_rest: 0.5, dynamic: 0.3, decay_velocity: 0.1 };
-        for name in ["velocity_weakening", "slip_weakening"] {
-            assert_eq!(
-                read(name).unwrap_or_else(|e| panic!("{name}: {e}")),
-                FrictionLaw::VelocityWeakening(law)
-            );
-        }
-    }
 
     #[test]
     fn the_coefficient_falls_by_hand() {
