@@ -184,11 +184,34 @@ fn links_and_pictures_of_pages_at_the_root_are_there() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
 }
 
+/// The fenced blocks of a text in a language, one after the other.
+fn blocks(text: &str, language: &str) -> String {
+    let block = |part: &str| part.strip_prefix(language)?.strip_prefix('\n').map(str::to_owned);
+    text.split("```").skip(1).step_by(2).filter_map(block).collect()
+}
+
 /// The TOML blocks of a page, one after the other.
 fn toml(page: &str) -> String {
-    let text = read(page);
-    let block = |part: &str| part.strip_prefix("toml\n").map(str::to_owned);
-    text.split("```").skip(1).step_by(2).filter_map(block).collect()
+    blocks(&read(page), "toml")
+}
+
+/// Writes the job of each section of docs/recipes.md, and the mesh file that it reads, into a folder; the job files.
+pub fn recipes(folder: &Path) -> Vec<PathBuf> {
+    let page = read("docs/recipes.md");
+    let mut jobs = Vec::new();
+    for section in page.split("\n## ").skip(1) {
+        let title = section.lines().next().expect("a title");
+        let text = blocks(section, "toml");
+        assert!(!text.is_empty(), "{title}: no job");
+        let job = folder.join(title.to_lowercase().replace([' ', ':'], "_")).with_extension("toml");
+        let keys: toml::Table = text.parse().unwrap_or_else(|error| panic!("{title}: {error}"));
+        if let Some(mesh) = keys["mesh"].get("file").and_then(toml::Value::as_str) {
+            std::fs::write(folder.join(mesh), blocks(section, "msh")).expect("written");
+        }
+        std::fs::write(&job, text).expect("written");
+        jobs.push(job);
+    }
+    jobs
 }
 
 #[test]
@@ -199,6 +222,60 @@ fn the_jobs_in_the_pages_are_valid() {
             panic!("{page}: {error}");
         }
     }
+}
+
+#[test]
+fn recipes_are_short_and_state_what_they_prove() {
+    let folder = tempfile::tempdir().expect("folder");
+    let jobs = recipes(folder.path());
+    assert!(jobs.len() >= 7, "only {} recipes", jobs.len());
+    for file in jobs {
+        let text = std::fs::read_to_string(&file).expect("a job");
+        let name = file.display();
+        assert!(text.lines().count() <= 35, "{name} has {} lines", text.lines().count());
+        let job = clarke::job::Job::load(&file, &[]).unwrap_or_else(|error| panic!("{name}: {error}")).job;
+        assert!(!job.check.is_empty(), "{name}: no [check] table");
+    }
+}
+
+/// The names of keys and tables in the last column of the tables of a page, and what the page sets them to.
+fn keys_in_tables(text: &str) -> Vec<String> {
+    let is_key = |span: &String| {
+        let key = span.split(" = ").next().unwrap_or_default();
+        let is_file = [".csv", ".toml", ".inp"].iter().any(|ending| key.ends_with(ending));
+        let is_name = key.starts_with(|c: char| c.is_ascii_lowercase())
+            && key.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '.');
+        is_name && key.contains('.') && !is_file
+    };
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |"));
+    let last = rows.filter_map(|row| row.rsplit_once(" | ").map(|(_, last)| last));
+    last.flat_map(spans).filter(is_key).collect()
+}
+
+/// Whether a job has this key or table, and its description the word that it is set to.
+fn is_key_of_a_job(name: &str) -> bool {
+    let (key, value) = name.split_once(" = ").unwrap_or((name, ""));
+    clarke::job::describe(Some(key)).is_ok_and(|text| text.starts_with('[') && text.contains(value))
+}
+
+#[test]
+fn pages_of_terms_and_values_name_keys_that_are_there() {
+    for (page, least) in [("docs/terms.md", 80), ("docs/typical-values.md", 45)] {
+        let named = keys_in_tables(&read(page));
+        assert!(named.len() >= least, "{page} names only {} keys", named.len());
+        let missing: Vec<&String> = named.iter().filter(|name| !is_key_of_a_job(name)).collect();
+        assert!(missing.is_empty(), "{page} names what is no key: {missing:?}");
+    }
+}
+
+#[test]
+fn keys_that_are_not_there_are_found() {
+    let row = "| friction | `*FRICTION` | `contact.friction.coulomb`, `history.csv`, `time.scheme = \"bdf2\"`, `max` |";
+    assert_eq!(keys_in_tables(row), ["contact.friction.coulomb", "time.scheme = \"bdf2\""]);
+    assert!(is_key_of_a_job("contact.friction.coulomb.coefficient"));
+    assert!(is_key_of_a_job("time.scheme = \"bdf2\""));
+    assert!(!is_key_of_a_job("contact.friction.coulomb.factor"));
+    assert!(!is_key_of_a_job("time.scheme = \"newmark\""));
 }
 
 #[test]

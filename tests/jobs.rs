@@ -1,9 +1,10 @@
-//! Every job under jobs/ and every case under tests/cases reproduces the numbers of its `[check]` table, on one and on two ranks.
+//! Every job under jobs/, every case under tests/cases and every recipe of docs/recipes.md reproduces the numbers of its `[check]` table,
+//! on one and on two ranks.
 //! The cases are problems of manuals and publications at default settings.
 
 use std::path::{Path, PathBuf};
 
-use crate::checked::run;
+use crate::{checked::run, documents::recipes};
 use clarke::{
     job::{Expected, Job},
     postprocessing::study::quantity,
@@ -38,17 +39,17 @@ fn difference(found: Option<f64>, expected: &Expected) -> Option<String> {
     if relative && absolute { None } else { Some(format!("{found:e} instead of {:e}", expected.value)) }
 }
 
-fn faults(ranks: usize) -> Vec<String> {
+fn faults(files: &[PathBuf], ranks: usize) -> Vec<String> {
     let mut faults = Vec::new();
-    for file in jobs() {
+    for file in files {
         let name = format!("{} on {ranks} rank(s)", file.display());
-        let job = Job::load(&file, &[]).expect("a job of the repository").job;
+        let job = Job::load(file, &[]).expect("a job of the repository").job;
         if job.check.is_empty() {
             faults.push(format!("{name}: no [check] table"));
             continue;
         }
         let output = tempfile::tempdir().expect("folder");
-        if let Err(words) = run(&file, ranks, output.path(), &[]) {
+        if let Err(words) = run(file, ranks, output.path(), &[]) {
             faults.push(format!("{name}: {words}"));
             continue;
         }
@@ -62,14 +63,24 @@ fn faults(ranks: usize) -> Vec<String> {
 
 #[test]
 fn every_job_gives_its_numbers_on_one_rank() {
-    let faults = faults(1);
+    let faults = faults(&jobs(), 1);
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 #[test]
 fn every_job_gives_its_numbers_on_two_ranks() {
-    let faults = faults(2);
+    let faults = faults(&jobs(), 2);
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn every_recipe_gives_its_numbers_on_one_and_two_ranks() {
+    let folder = tempfile::tempdir().expect("folder");
+    let recipes = recipes(folder.path());
+    for ranks in [1, 2] {
+        let faults = faults(&recipes, ranks);
+        assert!(faults.is_empty(), "{}", faults.join("\n"));
+    }
 }
 
 #[test]
