@@ -157,19 +157,27 @@ pub fn named(kind: Kind) -> Vec<Named> {
     found
 }
 
+/// Words with fewer letters are searched as whole words.
+const SHORT: usize = 5;
+
 /// The tables, keys and other names that are a word or, if it has three letters, contain it or have it among their other words or in their
 /// meanings, those with the name first; `None` if there are none.
 fn occurrences(kind: Kind, word: &str, others: &[Named]) -> Option<String> {
     let plain = |text: &str| text.to_lowercase().replace(['-', '_'], " ");
     let wanted = plain(word);
+    // A few letters occur inside of many words.
+    let mentions = |text: &str| match wanted.len() < SHORT {
+        true => text.split(|letter: char| !letter.is_alphanumeric()).any(|word| word == wanted),
+        false => text.contains(&wanted),
+    };
     let own = named(kind);
     let mut found: Vec<(usize, &Named)> = Vec::new();
     for one in own.iter().chain(others) {
         let rank = match plain(&one.name) {
             name if name == wanted => 0,
             _ if wanted.len() < 3 => continue,
-            name if name.contains(&wanted) || one.also.split(", ").any(|also| plain(also) == wanted) => 1,
-            _ if plain(&one.meaning).contains(&wanted) => 2,
+            name if mentions(&name) || one.also.split(", ").any(|also| plain(also) == wanted) => 1,
+            _ if mentions(&plain(&one.meaning)) => 2,
             _ => continue,
         };
         found.push((rank, one));

@@ -130,7 +130,7 @@ pub struct Traction {
     /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
     /// x, y, z, integrated by their values at points within the facets.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(extend("also" = "load, distributed load, surface load", "unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
+    #[schemars(extend("also" = "load, distributed load, surface load, ramp, blast, explosion", "unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
     pub value: Vec<Scalar>,
     /// A pressure on the undeformed boundary, against its outward normal, in place of `value`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -34,6 +34,7 @@ use serde::{Deserialize, Serialize};
 /// Adhesive bonds on a contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "glue, bond, cohesive zone, delamination, crack, fracture, weld"))]
 pub struct Adhesion {
     /// Normal stiffness of intact bonds: normal traction per opening. In slow opening the traction is at most `sqrt(stiffness
     /// energy)`.

@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 /// Isotropic damage with a rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "crack, fracture, concrete, rock"))]
 pub struct Damage {
     /// Elastic energy per volume Y above which damage grows. In uniaxial tension, Y is the square of the stress divided by twice
     /// Young's modulus.

@@ -217,11 +217,9 @@ impl Verdict {
         let accepts = "or accept it with [solver] accept = [\"explicit_stability\"]";
         let (found, remedy) = if bound < NOTHING * step {
             (
-                format!(
-                    "no step is stable: lagged_euler takes forces of springs and stresses at the start of the step, and nothing viscous and no \
-                     mass resists a motion that only they hold, such as a rigid motion of a body on springs, or flow relaxes stresses within \
-                     {least_bound} s"
-                ),
+                "no step is stable: lagged_euler takes forces of springs and stresses at the start of the step, and nothing viscous and no mass \
+                 resists a motion that only they hold, such as a rigid motion of a body on springs, or flow relaxes stresses within far less"
+                    .to_owned(),
                 format!(
                     "give supports with `stiffness` also `damping`, the material a `density` or flow a longer `relaxation`, use [time] scheme = \
                      \"implicit_euler\" or \"bdf2\", {accepts}"

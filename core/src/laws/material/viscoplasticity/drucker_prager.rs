@@ -33,7 +33,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 /// tension).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(rename = "DruckerPrager")]
+#[schemars(rename = "DruckerPrager", extend("also" = "soil, sand, clay, rock, concrete"))]
 pub struct DruckerPrager<N = f64> {
     /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
     #[schemars(extend("at_infinity" = WITHOUT_FLOW, "unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]

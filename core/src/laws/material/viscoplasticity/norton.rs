@@ -39,6 +39,7 @@ use serde::{Deserialize, Serialize};
 /// primary creep: under constant stress they grow as `t^(1/(1 + hardening_exponent))`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "creep, ice, bolt, preload"))]
 pub struct Norton {
     /// Equivalent creep strain rate at the reference stress, before any creep strain.
     #[schemars(extend("unit" = "1/s", "exclusiveMinimum" = 0), example = 1e-8)]

@@ -27,7 +27,7 @@ pub(super) struct Overstressed {
 /// projection on the yield set of von Mises and the overstress f is the von Mises norm of s minus the yield stress.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(rename = "Perzyna")]
+#[schemars(rename = "Perzyna", extend("also" = "plasticity, yield, hardening, steel, metal"))]
 pub struct Perzyna<N = f64> {
     /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
     #[schemars(extend("at_infinity" = WITHOUT_FLOW, "unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
