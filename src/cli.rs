@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Exit, Result},
     io::{
-        output::{inspect::inspect, parallel_file::was_abandoned},
+        output::{inspect::inspect, log::WORDS, parallel_file::was_abandoned},
         partitioned,
     },
     job::{self, Job, Loaded},
@@ -14,7 +14,7 @@ use crate::{
         agreement::Agreed,
         session::{Mpi, Session},
     },
-    postprocessing::{outputs, remesh, report, study},
+    postprocessing::{check::differences, outputs, remesh, report, study},
     run::{self, Clock, Start},
 };
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -525,8 +525,33 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
         // All jobs are checked before the first one runs.
         let stages = arguments.jobs.iter().map(load).collect::<Result<Vec<Loaded>>>().and_then(stages);
         let clock = Clock { on_terminal: !arguments.quiet, logs_every_step: arguments.verbose, ..clock };
-        Ok(run::run_stages(session, session.agree(stages)?, &from, clock)?)
+        let stages = session.agree(stages)?;
+        let jobs: Vec<Job> = stages.iter().map(|stage| stage.job.clone()).collect();
+        let exit = run::run_stages(session, stages, &from, clock)?;
+        if exit == Exit::Done && session.is_first() && !arguments.quiet {
+            jobs.iter().for_each(compare);
+        }
+        Ok(exit)
     })
+}
+
+/// Says whether the run of a job has left the numbers that it expects.
+fn compare(job: &Job) {
+    if job.check.is_empty() {
+        return;
+    }
+    let differences = differences(job, job.output_folder());
+    let mut words = match differences.len() {
+        0 => format!("check      all {} numbers of [check] are as expected\n", job.check.len()),
+        count => {
+            format!("check      {count} of {} numbers of [check] are not as expected\n", job.check.len())
+        }
+    };
+    for difference in differences {
+        words += &wrapped(&format!("check      {difference}"), WORDS);
+        words.push('\n');
+    }
+    print(&words);
 }
 
 /// Refuses stages that would overwrite each other's results, or whose options of PETSc would apply to later ones.

@@ -5,10 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::{checked::run, documents::recipes};
-use clarke::{
-    job::{Expected, Job},
-    postprocessing::study::quantity,
-};
+use clarke::{job::Job, postprocessing::check::differences};
 
 /// All jobs of the repository, without studies, and all cases.
 pub fn jobs() -> Vec<PathBuf> {
@@ -30,15 +27,6 @@ pub fn jobs() -> Vec<PathBuf> {
     found
 }
 
-/// The error of a number, if there is one.
-fn difference(found: Option<f64>, expected: &Expected) -> Option<String> {
-    let Some(found) = found else { return Some("the run left no such number".into()) };
-    let off = (found - expected.value).abs();
-    let relative = expected.relative.is_none_or(|bound| off <= bound * expected.value.abs());
-    let absolute = expected.absolute.is_none_or(|bound| off <= bound);
-    if relative && absolute { None } else { Some(format!("{found:e} instead of {:e}", expected.value)) }
-}
-
 fn faults(files: &[PathBuf], ranks: usize) -> Vec<String> {
     let mut faults = Vec::new();
     for file in files {
@@ -53,10 +41,7 @@ fn faults(files: &[PathBuf], ranks: usize) -> Vec<String> {
             faults.push(format!("{name}: {words}"));
             continue;
         }
-        for (result, expected) in &job.check {
-            let fault = difference(quantity(output.path(), result), expected);
-            faults.extend(fault.map(|words| format!("{name}: {result}: {words}")));
-        }
+        faults.extend(differences(&job, output.path()).into_iter().map(|words| format!("{name}: {words}")));
     }
     faults
 }

@@ -7,7 +7,7 @@ const DIGITS: usize = 6;
 
 /// A number with at most six significant digits, whatever its unit: `0.3855`, `22.4`, `2.7e-7`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Digits(pub f64);
+pub struct Digits(pub f64);
 
 impl Display for Digits {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {

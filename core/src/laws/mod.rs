@@ -1,6 +1,6 @@
 //! Constitutive laws at a point and time schemes, with their keys in the job file: no mesh, no MPI.
 
-pub(crate) mod digits;
+pub mod digits;
 pub mod lines;
 pub mod nearest;
 pub mod quadrature;

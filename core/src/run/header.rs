@@ -12,6 +12,7 @@ use crate::{
     job::{Contact, Job, Loaded, Method, Sliding},
     laws::digits::Digits,
     parallel::session::Session,
+    solver::certificate::Statement,
 };
 
 /// Versions, title, mesh, partition, effects, solver, certificates and output folder, one line each; with all details, or those that a
@@ -71,8 +72,10 @@ pub(super) fn lines<const D: usize, const S: usize>(
     ));
     let (preconditioner, reason) = scheme.solver.preconditioner();
     lines.push(format!("solver     {}: {reason}", preconditioner.name()));
-    let certified = if has_details { &verdict.words } else { &verdict.brief };
-    lines.extend(certified.iter().map(|words| format!("certified  {words}")));
+    match has_details {
+        true => lines.extend(verdict.words.iter().map(|words| format!("certified  {words}"))),
+        false => lines.extend(verdict.brief.iter().map(Statement::line)),
+    }
     lines.push(format!("output     {}", job.output_folder().display()));
     Ok(lines)
 }

@@ -18,6 +18,10 @@ use std::cell::LazyCell;
 const LEAST_SEEN: f64 = 0.5;
 /// Share of the largest impulse by which that over the steps may differ after the load has ended; and of the largest way of a support.
 const WRONG_IMPULSE: f64 = 0.1;
+/// Share of all its change by which the place of an obstacle or a friction coefficient may be off a straight line within a step, and the share of
+/// a step behind its start at which it counts as that at the start.
+const BENT: f64 = 0.05;
+const BESIDE: f64 = 1e-6;
 /// Runs of more fixed steps are not examined.
 const MOST_STEPS: u64 = 20_000;
 /// Steps between the kinks of a load that resolve it.
@@ -30,14 +34,17 @@ pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
     let has_mass = job.materials().any(|(_, material)| material.density.is_some());
     let mut found = Vec::new();
     for load in time_dependent(job) {
-        if load.value.depends_on_position() || load.kind == Kind::Followed {
+        if load.value.depends_on_position() {
             continue;
         }
         let breakpoints = load.value.breakpoints();
         let kinks = breakpoints.within(landings.end);
         let words = if job.time.adaptive.is_some() {
-            // Steps end at every jump.
-            passed_over(&load.value, &kinks, shortest_step(job)).filter(|_| breakpoints.switches.is_empty())
+            // Steps end at every jump, and follow obstacles within their tolerance.
+            let is_resolved = !breakpoints.switches.is_empty() || load.kind == Kind::Followed;
+            passed_over(&load.value, &kinks, shortest_step(job)).filter(|_| !is_resolved)
+        } else if load.kind == Kind::Followed {
+            bent(&load.value, &steps)
         } else {
             let sampled = Sampled::by(&load.value, job.time.scheme.formula(), &steps, &kinks);
             sampled.missed(&kinks).or_else(|| sampled.wrong_integral(&load, &kinks).filter(|_| has_mass))
@@ -162,6 +169,36 @@ impl Sampled {
     }
 }
 
+/// Words where a value between the ends of a step is far from a linear function of time: a friction coefficient, or the place of an obstacle,
+/// of whose motion to and fro, along its surface in particular, steps see little or another one.
+fn bent(value: &Scalar, steps: &[Step]) -> Option<String> {
+    let at = |time: f64| value.evaluate(time, &[]);
+    let (mut ends, mut most, mut longest) = ([at(0.0); 2], [0.0; 2], 0.0);
+    for step in steps {
+        // Beside a jump at the start of the step, the last digits of times matter.
+        let [from, to] = [at(step.time - (1.0 - BESIDE) * step.length), at(step.time)];
+        for [share, _] in unit_rule() {
+            let found = at(step.time - (1.0 - share) * step.length);
+            let off = (found - from - share * (to - from)).abs();
+            if off > most[0] {
+                most = [off, step.time];
+            }
+            ends = [ends[0].min(found).min(to), larger(ends[1], larger(found, to))];
+        }
+        longest = larger(longest, step.length);
+    }
+    let [off, time] = most;
+    let share = off / (ends[1] - ends[0]);
+    (share > BENT).then(|| {
+        format!(
+            "within the step to t = {time:.6e} s it is off the straight line between its values at the ends of the step by {:.0} % of all its change: choose a \
+             time.step of at most {:.1e} s, or [time.adaptive]",
+            100.0 * share,
+            longest * (0.1 * BENT / share).sqrt()
+        )
+    })
+}
+
 /// The length in s of steps that resolve a value with these kinks, given the longest step.
 fn resolving(kinks: &[f64], longest: f64) -> f64 {
     let gaps = kinks.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0);
@@ -241,6 +278,32 @@ mod tests {
         for value in resolved {
             assert!(warned(&fixed("implicit_euler"), &value, "").is_empty(), "{value}");
             assert!(warned(ADAPTIVE, &value, "").is_empty(), "{value}");
+        }
+    }
+
+    #[test]
+    fn obstacles_and_friction_that_steps_do_not_resolve_are_warned_of() {
+        let on_a_belt = |way: &str, coefficient: &str, step: f64| {
+            let contact = format!(
+                "[[contact]]\non = [\"bottom\"]\nnormal.unilateral = {{}}\nfriction.expression.coefficient = \"{coefficient}\"\n\
+                 obstacle.plane = {{ point = [\"{way}\", 0], normal = [0, 1] }}\n"
+            );
+            warned_of(&contact, &fixed("implicit_euler").replace("0.1", &step.to_string()), "density = 1.0")
+        };
+        for step in [0.1, 0.04, 0.02] {
+            let found = on_a_belt("0.01*sin(20*pi*t)", "0.3", step);
+            assert!(
+                matches!(&found[..], [one] if one.starts_with("contact.0.obstacle: within the step")),
+                "{step}: {found:?}"
+            );
+            let found = on_a_belt("t", "0.3 + 0.1*sin(20*pi*t)", step);
+            assert!(
+                matches!(&found[..], [one] if one.contains("friction") && one.contains("time.step of at most")),
+                "{step}: {found:?}"
+            );
+        }
+        for resolved in ["0.01*sin(2*pi*t)", "0.1*t", "t^2", "step(t - 0.55)", "max(0, t - 0.537)", "0*t"] {
+            assert_eq!(on_a_belt(resolved, "0.3", 0.1), [""; 0], "{resolved}");
         }
     }
 

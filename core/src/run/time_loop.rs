@@ -297,7 +297,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let mut matrix = scheme.matrix(self.session, body, range.steps[1])?;
         let renewed = Certificates::of(self.session, body, state, &mut matrix, range)?;
         let words = renewed.verdict(range.steps[1], None, &self.job.solver.accept);
-        words.brief.iter().for_each(|words| self.log.line(format!("certified  {words}")));
+        words.brief.iter().for_each(|statement| self.log.line(statement.line()));
         let was_unique = self.certificates.steps_are_unique();
         let is_stable = |bound: Option<f64>| bound.is_none_or(|bound| range.steps[1] < bound);
         let was_stable = is_stable(self.certificates.explicit_step_bound);

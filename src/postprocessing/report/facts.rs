@@ -132,7 +132,7 @@ pub(super) fn certificates(found: &RunFiles) -> [String; 2] {
     let longest = steps.and_then(|steps| steps.into_iter().reduce(f64::max));
     if let Some(step) = longest.or_else(|| found.job.as_ref().map(|job| job.time.step)) {
         let verdict = known.verdict(step, None, &[Accept::Uniqueness, Accept::ExplicitStability]);
-        brief.extend(verdict.brief.iter().map(|words| paragraph(&format!("{}.", capital(words)))));
+        brief.extend(verdict.brief.iter().map(|one| paragraph(&format!("{}.", capital(&one.words)))));
         let _ = writeln!(out, "<h3>Verdict for steps of {} s</h3>\n<ul>", number(step));
         for words in &verdict.words {
             let _ = writeln!(out, "<li>{}</li>", escape(words));

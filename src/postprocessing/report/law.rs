@@ -121,7 +121,8 @@ impl Law {
             [Some(left), None] => left + share,
             [None, right] => right.unwrap_or_default() - share,
         };
-        [0.5, 0.75].map(|share| self.law.slope(at(share), NodeContext::AT_THE_GAP))
+        // One beside its beginning: a curve may be straight far from it.
+        [1e-6, 0.75].map(|share| self.law.slope(at(share), NodeContext::AT_THE_GAP))
     }
 
     /// The branch of each of these nodes, given by abscissa and pressure, where places have coordinates in m up to this one: gaps below its

@@ -97,8 +97,8 @@ pub struct Job {
     /// When the complete state is saved for a restart. Absent: only when the run is stopped or fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checkpoint: Option<Checkpoint>,
-    /// Expected results, by the quoted name of the quantity, such as "final_von_mises" or "probe.tip.velocity_y". The tests of the
-    /// solver compare the example jobs with them; a run only refuses names of which it will have no value.
+    /// Expected results, by the quoted name of the quantity, such as "final_von_mises" or "probe.tip.velocity_y". A run says at its end which of
+    /// its results are not as expected, and refuses names of which it will have no value.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(extend("key_help" = "quote the whole name: \"probe.tip.velocity_y\" = { value = .., relative = .. }"))]
     pub check: BTreeMap<String, Expected>,

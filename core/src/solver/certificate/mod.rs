@@ -51,7 +51,7 @@ mod verdict;
 mod worst_length;
 
 pub use certificates::Certificates;
-pub use verdict::Verdict;
+pub use verdict::{Statement, Verdict};
 
 use crate::{
     error::Result,

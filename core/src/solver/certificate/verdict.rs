@@ -9,11 +9,28 @@ pub struct Verdict {
     /// One line for each certificate: its value, its meaning, and possible changes.
     pub words: Vec<String>,
     /// What of this a run tells: whether steps have one solution and are stable.
-    pub brief: Vec<String>,
+    pub brief: Vec<Statement>,
     /// Warnings.
     pub warnings: Vec<String>,
     /// Reasons for a refusal of the run: message and advice.
     pub refusals: Vec<(String, String)>,
+}
+
+/// What certificates say of the steps of a run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Statement {
+    /// Whether it is a guarantee.
+    pub is_certified: bool,
+    /// A clause.
+    pub words: String,
+}
+
+impl Statement {
+    /// As a line of the log.
+    pub fn line(&self) -> String {
+        let title = if self.is_certified { "certified" } else { "uncertain" };
+        format!("{title}  {}", self.words)
+    }
 }
 
 /// The share of the coefficient of friction that it may lose in a step of `lagged_euler`: half of the least at which errors were measured in
@@ -120,7 +137,7 @@ impl Certificates {
     }
 
     /// In one line, whether steps of these lengths have one solution, where theta of a step is below 1.
-    fn unique_steps(&self, steps: &str) -> String {
+    fn unique_steps(&self, steps: &str) -> Statement {
         let bound = self.slip_pressure_bound.filter(|bound| *bound > 0.0);
         let covered = bound.map_or_else(String::new, |bound| {
             format!(" for given contact pressures up to {} Pa", Digits(bound))
@@ -128,7 +145,8 @@ impl Certificates {
         let reasons = self.not_covered.iter().filter_map(|words| words.split([':', ',', ';']).next());
         let reasons: Vec<&str> =
             reasons.filter(|words| bound.is_none() || !words.contains("friction")).collect();
-        match reasons.as_slice() {
+        let is_certified = reasons.is_empty() || bound.is_some();
+        let words = match reasons.as_slice() {
             [] => format!("each step{steps} has one solution{covered}"),
             _ if bound.is_none() => {
                 format!("several solutions of a step are not excluded: {}; {SEARCH}", reasons.join("; "))
@@ -137,7 +155,8 @@ impl Certificates {
                 "each step{steps} has one solution{covered}, which does not cover: {}; {SEARCH}",
                 reasons.join("; ")
             ),
-        }
+        };
+        Statement { is_certified, words }
     }
 
     /// The verdict on the growth of contact pressures with the velocity.
@@ -174,7 +193,7 @@ impl Verdict {
             if theta < 1.0 { 1.0 - Certificates::MARGIN } else { 1.0 }
         );
         self.words.push(found.clone());
-        self.brief.push(found.clone());
+        self.brief.push(Statement { is_certified: false, words: found.clone() });
         let largest = unique_step.map_or_else(
             || {
                 let longer = if shortest < longest {
@@ -211,7 +230,7 @@ impl Verdict {
             self.words.push(format!(
                 "{stable} (elastic and viscoplastic stress, adhesion and contact memory are explicit){power}"
             ));
-            self.brief.push(stable);
+            self.brief.push(Statement { is_certified: true, words: stable });
             return;
         }
         let accepts = "or accept it with [solver] accept = [\"explicit_stability\"]";
@@ -235,7 +254,7 @@ impl Verdict {
             )
         };
         self.words.push(found.clone());
-        self.brief.push(found.clone());
+        self.brief.push(Statement { is_certified: false, words: found.clone() });
         self.judge(found, remedy, accepted);
     }
 
@@ -283,18 +302,24 @@ mod tests {
 
     #[test]
     fn a_run_tells_whether_steps_have_one_solution_and_why_not() {
-        let brief = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).brief;
-        let stable = "steps are stable up to 0.12 s";
-        assert_eq!(brief(paper()), ["each step has one solution", stable]);
+        let brief = |known: Certificates| {
+            let brief = known.verdict(1.0 / 64.0, None, &[]).brief;
+            brief.iter().map(Statement::line).collect::<Vec<_>>()
+        };
+        let stable = "certified  steps are stable up to 0.12 s";
+        assert_eq!(brief(paper()), ["certified  each step has one solution", stable]);
         let weakens = || vec!["the friction traction decreases: theta does not cover this".into()];
         let known = Certificates { not_covered: weakens(), slip_pressure_bound: Some(1.8e5), ..paper() };
-        assert_eq!(brief(known)[0], "each step has one solution for given contact pressures up to 180000 Pa");
+        assert_eq!(
+            brief(known)[0],
+            "certified  each step has one solution for given contact pressures up to 180000 Pa"
+        );
         let mut both = weakens();
         both.push("damage may soften the body: theta does not take it into account".into());
         let known = Certificates { not_covered: both, slip_pressure_bound: Some(0.0), ..paper() };
         assert_eq!(
             brief(known)[0],
-            "several solutions of a step are not excluded: the friction traction decreases; damage may soften the body; [solver] guesses = 10 searches \
+            "uncertain  several solutions of a step are not excluded: the friction traction decreases; damage may soften the body; [solver] guesses = 10 searches \
              each step for others"
         );
         let known = Certificates { theta_step: Some(1.5), ..paper() };
