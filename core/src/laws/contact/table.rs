@@ -124,8 +124,8 @@ pub struct Contact {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("also" = "restitution, rebound"))]
     pub redistribute_mass: bool,
-    /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;
-    /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
+    /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph`, `unilateral` and
+    /// `expression` of the penetration d; other normal laws have no distance to an obstacle. Absent: `gap` applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Gap>,
     /// A force that moves the obstacle (indentation), or a moment that turns it (rolling). Its displacement and velocity, angle and
