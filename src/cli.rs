@@ -541,12 +541,8 @@ fn compare(job: &Job) {
         return;
     }
     let differences = differences(job, job.output_folder());
-    let mut words = match differences.len() {
-        0 => format!("check      all {} numbers of [check] are as expected\n", job.check.len()),
-        count => {
-            format!("check      {count} of {} numbers of [check] are not as expected\n", job.check.len())
-        }
-    };
+    let all = job.check.len();
+    let mut words = format!("check      {} of {all} numbers are as expected\n", all - differences.len());
     for difference in differences {
         words += &wrapped(&format!("check      {difference}"), WORDS);
         words.push('\n');

@@ -58,4 +58,19 @@ mod tests {
         );
         assert!(difference(Some(-198.5), &expected(Some(0.01), Some(1.0))).is_some(), "both have to hold");
     }
+
+    #[test]
+    fn a_quantity_that_the_run_did_not_leave_is_missing() {
+        let folder = tempfile::tempdir().expect("folder");
+        std::fs::write(folder.path().join("summary.json"), r#"{"status": "completed"}"#).expect("written");
+        std::fs::write(folder.path().join("probes.csv"), "step,probe,velocity_y\n1,a,1\n").expect("written");
+        let expected = Expected { value: 0.0, relative: None, absolute: Some(1e9) };
+        let found = |name: &str| difference(quantity(folder.path(), name), &expected);
+        for name in
+            ["max_von_misses", "status", "history.work", "probe.b.velocity_y", "probe.a.velocity", "probe.a"]
+        {
+            assert!(found(name).is_some(), "{name}");
+        }
+        assert_eq!(found("probe.a.velocity_y"), None);
+    }
 }

@@ -507,3 +507,31 @@ fn runs_on_one_rank_side_by_side_share_no_file_of_open_mpi() {
         assert!(outcome.status.success() && printed.is_empty(), "{printed}");
     }
 }
+
+#[test]
+fn a_run_says_which_of_its_results_are_not_as_expected() {
+    let case = |value: &str| {
+        Case::of("velocity_weakening_block")
+            .set("time.end", "0.02")
+            .set("check", &format!("{{ max_energy_imbalance = {{ value = {value}, absolute = 1e-3 }} }}"))
+    };
+    for ranks in [1, 2] {
+        let wrong = case("2.5").run_with(ranks, &[]).expect(0);
+        let wrong = wrong.says("check      0 of 1 numbers are as expected");
+        assert!(
+            wrong.says("instead of 2.5, off by 2.5, accepted are 1e-3").stdout.matches("off by").count() == 1
+        );
+        case("0.0").run_with(ranks, &[]).expect(0).says("check      1 of 1 numbers are as expected");
+    }
+    let quiet = case("2.5").run_with(1, &["--quiet"]).expect(0);
+    assert!(!quiet.stdout.contains("check"), "{}", quiet.stdout);
+}
+
+#[test]
+fn the_name_of_an_earlier_version_gives_the_same_run() {
+    let new = Case::of("velocity_weakening_block").set("time.end", "0.1");
+    let law = "{ slip_weakening = { static = 0.5, dynamic = 0.3, decay_velocity = 0.05 } }";
+    let old = Case::of("velocity_weakening_block").set("time.end", "0.1").set("contact.0.friction", law);
+    let tables = [new, old].map(|case| case.run(1).text("history.csv"));
+    assert_eq!(tables[0], tables[1]);
+}
