@@ -683,10 +683,15 @@ mod tests {
             ("cylinder", "contact.obstacle.shape: "),
             ("remesh", "output.error_indicator: "),
             ("Slurm", "checkpoint"),
+            ("earthquake", "support.velocity: "),
+            ("crack", "contact.adhesion: "),
+            ("soil", "material.viscoplasticity.drucker_prager: "),
+            ("slip_weakening", "contact.friction.velocity_weakening: "),
         ] {
             let found = described(Some(word)).unwrap_or_else(|error| panic!("{word}: {error}"));
             assert!(found.lines().any(|line| line.trim().starts_with(key)), "{word}: {found}");
         }
+        assert!(described(Some("tie")).is_err(), "a part of properties");
     }
 
     #[test]

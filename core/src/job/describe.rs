@@ -157,7 +157,7 @@ pub fn named(kind: Kind) -> Vec<Named> {
     found
 }
 
-/// Words with fewer letters are searched as whole words.
+/// Words with fewer letters are searched at the beginning of words.
 const SHORT: usize = 5;
 
 /// The tables, keys and other names that are a word or, if it has three letters, contain it or have it among their other words or in their
@@ -165,9 +165,9 @@ const SHORT: usize = 5;
 fn occurrences(kind: Kind, word: &str, others: &[Named]) -> Option<String> {
     let plain = |text: &str| text.to_lowercase().replace(['-', '_'], " ");
     let wanted = plain(word);
-    // A few letters occur inside of many words.
+    // A few letters occur within many words.
     let mentions = |text: &str| match wanted.len() < SHORT {
-        true => text.split(|letter: char| !letter.is_alphanumeric()).any(|word| word == wanted),
+        true => text.split(|letter: char| !letter.is_alphanumeric()).any(|word| word.starts_with(&wanted)),
         false => text.contains(&wanted),
     };
     let own = named(kind);
