@@ -63,3 +63,20 @@ fn an_error_of_states_that_do_not_approach_each_other_is_uncertain() {
     let log = results.text("run.log");
     assert!(log.contains("uncertain: the states of"), "{log}");
 }
+
+#[test]
+fn errors_by_the_mesh_are_uncertain_in_thin_bodies_and_in_those_that_vibrate() {
+    let doubt = |case: Case, ranks: usize| {
+        let results = case.set("time.scheme", "'implicit_euler'").run(ranks);
+        results.summary()["doubt_of_mesh"].as_str().map(str::to_owned)
+    };
+    let of_cells = |cells: &str| relaxing("implicit_euler", 0.5).set("mesh.rectangle.cells", cells);
+    for ranks in [1, 2] {
+        let thin = doubt(of_cells("[4, 4]"), ranks).unwrap_or_default();
+        assert!(thin.contains("lie at the surface"), "{thin}");
+        assert_eq!(doubt(of_cells("[6, 6]"), ranks), None);
+    }
+    let pulse = Case::of("absorbed_pulse").set("output.error_estimate", "true").without("check");
+    let vibrates = doubt(pulse.set("time.end", "0.1"), 1).unwrap_or_default();
+    assert!(vibrates.contains("vibrates"), "{vibrates}");
+}
