@@ -691,7 +691,8 @@ mod tests {
             let found = described(Some(word)).unwrap_or_else(|error| panic!("{word}: {error}"));
             assert!(found.lines().any(|line| line.trim().starts_with(key)), "{word}: {found}");
         }
-        assert!(described(Some("tie")).is_err(), "a part of properties");
+        let tie = described(Some("tie")).unwrap_or_default();
+        assert!(!tie.contains("properties"), "{tie}");
     }
 
     #[test]
