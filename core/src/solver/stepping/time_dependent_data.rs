@@ -47,6 +47,16 @@ struct TimeDependentExpression<const D: usize> {
     moves_by: Option<fn(Step) -> Blend>,
 }
 
+/// What a value is to the body.
+#[derive(Clone, Copy)]
+enum Role {
+    Load,
+    /// The place of an obstacle.
+    Place,
+    /// The velocity with which this scheme moves a body with mass.
+    Velocity(fn(Step) -> Blend),
+}
+
 impl<const D: usize> TimeDependentData<D> {
     /// The expressions of a body, in a run with this scheme to the time `end`. Collective.
     pub(super) fn of<const S: usize>(
@@ -57,37 +67,30 @@ impl<const D: usize> TimeDependentData<D> {
     ) -> Self {
         let lattice = sample_points(session, &body.mesh.nodes);
         let mut expressions = Vec::new();
-        let values = body.support_motion.iter().flat_map(|motion| motion.values());
-        for Prescribed { value, is_displacement } in values.filter(|found| found.value.depends_on_time()) {
-            let moves_by = (!is_displacement && body.has_form(Form::Mass)).then_some(formula);
-            expressions.push(TimeDependentExpression::new(
-                ("a support", value, true),
-                &lattice,
-                moves_by,
-                end,
-            ));
-        }
-        let mut add = |name, values: &[Scalar], is_load: bool| {
+        let mut add = |name, values: &[Scalar], role: Role| {
             for value in values.iter().filter(|value| value.depends_on_time()) {
-                expressions.push(TimeDependentExpression::new((name, value, is_load), &lattice, None, end));
+                expressions.push(TimeDependentExpression::new(name, value, &lattice, role, end));
             }
         };
         for (name, value) in body.load.expressions() {
-            add(name, std::slice::from_ref(value), true);
+            add(name, std::slice::from_ref(value), Role::Load);
+        }
+        for Prescribed { value, is_displacement } in
+            body.support_motion.iter().flat_map(|motion| motion.values())
+        {
+            let moves = !is_displacement && body.has_form(Form::Mass);
+            let role = if moves { Role::Velocity(formula) } else { Role::Load };
+            add("a support", std::slice::from_ref(value), role);
         }
         for value in body.heat.iter().flat_map(|heat| heat.expressions()) {
-            add("heat at a boundary", std::slice::from_ref(value), true);
+            add("heat at a boundary", std::slice::from_ref(value), Role::Load);
         }
         for contact in &body.contacts {
             let motions = contact.obstacle.motions.iter().flatten();
             let forces = motions.map(|motion| &motion.force);
-            forces.for_each(|force| add("the force on an obstacle", std::slice::from_ref(force), true));
-            contact
-                .obstacle
-                .gap
-                .expressions()
-                .into_iter()
-                .for_each(|values| add("an obstacle", values, false));
+            forces.for_each(|force| add("the force on an obstacle", std::slice::from_ref(force), Role::Load));
+            let of_gap = contact.obstacle.gap.expressions();
+            of_gap.into_iter().for_each(|values| add("an obstacle", values, Role::Place));
         }
         Self { expressions }
     }
@@ -144,16 +147,15 @@ impl<const D: usize> TimeDependentData<D> {
 }
 
 impl<const D: usize> TimeDependentExpression<D> {
-    /// A value with its meaning and whether it is a load, at the points on which it depends.
-    fn new(
-        (name, value, is_load): (&'static str, &Scalar, bool),
-        lattice: &[Vector<D>],
-        moves_by: Option<fn(Step) -> Blend>,
-        end: f64,
-    ) -> Self {
+    /// A value with its meaning, at those points of a lattice on which it depends.
+    fn new(name: &'static str, value: &Scalar, lattice: &[Vector<D>], role: Role, end: f64) -> Self {
         let points = if value.depends_on_position() { lattice } else { &lattice[..1] };
+        let moves_by = match role {
+            Role::Velocity(formula) => Some(formula),
+            Role::Load | Role::Place => None,
+        };
         let mut new = Self { name, value: value.clone(), points: points.to_vec(), scale: 0.0, moves_by };
-        new.scale = new.measure_scale(end, is_load);
+        new.scale = new.measure_scale(end, !matches!(role, Role::Place));
         new
     }
 
@@ -266,7 +268,7 @@ mod tests {
 
     fn expression(text: &str) -> TimeDependentExpression<2> {
         let value = Scalar::Expression(Expression::parse(text).expect(text));
-        TimeDependentExpression::new(("a load", &value, true), &[[0.5, 0.0]], None, 2.0)
+        TimeDependentExpression::new("a load", &value, &[[0.5, 0.0]], Role::Load, 2.0)
     }
 
     #[test]
