@@ -67,8 +67,8 @@ fn an_error_of_states_that_do_not_approach_each_other_is_uncertain() {
 #[test]
 fn errors_by_the_mesh_are_uncertain_in_thin_bodies_and_in_those_that_vibrate() {
     let doubt = |case: Case, ranks: usize| {
-        let results = case.set("time.scheme", "'implicit_euler'").run(ranks);
-        results.summary()["doubt_of_mesh"].as_str().map(str::to_owned)
+        let case = case.set("time.scheme", "'implicit_euler'").run_and_keep(ranks);
+        case.results().summary()["doubt_of_mesh"].as_str().map(str::to_owned)
     };
     let of_cells = |cells: &str| relaxing("implicit_euler", 0.5).set("mesh.rectangle.cells", cells);
     for ranks in [1, 2] {

@@ -867,7 +867,7 @@ fn a_much_stiffer_body_is_a_rigid_obstacle() {
             .set("traction", "[{ on = ['upper.top'], value = [0, '-1e4*(1 + x)'] }]")
             .set(
                 "contact",
-                &format!("[{{ on = ['upper.bottom'], {against} normal.unilateral.gap = '0.01*x^2' }}]"),
+                &format!("[{{ on = ['upper.bottom'], {against} normal.unilateral.gap = '0.1*x^2' }}]"),
             );
         let stiff =
             "[{ name = 'lower', material.elasticity = { youngs_modulus = 1e14, poisson_ratio = 0.3 } }]";
