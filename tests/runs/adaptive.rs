@@ -181,6 +181,25 @@ fn bonds_break_as_accurately_in_a_body_under_a_large_stress_along_them() {
     assert!((with / 2.375 - 1.0).abs() < 0.02, "{with} J under tension, {without} J without");
 }
 
+#[test]
+fn a_friction_coefficient_that_rises_for_a_while_is_not_passed_over() {
+    // A block of 40 kg/m2 under 1000 Pa is braked for 1 s from 4 m/s.
+    for (width, scheme) in [(0.02, "bdf2"), (0.005, "bdf2"), (0.02, "implicit_euler")] {
+        let case = Case::written_as(&format!(
+            "[mesh.rectangle]\nsize = [0.1, 0.02]\ncells = [4, 2]\n[material]\nhypothesis = \"plane_strain\"\ndensity = 2000.0\n\
+             elasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0.3 }}\nviscosity = {{ volumetric = 1e4, shear = 1e4 }}\n\
+             [initial]\nvelocity = [\"4\", \"0\"]\n[[traction]]\non = [\"top\"]\npressure = 1000.0\n\
+             [[contact]]\non = [\"bottom\"]\nnormal.unilateral = {{}}\n\
+             friction.expression.coefficient = \"0.1 + 0.5*exp(-((t - 0.5)/{width})^2)\"\n\
+             [time]\nscheme = \"{scheme}\"\nend = 1.0\nstep = 1e-3\n[time.adaptive]\nsmallest_step = 1e-6\nlargest_step = 0.2\n\
+             [[output.probe]]\nname = \"middle\"\npoint = [0.05, 0.01]\n",
+        ));
+        let exact = 4.0 - 1000.0 / 40.0 * (0.1 + 0.5 * width * std::f64::consts::PI.sqrt());
+        let found = case.run(1).table("probes.csv").last("velocity_x");
+        assert!((found / exact - 1.0).abs() < 0.01, "{scheme}, {width} s: {found} m/s for {exact} m/s");
+    }
+}
+
 /// A block without mass that a support takes along after a while, until this time.
 fn carried(until: f64) -> Case {
     Case::written_as(&format!(

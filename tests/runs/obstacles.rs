@@ -507,6 +507,37 @@ fn a_contact_that_never_touched_is_warned_of_after_the_last_step() {
 }
 
 #[test]
+fn facets_beside_a_contact_that_sink_into_its_obstacle_are_warned_of() {
+    let words = "contact.0: at the end facets beside the boundary bottom lie up to";
+    let falls = |contact: &str, modulus: f64| {
+        Case::written_as(&format!(
+            "[mesh.rectangle]\nsize = [1.0, 0.5]\ncells = [8, 4]\n[gravity]\nacceleration = [0, -10]\n[material]\nhypothesis = \"plane_strain\"\n\
+             density = 1000.0\nelasticity = {{ youngs_modulus = {modulus}, poisson_ratio = 0.3 }}\nviscosity = {{ volumetric = 1e4, shear = 1e4 }}\n\
+             [[support]]\non = [\"left\"]\nfix = [\"x\"]\n[time]\nscheme = \"implicit_euler\"\nend = 1.0\nstep = 0.05\n[[contact]]\non = [\"bottom\"]\n{contact}\n"
+        ))
+    };
+    let rigid = "normal.unilateral = {}\nobstacle.plane = { point = [0, 0], normal = [0, 1] }";
+    let partly = format!("{rigid}\nwhere = 'x < 0.55'");
+    // The plane comes from below, by its motion or by a force.
+    let rises = "normal.unilateral = {}\nwhere = 'x < 0.55'\nobstacle.plane = { point = [0, '0.1*t - 0.05'], normal = [0, 1] }";
+    let soft =
+        "normal.compliance = { stiffness = 1e5 }\nobstacle.plane = { point = [0, 0], normal = [0, 1] }";
+    for (contact, modulus, sinks) in [
+        (rigid, 1e5, false),
+        (&partly[..], 1e5, true),
+        (&partly[..], 1e8, false),
+        (rises, 1e5, true),
+        (soft, 1e5, false),
+    ] {
+        for ranks in [1, 3] {
+            let case = falls(contact, modulus);
+            let outcome = case.run_with(ranks, &["--force"]).expect(0);
+            assert_eq!(warns_of(&outcome, &case, words), sinks, "{contact}: {}", outcome.stdout);
+        }
+    }
+}
+
+#[test]
 fn a_contact_that_touched_before_a_restart_has_touched() {
     let obstacle = "{plane = {point = [0, '0.52 - 0.06*sin(2*pi*t)'], normal = [0, -1]}}";
     let case = under(obstacle).set("checkpoint", "{every = 10}").set("time.end", "0.5");

@@ -1304,6 +1304,27 @@ fn the_side_with_the_finer_mesh_carries_the_law_unless_the_job_states_it() {
 }
 
 #[test]
+fn a_body_with_a_chamfer_that_only_touches_another_one_is_not_pressed_on_it() {
+    // A facet of the lower body lies under the end of the flat face and the chamfer beside it.
+    let mesh = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/meshes/chamfer.inp");
+    let case = Case::written_as(&format!(
+        "[mesh]\nfile = {mesh:?}\n[material]\nhypothesis = \"plane_strain\"\n\
+         elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.0 }}\n\
+         [[support]]\non = [\"base\", \"load\"]\nfix = \"all\"\n\
+         [[contact]]\non = [\"top\"]\nagainst = [\"face\"]\nnormal.unilateral = {{}}\n\
+         [time]\nscheme = \"implicit_euler\"\nend = 1.0\nstep = 1.0\n"
+    ));
+    for ranks in [1, 2] {
+        let outcome = case.run_with(ranks, &["--force"]).expect(0);
+        let said = launch::unwrapped(&outcome.stdout);
+        assert!(said.contains("because its corners or edges lie over top"), "{said}");
+        assert!(!said.contains("inside face"), "{said}");
+        let force = case.results().table("resultants.csv").only("source", "contact top").last("force_y");
+        assert!(force.abs() < 1e-3, "{ranks} ranks: {force} N/m");
+    }
+}
+
+#[test]
 fn the_side_of_a_much_softer_body_carries_the_law() {
     // A heavy block of steel settles on rubber. Were its nodes to carry the law, steps would take some hundred iterations.
     let of = |table: &str, cells: &str| {

@@ -201,3 +201,29 @@ fn checks_name_the_loaded_part_and_its_area() {
     let area = top["area"].as_f64().expect("a number");
     assert!(top["facets"].as_u64().is_some_and(|count| count > 0) && (0.3..0.5).contains(&area), "{top}");
 }
+
+#[test]
+fn a_traction_that_supports_alone_bear_is_warned_of() {
+    let words = "supports hold the boundary right in every direction in which it acts";
+    for (fix, traction, is_borne) in [
+        ("'all'", "value = [10, '5*sin(6*t)']", true),
+        ("['x']", "pressure = 10", true),
+        ("['x']", "value = [10, '1e-3*t']", false),
+        ("['y']", "pressure = 10", false),
+        ("['x'], where = 'y < 0.4'", "pressure = 10", false),
+        ("['x']", "value = [0, 0]", false),
+    ] {
+        for ranks in [1, 3] {
+            let case = Case::square(4)
+                .set("support", &format!("[{{on = ['left'], fix = 'all'}}, {{on = ['right'], fix = {fix}}}]"))
+                .set(
+                    "traction",
+                    &format!("[{{on = ['top'], value = [0, -1]}}, {{on = ['right'], {traction}}}]"),
+                );
+            let outcome = launch::run(ranks, &["check", case.written().to_str().expect("a path")]).expect(0);
+            let said = launch::unwrapped(&outcome.stdout);
+            assert_eq!(said.contains(&format!("traction.1: {words}")), is_borne, "{fix}, {traction}: {said}");
+            assert!(!said.contains("traction.0: supports"), "{said}");
+        }
+    }
+}

@@ -1,5 +1,6 @@
 //! Constitutive laws at a point and time schemes, with their keys in the job file: no mesh, no MPI.
 
+pub mod chord;
 pub mod digits;
 pub mod lines;
 pub mod nearest;

@@ -28,9 +28,13 @@ const LAST: [[f64; 2]; 5] = {
     last
 };
 
-/// The points of the quadrature on [0, 1] and their weights, whose sum is 1.
-pub fn unit_rule() -> impl Iterator<Item = [f64; 2]> {
-    let side = |sign: f64| RULE.into_iter().map(move |[at, weight]| [0.5 + 0.5 * sign * at, 0.5 * weight]);
+/// The points of the quadrature from `a` to `b` and their weights, whose sum is `b - a`.
+pub fn rule([a, b]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+    let length = b - a;
+    let side = move |sign: f64| {
+        RULE.into_iter()
+            .map(move |[at, weight]| [a + (0.5 + 0.5 * sign * at) * length, 0.5 * weight * length])
+    };
     side(-1.0).chain(side(1.0))
 }
 

@@ -170,7 +170,7 @@ fn report<const D: usize, const S: usize>(
             true => Dynamics::Impacts { may_conserve: may_conserve(job, body) },
             false => Dynamics::Inertia,
         },
-        header: header::lines(session, loaded, ready, true)?,
+        header: [header::opening(session, loaded, mesh, true)?, header::lines(loaded, ready, true)].concat(),
     })
 }
 

@@ -11,24 +11,23 @@ use crate::{
     },
     job::{Contact, Job, Loaded, Method, Sliding},
     laws::digits::Digits,
+    mesh::Mesh,
     parallel::session::Session,
     solver::certificate::Statement,
 };
 
-/// Versions, title, mesh, partition, effects, solver, certificates and output folder, one line each; with all details, or those that a
-/// run needs. Collective.
-pub(super) fn lines<const D: usize, const S: usize>(
+/// What is known before the problem is set up: versions, title, mesh, partition and faults in the body, one line each; with all details, or
+/// those that a run needs.
+pub(super) fn opening<const D: usize>(
     session: &Session,
     loaded: &Loaded,
-    ready: &Setup<D, S>,
+    mesh: &Mesh<D>,
     has_details: bool,
 ) -> Result<Vec<String>> {
-    let Setup { body, scheme, verdict, .. } = ready;
-    let (job, mesh) = (&loaded.job, &body.mesh);
     let ranks = if session.ranks() == 1 { "1 rank".into() } else { format!("{} ranks", session.ranks()) };
     let mut lines =
         vec![format!("Clarke {}, PETSc {}, {ranks}", super::version(), session.petsc().version()?)];
-    if let Some(title) = job.about.as_ref().and_then(|a| a.title.as_deref()) {
+    if let Some(title) = loaded.job.about.as_ref().and_then(|a| a.title.as_deref()) {
         lines.push(format!("job        {title}"));
     }
     let kind = match (D, mesh.order(), mesh.is_curved) {
@@ -49,7 +48,18 @@ pub(super) fn lines<const D: usize, const S: usize>(
         lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
     }
     lines.extend(loaded.faults.iter().map(|words| format!("fault      {words}")));
-    lines.push(format!("effects    {}", body.effect_names().join(", ")));
+    Ok(lines)
+}
+
+/// Effects, solver, certificates and output folder, one line each; with all details, or those that a run needs.
+pub(super) fn lines<const D: usize, const S: usize>(
+    loaded: &Loaded,
+    ready: &Setup<D, S>,
+    has_details: bool,
+) -> Vec<String> {
+    let Setup { body, scheme, verdict, .. } = ready;
+    let job = &loaded.job;
+    let mut lines = vec![format!("effects    {}", body.effect_names().join(", "))];
     lines.extend(side_words::lines(job, &body.pairs));
     let lengths = match &job.time.adaptive {
         Some(a) => {
@@ -72,12 +82,10 @@ pub(super) fn lines<const D: usize, const S: usize>(
     ));
     let (preconditioner, reason) = scheme.solver.preconditioner();
     lines.push(format!("solver     {}: {reason}", preconditioner.name()));
-    match has_details {
-        true => lines.extend(verdict.words.iter().map(|words| format!("certified  {words}"))),
-        false => lines.extend(verdict.brief.iter().map(Statement::line)),
-    }
+    let statements = if has_details { &verdict.details } else { &verdict.brief };
+    lines.extend(statements.iter().map(Statement::line));
     lines.push(format!("output     {}", job.output_folder().display()));
-    Ok(lines)
+    lines
 }
 
 /// Warnings about the job, its certificates and its initial state.

@@ -2,7 +2,6 @@
 
 use crate::{
     fem::{body::Body, effect::Contact},
-    laws::contact::Gap,
     linear_algebra::tensor::{Vector, add_scaled, larger, norm},
     mesh::{Mesh, shape::centroid},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
@@ -15,26 +14,28 @@ const BESIDE_SURFACE: f64 = 0.15;
 /// The error of a depth, as a share of the least depth that matters.
 const ACCURACY: f64 = 0.25;
 
-/// The displaced nodes of bodies and an obstacle at a time.
+/// The displaced nodes of bodies and the obstacle of a contact at a time.
 pub(super) struct Inside<'a, const D: usize> {
     mesh: &'a Mesh<D>,
-    gap: &'a Gap,
+    contact: &'a Contact<D>,
     time: f64,
+    /// The places of nodes in m, as seen from an obstacle that a force moves.
     places: Vec<Vector<D>>,
     /// The least depth in m that matters.
     least: f64,
 }
 
 impl<'a, const D: usize> Inside<'a, D> {
-    /// The nodes of a mesh at local displacements with ghosts.
+    /// The nodes of a mesh at local displacements with ghosts, after a step to this time.
     pub(super) fn new(
         mesh: &'a Mesh<D>,
-        gap: &'a Gap,
+        contact: &'a Contact<D>,
         (time, least): (f64, f64),
         displacement: &[f64],
     ) -> Self {
         let moved = mesh.nodes.iter().zip(displacement.as_chunks::<D>().0);
-        Self { mesh, gap, time, places: moved.map(|(place, by)| add_scaled(place, 1.0, by)).collect(), least }
+        let seen = moved.map(|(place, by)| contact.obstacle.seen_before(&add_scaled(place, 1.0, by)));
+        Self { mesh, contact, time, places: seen.collect(), least }
     }
 
     /// The largest depth in m of any place of the bodies, negative outside, exact where it is at a node and else up to a part of the least one that matters;
@@ -50,17 +51,34 @@ impl<'a, const D: usize> Inside<'a, D> {
         &self,
         session: &Session,
         body: &Body<D, S>,
-        contact: &Contact<D>,
     ) -> Result<[f64; 2], Agreed> {
-        let own = nodes_of_bodies(session, body, contact)?;
+        let own = nodes_of_bodies(session, body, self.contact)?;
         let [least, most] = self.depths(session, own.iter().copied());
         let is_own = |cell: usize| own.binary_search(&(self.mesh.cell(cell)[0] as usize)).is_ok();
         Ok([least, self.between(session, most, is_own)])
     }
 
+    /// The largest depth of nodes at the surface of these bodies, as far as they were outside of the obstacle at the start of the run.
+    /// Collective.
+    pub(super) fn deepest_of_surface<const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+    ) -> Result<f64, Agreed> {
+        let own = nodes_of_bodies(session, body, self.contact)?;
+        let at_surface: BTreeSet<usize> =
+            self.mesh.facets.iter().flatten().map(|node| *node as usize).collect();
+        let was_outside = |node: usize| {
+            let depth = self.contact.obstacle.gap.depth(0.0, &self.mesh.nodes[node]);
+            depth.is_some_and(|depth| depth <= ACCURACY * self.least)
+        };
+        let met = own.into_iter().filter(|node| at_surface.contains(node) && was_outside(*node));
+        Ok(self.depths(session, met)[1])
+    }
+
     /// The smallest and the largest depth of nodes. Collective.
     fn depths(&self, session: &Session, nodes: impl Iterator<Item = usize>) -> [f64; 2] {
-        let depths = nodes.filter_map(|node| self.gap.depth(self.time, &self.places[node]));
+        let depths = nodes.filter_map(|node| self.contact.obstacle.gap.depth(self.time, &self.places[node]));
         let [least, most] =
             depths.fold([f64::NEG_INFINITY; 2], |[a, b], depth| [larger(a, -depth), larger(b, depth)]);
         let [least, most] = session.largest([least, most]);
@@ -81,8 +99,11 @@ impl<'a, const D: usize> Inside<'a, D> {
                 corners[i] = add_scaled(&corners[i], BESIDE_SURFACE, &add_scaled(&top, -1.0, &corners[i]))
             });
         }
-        let mut search =
-            Search { depth: &|place| self.gap.depth(self.time, place), least: self.least, most: at_nodes };
+        let mut search = Search {
+            depth: &|place| self.contact.obstacle.gap.depth(self.time, place),
+            least: self.least,
+            most: at_nodes,
+        };
         let meant = cells.iter().enumerate().filter(|(cell, _)| is_meant(*cell));
         meant.for_each(|(_, corners)| search.look(corners));
         let [most] = session.largest([search.most]);

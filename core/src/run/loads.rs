@@ -1,12 +1,47 @@
-//! The areas on which tractions act.
+//! The areas on which tractions act, and tractions that act on supports alone.
 
 use crate::{
     fem::{body::Body, space::facet_points},
     job::{Job, Scalar},
     laws::digits::Digits,
+    linear_algebra::tensor::norm,
     parallel::session::Session,
 };
 use serde::Serialize;
+
+/// Times of a run at which tractions are compared with supports.
+const TIMES: u32 = 16;
+/// A free share of forces below this is a rounding error.
+const FREE: f64 = 1e-9;
+
+/// Warnings about tractions along directions that supports hold at all their nodes. Collective, with the same warnings on all ranks.
+pub(super) fn warnings<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+) -> Vec<String> {
+    let mut out = Vec::new();
+    for (number, (traction, table)) in body.load.tractions.iter().zip(&job.traction).enumerate() {
+        let mut mine = [0.0; 2];
+        for at in 0..=TIMES {
+            let time = job.time.end * f64::from(at) / f64::from(TIMES);
+            // A step at which the traction is no number ends the run with the reason.
+            let _ = traction.forces(&body.mesh, time, |node, force| {
+                mine[0] += norm(&force);
+                mine[1] += norm(&body.held.free_part(node as usize, &force));
+            });
+        }
+        let [all, free] = session.sum(mine);
+        if all > 0.0 && free <= FREE * all {
+            out.push(format!(
+                "traction.{number}: supports hold the boundary {} in every direction in which it acts, so that nothing but their forces \
+                 changes: to load the body, take these directions from the supports (`fix`, `on` or `where`)",
+                table.on.join(", ")
+            ));
+        }
+    }
+    out
+}
 
 /// The part of the boundary that a traction loads. Names are those of `solver check --json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]

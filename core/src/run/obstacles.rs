@@ -49,6 +49,8 @@ const TIMES: u32 = 16;
 /// nodes from which on it is meant to be round: at nodes on edges facets do not turn.
 const TURNING: f64 = 1e-3;
 const SHARE_OF_CORNERS: usize = 8;
+/// A node of the surface that is this many times as deep in an obstacle as points of its contact is beside the contact.
+const SUNKEN: f64 = 2.0;
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -132,12 +134,12 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 if is_deep { share } else { String::new() }
             ));
         }
-        let inside = Inside::new(&body.mesh, &contact.obstacle.gap, (0.0, TOO_DEEP * size), &absolute);
+        let inside = Inside::new(&body.mesh, contact, (0.0, TOO_DEEP * size), &absolute);
         if deepest > ROUNDING * size || inside.deepest(session) <= TOO_DEEP * size {
             continue;
         }
         // Other bodies may be anywhere.
-        let [least, most] = inside.depths_of_own(session, body, contact)?;
+        let [least, most] = inside.depths_of_own(session, body)?;
         if most <= TOO_DEEP * size {
             continue;
         }
@@ -479,8 +481,24 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             ));
         }
         let touched = larger(penetration, held) >= -ROUNDING * size;
+        if !has_ended || state.step == 0 {
+            continue;
+        }
+        let least = TOO_DEEP * size;
+        let inside = Inside::new(&body.mesh, contact, (state.time, least), &absolute);
+        if touched && table.wear.is_none() {
+            let own = larger(larger(penetration, held), 0.0);
+            let deepest = inside.deepest_of_surface(session, body)?;
+            if deepest > least + SUNKEN * own {
+                out.push(format!(
+                    "contact.{number}: at the end facets beside the boundary {on} lie up to {deepest:.3e} m inside its obstacle, which acts on \
+                     that boundary alone: let the contact be `on` them, too (facets that belong to no boundary need a name in the mesh), or move \
+                     the obstacle away from them"
+                ));
+            }
+        }
         // Bonds carry forces across a gap.
-        if has_ended && state.step > 0 && !touched && table.adhesion.is_none() {
+        if !touched && table.adhesion.is_none() {
             let Gaps { smallest, .. } = gaps_of_all(session, contact, state.time, &displacement);
             let nearest = match larger(penetration, held) {
                 f64::NEG_INFINITY => {
@@ -493,9 +511,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             } else {
                 String::new()
             };
-            let least = TOO_DEEP * size;
-            let inside = Inside::new(&body.mesh, &contact.obstacle.gap, (state.time, least), &absolute);
-            let last = match inside.depths_of_own(session, body, contact)? {
+            let last = match inside.depths_of_own(session, body)? {
                 [out, depth] if out < -ROUNDING * size && depth > least => {
                     format!("{last}, at the end it lies inside the body, up to {depth:.3e} m deep")
                 }

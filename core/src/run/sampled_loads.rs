@@ -5,8 +5,9 @@ use super::steps::{Kind, TimeDependent, shortest_step, time_dependent};
 use crate::{
     job::{Job, Scalar},
     laws::{
+        chord::course,
         digits::Digits,
-        quadrature::unit_rule,
+        quadrature::rule,
         step::{Blend, Step},
     },
     linear_algebra::tensor::larger,
@@ -18,12 +19,11 @@ use std::cell::LazyCell;
 const LEAST_SEEN: f64 = 0.5;
 /// Share of the largest impulse by which that over the steps may differ after the load has ended; and of the largest way of a support.
 const WRONG_IMPULSE: f64 = 0.1;
-/// Share of all its change by which the place of an obstacle or a friction coefficient may be off a straight line within a step, and the share of
-/// a step behind its start at which it counts as that at the start.
+/// Share of all its change by which the place of an obstacle or a friction coefficient may be off a straight line within a step, the share of
+/// a step behind its start at which it counts as that at the start, and the parts of a step in which it is seen.
 const BENT: f64 = 0.05;
 const BESIDE: f64 = 1e-6;
-/// The share of a value that may be an error of rounding.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+const PARTS: u32 = 16;
 /// Runs of more fixed steps are not examined.
 const MOST_STEPS: u64 = 20_000;
 /// Steps between the kinks of a load that resolve it.
@@ -42,7 +42,7 @@ pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
         let breakpoints = load.value.breakpoints();
         let kinks = breakpoints.within(landings.end);
         let words = if job.time.adaptive.is_some() {
-            // Steps end at every jump, and follow obstacles within their tolerance.
+            // Steps end at every jump, and follow obstacles and friction coefficients within their tolerance.
             let is_resolved = !breakpoints.switches.is_empty() || load.kind == Kind::Followed;
             passed_over(&load.value, &kinks, shortest_step(job)).filter(|_| !is_resolved)
         } else if load.kind == Kind::Followed {
@@ -99,10 +99,9 @@ impl Sampled {
             }
             pieces.push(step.time);
             for to in pieces {
-                for [share, weight] in unit_rule() {
-                    let time = from + share * (to - from);
+                for [time, weight] in rule([from, to]) {
                     let size = value.evaluate(time, &[]);
-                    impulse += (to - from) * weight * size;
+                    impulse += weight * size;
                     found.meet(size, [time, to]);
                 }
                 found.meet(value.evaluate(to, &[]), [to; 2]);
@@ -150,7 +149,7 @@ impl Sampled {
         let error = (over_steps - exact).abs() / (WRONG_IMPULSE * largest);
         let is_wrong = error > 1.0;
         let [found, right] = [over_steps, exact].map(Digits);
-        let mut step = resolving(kinks, self.longest);
+        let step = resolving(kinks, self.longest);
         match load.kind {
             Kind::Force => (is_wrong && self.last == 0.0 && self.ended > 0.0).then(|| {
                 format!(
@@ -160,7 +159,7 @@ impl Sampled {
                 )
             }),
             Kind::Velocity => is_wrong.then(|| {
-                step = step.min(0.5 * self.longest / error);
+                let step = step.min(0.5 * self.longest / error);
                 format!(
                     "over the steps the support moves by {found} m for {right} m, because they are too long for the scheme: choose scheme = \"bdf2\" or a \
                      time.step of at most {step:.1e} s"
@@ -175,25 +174,19 @@ impl Sampled {
 /// of whose motion to and fro, along its surface in particular, steps see little or another one.
 fn bent(value: &Scalar, steps: &[Step]) -> Option<String> {
     let at = |time: f64| value.evaluate(time, &[]);
-    let (mut ends, mut most, mut longest) = ([at(0.0); 2], [0.0; 2], 0.0);
+    let (mut range, mut most, mut longest) = ([at(0.0); 2], [0.0; 2], 0.0);
     for step in steps {
         // Beside a jump at the start of the step, the last digits of times matter.
-        let [from, to] = [at(step.time - (1.0 - BESIDE) * step.length), at(step.time)];
-        for [share, _] in unit_rule() {
-            let found = at(step.time - (1.0 - share) * step.length);
-            let off = (found - from - share * (to - from)).abs();
-            if off > most[0] {
-                most = [off, step.time];
-            }
-            ends = [ends[0].min(found).min(to), larger(ends[1], larger(found, to))];
+        let of_step = course(at, [step.start() + BESIDE * step.length, step.time], PARTS);
+        if of_step.bend > most[0] {
+            most = [of_step.bend, step.time];
         }
+        range = [range[0].min(of_step.range[0]), larger(range[1], of_step.range[1])];
         longest = larger(longest, step.length);
     }
-    let [off, time] = most;
-    let share = off / (ends[1] - ends[0]);
-    // The last digits of a place at rest are rounding errors.
-    let is_rounding = off <= ROUNDING * larger(ends[0].abs(), ends[1].abs());
-    (share > BENT && !is_rounding).then(|| {
+    let [bend, time] = most;
+    let share = bend / (range[1] - range[0]);
+    (share > BENT).then(|| {
         format!(
             "within the step to t = {time:.6e} s it is off the straight line between its values at the ends of the step by {:.0} % of all its change: choose a \
              time.step of at most {:.1e} s, or [time.adaptive]",

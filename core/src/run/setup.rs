@@ -3,6 +3,7 @@
 use super::{
     bonds, build,
     estimate::MemoryEstimate,
+    loads,
     materials::Materials,
     memory::require_for_run,
     obstacles, pairs, parts,
@@ -64,6 +65,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;
     warnings.extend(bonds::warnings(session, job, &body));
     warnings.extend(parts::warnings(session, job, &body.mesh));
+    warnings.extend(loads::warnings(session, job, &body));
     warnings.extend(touching::warning(session, job, &body.mesh)?);
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);
     warnings.extend(side_words::warnings_of_changes(&earlier, &body.pairs));

@@ -7,13 +7,13 @@ use crate::{
         coupling::{HELD_TOGETHER, Inclined, held_share, is_held},
         effect::Supports,
         pairs::{Edges, Exchange, Pair, PairedNode},
-        space::{Held, facets},
+        space::{Held, facets, longest_side},
     },
     job::{self, Job, Side},
     laws::material::Material,
     linear_algebra::{
         petsc::DistributedVector,
-        tensor::{Vector, add_scaled, dot, norm},
+        tensor::{Vector, add_scaled, dot, larger, norm},
     },
     mesh::{Mesh, other_side},
     parallel::{agreement::Agreed, exchange::gather, session::Session},
@@ -22,7 +22,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Component of a unit direction along the normal of the law above which it counts as along the normal.
 const ALONG: f64 = 0.1;
-/// The same for the normal of the facets, which turns into a plane of symmetry.
+/// The same for the normal of the facets, which turns into a plane of symmetry; a share of the body's size that is a rounding error.
 const ROUNDING: f64 = 1e-6;
 /// Length of the free part of a unit direction below which a node is held nearly along it.
 const NEARLY_HELD: f64 = 0.5;
@@ -131,6 +131,14 @@ impl<'a, const D: usize> Sides<'a, D> {
                 return Ok(other);
             }
         }
+        let size = longest_side(session, &mesh.nodes);
+        let overlaps = |pair: &Pair<D>| !pair.slides && overlap(session, pair) > ROUNDING * size;
+        if overlaps(&first) {
+            let other = formed(first.clone().exchanged(Exchange::Sharper))?;
+            if !is_held(&other) && !overlaps(&other) {
+                return Ok(other);
+            }
+        }
         let [own, faced] = [&first.on, &first.against].map(|facets| self.stiffness(facets));
         let reason = if own > STIFFER * faced {
             Some(Exchange::Stiffer)
@@ -143,7 +151,8 @@ impl<'a, const D: usize> Sides<'a, D> {
             && !self.meets_another(&first)?
         {
             let other = formed(first.clone().exchanged(reason))?;
-            return Ok(if is_held(&other) { first } else { other });
+            let is_worse = is_held(&other) || overlaps(&other) && !overlaps(&first);
+            return Ok(if is_worse { first } else { other });
         }
         Ok(first)
     }
@@ -373,6 +382,14 @@ pub(super) fn is_smoother<const D: usize>(
     let is_sharper = |one: Edges, than: Edges| one.sharpness > SHARP && 2.0 * than.sharpness < one.sharpness;
     let ends_less = other.ends && !own.ends && !is_sharper(own, other);
     session.total(facing) > 0 && (is_sharper(other, own) || ends_less)
+}
+
+/// By how much in m the undeformed bodies overlap at most, as the nodes of a pair see it: of bodies that only touch, where corners or edges of the
+/// other side lie over its facets. Collective.
+fn overlap<const D: usize>(session: &Session, pair: &Pair<D>) -> f64 {
+    let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty());
+    let [most] = session.largest([facing.map(|node| -node.distance).fold(0.0, larger)]);
+    most
 }
 
 /// Whether the nodes of a pair face more than twice as many nodes as they are, in space more than four times as many. Collective.

@@ -62,6 +62,8 @@ pub(super) fn run<const D: usize, const S: usize>(
     let folder = job.output_folder();
     let mut log = Log::new(session.is_first(), clock.on_terminal);
     let claimed = session.on_first(|| claim_folder(job, start, &mut log))?.unwrap_or_default();
+    let opening = session.agree(header::opening(session, loaded, &mesh, clock.logs_every_step))?;
+    opening.iter().for_each(|line| log.line(line));
     log.start_waiting();
     let began_on = job.output.error_estimate.then(|| (loaded, mesh.clone()));
     let is_restart = start.is_restart();
@@ -83,10 +85,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let began_from = ready.began_from.iter().filter(|state| state.is_gone || restored.is_none());
     began_from.for_each(|state| log.line(&state.words));
     let start_state = identity.start_state.clone();
-    session
-        .agree(header::lines(session, loaded, &ready, clock.logs_every_step))?
-        .iter()
-        .for_each(|line| log.line(line));
+    header::lines(loaded, &ready, clock.logs_every_step).iter().for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let warned = log.warnings().len();
     restored.iter().flat_map(|restored| &restored.warnings).for_each(|warning| log.warning(warning));

@@ -134,8 +134,8 @@ pub(super) fn certificates(found: &RunFiles) -> [String; 2] {
         let verdict = known.verdict(step, None, &[Accept::Uniqueness, Accept::ExplicitStability]);
         brief.extend(verdict.brief.iter().map(|one| paragraph(&format!("{}.", capital(&one.words)))));
         let _ = writeln!(out, "<h3>Verdict for steps of {} s</h3>\n<ul>", number(step));
-        for words in &verdict.words {
-            let _ = writeln!(out, "<li>{}</li>", escape(words));
+        for statement in &verdict.details {
+            let _ = writeln!(out, "<li>{}</li>", escape(&statement.words));
         }
         out.push_str("</ul>\n");
         if verdict.warnings.iter().any(|warning| warning.ends_with("accepted by the job")) {

@@ -5,7 +5,7 @@ use crate::{
     error::{Error, Result},
     fem::space::{Held, SurfacePoint, facets, surface_points},
     job::{Fix, FixedDirections, Scalar, Support},
-    laws::{quadrature::unit_rule, step::Step},
+    laws::{quadrature::rule, step::Step},
     linear_algebra::{
         petsc::DistributedVector,
         tensor::{Vector, add_scaled, dot, dual_basis, norm},
@@ -340,10 +340,8 @@ impl<const D: usize> SupportMotion<D> {
                     return Ok((end - along(&part.direction, &|i| moved.origin[i])) / length);
                 }
                 let Some(converged) = converged.filter(|_| value.depends_on_time()) else { return Ok(end) };
-                let mut way = 0.0;
-                for [share, weight] in unit_rule() {
-                    way += weight * step.length * at_time(step.time - (1.0 - share) * step.length)?;
-                }
+                let parts = rule([step.start(), step.time]).map(|[time, weight]| Ok(weight * at_time(time)?));
+                let way = parts.sum::<Result<f64>>()?;
                 Ok((way - along(&part.direction, &|i| converged[at(i)])) / length)
             })?;
         }

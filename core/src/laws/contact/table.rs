@@ -54,7 +54,8 @@ impl Sliding {
 pub enum Side {
     /// Those in `on`, unless supports hold nodes there and not what they face, or the law of another contact acts at what they face, or all
     /// their nodes belong to other contacts, too, or, with `sliding = "finite"`, corners, edges or ends of `against` lie
-    /// over them where the bodies are nearest to each other, and theirs not over `against`; or else their body is more than 100 times as
+    /// over them where the bodies are nearest to each other, and theirs not over `against`, or, with `"small"`, such corners or edges would press
+    /// apart bodies that only touch, and would not the other way round; or else their body is more than 100 times as
     /// stiff, or, of bodies that are not, their mesh is clearly coarser: they face more than twice as many nodes of `against` as they have
     /// themselves, in 3D more than four times as many. Then those in `against`, if supports do not hold nodes there in the same way and, for a stiffer body or a coarser
     /// mesh, no other contact has nodes of either side. The log names the choice. A run that starts from another one (`[initial] from`)

@@ -6,8 +6,8 @@ use crate::{job::Accept, laws::digits::Digits};
 /// The outcome.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Verdict {
-    /// One line for each certificate: its value, its meaning, and possible changes.
-    pub words: Vec<String>,
+    /// One for each certificate: its value, its meaning, and possible changes.
+    pub details: Vec<Statement>,
     /// What of this a run tells: whether steps have one solution and are stable.
     pub brief: Vec<Statement>,
     /// Warnings.
@@ -26,6 +26,14 @@ pub struct Statement {
 }
 
 impl Statement {
+    fn certain(words: String) -> Self {
+        Self { is_certified: true, words }
+    }
+
+    fn uncertain(words: String) -> Self {
+        Self { is_certified: false, words }
+    }
+
     /// As a line of the log.
     pub fn line(&self) -> String {
         let title = if self.is_certified { "certified" } else { "uncertain" };
@@ -50,14 +58,17 @@ impl Certificates {
     /// below 1 by the margin, if it is known; `accepted` lists the limits that the job may exceed.
     pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: &[Accept]) -> Verdict {
         let mut verdict = Verdict::default();
-        verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
+        let not_covered = self.not_covered.iter().map(|words| format!("not covered: {words}"));
+        verdict.details.extend(not_covered.map(Statement::uncertain));
         if !self.not_covered.is_empty() && self.theta_step.is_some() {
-            verdict.words.push(format!("where several solutions are not excluded, {SEARCH}"));
+            let search = format!("where several solutions are not excluded, {SEARCH}");
+            verdict.details.push(Statement::uncertain(search));
         }
         // Laws that neither decrease nor are bounded have nothing to tell.
         let decreases = |fall: &f64| *fall > 0.0 || self.growth_constants.is_some();
         if let Some(fall) = self.monotonicity_constant.filter(decreases) {
-            verdict.words.push(format!("m_j = {} Pa s/m, {}", Digits(fall), self.growth()));
+            let words = format!("m_j = {} Pa s/m, {}", Digits(fall), self.growth());
+            verdict.details.push(Statement::certain(words));
         }
         let covered = if self.not_covered.is_empty() { "" } else { ", except for what is not covered" };
         if let Some(theta) = self.theta {
@@ -73,7 +84,8 @@ impl Certificates {
                 ));
                 "not below 1: the continuous problem may have several solutions"
             };
-            verdict.words.push(format!("theta = {size}, {meaning}{covered}"));
+            let words = format!("theta = {size}, {meaning}{covered}");
+            verdict.details.push(Statement { is_certified: theta < 1.0, words });
         }
         let fall = self.monotonicity_constant.filter(decreases);
         let fall = fall.filter(|_| self.decrease_with_displacement.is_none());
@@ -83,25 +95,27 @@ impl Certificates {
                 None if fall > 0.0 => f64::INFINITY,
                 None => 0.0,
             };
-            let (sign, meaning) = if modulus > product { (">", "holds") } else { ("<=", "does not hold") };
+            let is_certified = modulus > product;
+            let (sign, meaning) = if is_certified { (">", "holds") } else { ("<=", "does not hold") };
             let size = if product < f64::INFINITY {
                 format!("{} Pa s", Digits(product))
             } else {
                 format!("infinite {RIGID}")
             };
-            verdict.words.push(format!(
+            let words = format!(
                 "m_A = {} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) of Wang and Cheng (2022) {meaning}",
                 Digits(modulus)
-            ));
+            );
+            verdict.details.push(Statement { is_certified, words });
         }
         if let Some(theta) = self.theta_step {
             if self.steps_are_unique() {
                 let steps = self.steps_in_words();
                 verdict.brief.push(self.unique_steps(&steps));
-                verdict.words.push(format!(
+                verdict.details.push(Statement::certain(format!(
                     "theta of a step = {}, below 1: each step{steps} has one solution{covered}",
                     Digits(theta)
-                ));
+                )));
             } else {
                 let steps = self.step_range.unwrap_or([step; 2]);
                 verdict.uniqueness(theta, steps, unique_step, accepted.contains(&Accept::Uniqueness));
@@ -192,8 +206,7 @@ impl Verdict {
             Digits(theta),
             if theta < 1.0 { 1.0 - Certificates::MARGIN } else { 1.0 }
         );
-        self.words.push(found.clone());
-        self.brief.push(Statement { is_certified: false, words: found.clone() });
+        self.doubt(&found);
         let largest = unique_step.map_or_else(
             || {
                 let longer = if shortest < longest {
@@ -227,10 +240,10 @@ impl Verdict {
                 ""
             };
             let stable = format!("steps are stable up to {least}{least_bound} s");
-            self.words.push(format!(
+            self.details.push(Statement::certain(format!(
                 "{stable} (elastic and viscoplastic stress, adhesion and contact memory are explicit){power}"
-            ));
-            self.brief.push(Statement { is_certified: true, words: stable });
+            )));
+            self.brief.push(Statement::certain(stable));
             return;
         }
         let accepts = "or accept it with [solver] accept = [\"explicit_stability\"]";
@@ -253,9 +266,15 @@ impl Verdict {
                 format!("use a step below {least_bound} s, [time] scheme = \"implicit_euler\", {accepts}"),
             )
         };
-        self.words.push(found.clone());
-        self.brief.push(Statement { is_certified: false, words: found.clone() });
+        self.doubt(&found);
         self.judge(found, remedy, accepted);
+    }
+
+    /// States in full and in brief what is not certified.
+    fn doubt(&mut self, found: &str) {
+        for statements in [&mut self.details, &mut self.brief] {
+            statements.push(Statement::uncertain(found.to_owned()));
+        }
     }
 
     fn judge(&mut self, found: String, remedy: String, accepted: bool) {
@@ -297,7 +316,27 @@ mod tests {
     fn a_sound_problem_is_neither_refused_nor_warned_of() {
         let verdict = paper().verdict(1.0 / 64.0, None, &[]);
         assert!(verdict.refusals.is_empty() && verdict.warnings.is_empty());
-        assert!(verdict.words[2].contains("> m_j |gamma|^2 = 22.4"));
+        assert!(verdict.details[2].words.contains("> m_j |gamma|^2 = 22.4"));
+        assert!(verdict.details.iter().all(|one| one.is_certified), "{:?}", verdict.details);
+    }
+
+    #[test]
+    fn details_say_which_of_them_are_certain() {
+        let weakens = vec!["the friction traction decreases".into()];
+        let doubtful = Certificates {
+            not_covered: weakens,
+            theta: Some(1.5),
+            theta_step: Some(1.5),
+            monotonicity_constant: Some(1e9),
+            explicit_step_bound: Some(1e-9),
+            ..paper()
+        };
+        let details = doubtful.verdict(1.0 / 64.0, None, &[]).details;
+        let certain: Vec<_> = details.iter().filter(|one| one.is_certified).collect();
+        assert!(
+            details.len() == 7 && matches!(certain[..], [one] if one.words.starts_with("m_j = ")),
+            "{details:?}"
+        );
     }
 
     #[test]
@@ -328,7 +367,7 @@ mod tests {
 
     #[test]
     fn growth_stands_beside_the_monotonicity_constant() {
-        let first = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).words[0].clone();
+        let first = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).details[0].words.clone();
         assert_eq!(
             first(paper()),
             "m_j = 10 Pa s/m, |dj(r)| <= 0 Pa + 10 Pa s/m |r|: the contact pressure grows at most linearly with the velocity r, as hypothesis H(j) of Wang and Cheng (2022) requires"
@@ -346,7 +385,7 @@ mod tests {
         let words = |fall: f64| {
             let known =
                 Certificates { trace_norm_squared: None, monotonicity_constant: Some(fall), ..paper() };
-            known.verdict(1.0 / 64.0, None, &[]).words[2].clone()
+            known.verdict(1.0 / 64.0, None, &[]).details[2].words.clone()
         };
         assert_eq!(
             words(0.0),
@@ -358,8 +397,8 @@ mod tests {
     #[test]
     fn laws_that_neither_decrease_nor_are_bounded_are_not_spoken_of() {
         let rigid = Certificates { monotonicity_constant: Some(0.0), growth_constants: None, ..paper() };
-        let words = rigid.verdict(1.0 / 64.0, None, &[]).words;
-        assert!(words.len() > 1 && !words.iter().any(|words| words.contains("m_j")), "{words:?}");
+        let details = rigid.verdict(1.0 / 64.0, None, &[]).details;
+        assert!(details.len() > 1 && !details.iter().any(|one| one.words.contains("m_j")), "{details:?}");
     }
 
     #[test]
@@ -377,8 +416,8 @@ mod tests {
     #[test]
     fn a_bound_that_is_only_the_least_is_said_to_be_that() {
         let known = Certificates { explicit_bound_is_least: true, ..paper() };
-        let words = known.verdict(0.01, None, &[]).words;
-        assert!(words.iter().any(|words| words.starts_with("steps are stable up to at least 0.12 s")));
+        let details = known.verdict(0.01, None, &[]).details;
+        assert!(details.iter().any(|one| one.words.starts_with("steps are stable up to at least 0.12 s")));
     }
 
     #[test]
@@ -395,8 +434,10 @@ mod tests {
     #[test]
     fn the_bound_of_power_laws_says_where_it_holds() {
         let known = Certificates { explicit_bound_follows_stress: true, ..paper() };
-        let words = known.verdict(0.01, None, &[]).words;
-        assert!(words.iter().any(|words| words.contains("each step checks the bound at the current stress")));
+        let details = known.verdict(0.01, None, &[]).details;
+        assert!(
+            details.iter().any(|one| one.words.contains("each step checks the bound at the current stress"))
+        );
     }
 
     #[test]

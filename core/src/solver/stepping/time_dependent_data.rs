@@ -1,4 +1,4 @@
-//! Time-dependent loads and moving obstacles, evaluated over a step before it is attempted.
+//! Time-dependent loads, moving obstacles and friction coefficients, evaluated over a step before it is attempted.
 //!
 //! Each expression is sampled at a few points of the body's bounding box, the same on all ranks. Ends of smooth pieces
 //! (`min`, `max`, `abs`, `sign`, `floor`, `ceil`, `round`) between two samples are located by bisection, and a step ends there.
@@ -12,7 +12,7 @@ use crate::{
         effect::{Blend, Form, Prescribed, Step},
     },
     job::Scalar,
-    laws::quadrature::unit_rule,
+    laws::{chord::course, quadrature::rule},
     linear_algebra::tensor::Vector,
     parallel::session::Session,
 };
@@ -23,9 +23,6 @@ const SAMPLES: u32 = 64;
 const SAMPLES_OF_RUN: u32 = 1024;
 /// Values before and after a time that differ by less than this fraction of the scale count as equal: there is no jump.
 const CONTINUITY_TOLERANCE: f64 = 1e-9;
-
-/// The share of a value that may be an error of rounding.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// The time-dependent expressions.
 #[derive(Debug)]
@@ -41,7 +38,7 @@ struct TimeDependentExpression<const D: usize> {
     value: Scalar,
     /// The sample points.
     points: Vec<Vector<D>>,
-    /// The largest value of a load in the run, or the distance over which an obstacle moves.
+    /// The largest value of a load or a coefficient in the run, or the distance over which an obstacle moves.
     scale: f64,
     /// The scheme by which the body moves at this velocity, if it has one.
     moves_by: Option<fn(Step) -> Blend>,
@@ -50,6 +47,7 @@ struct TimeDependentExpression<const D: usize> {
 /// What a value is to the body.
 #[derive(Clone, Copy)]
 enum Role {
+    /// A load or the coefficient of a law.
     Load,
     /// The place of an obstacle.
     Place,
@@ -91,6 +89,8 @@ impl<const D: usize> TimeDependentData<D> {
             forces.for_each(|force| add("the force on an obstacle", std::slice::from_ref(force), Role::Load));
             let of_gap = contact.obstacle.gap.expressions();
             of_gap.into_iter().for_each(|values| add("an obstacle", values, Role::Place));
+            let coefficient = contact.friction.as_ref().and_then(|friction| friction.law.in_time());
+            add("a friction coefficient", coefficient.as_slice(), Role::Load);
         }
         Self { expressions }
     }
@@ -198,21 +198,10 @@ impl<const D: usize> TimeDependentExpression<D> {
     }
 
     /// The largest deviation between two times from the linear function between its values there, relative to its scale.
-    fn deviation_from_linear(&self, [start, end]: [f64; 2]) -> f64 {
+    fn deviation_from_linear(&self, ends: [f64; 2]) -> f64 {
         let deviation_at = |point: &Vector<D>| {
-            let [first, last] = [start, end].map(|time| self.value.evaluate(time, point));
-            let (mut deviation, mut scale) = (0.0f64, self.scale);
-            for at in 1..SAMPLES {
-                let fraction = f64::from(at) / f64::from(SAMPLES);
-                let value = self.value.evaluate((1.0 - fraction) * start + fraction * end, point);
-                let difference = (value - ((1.0 - fraction) * first + fraction * last)).abs();
-                // Of a position that hardly moves, the last digits are rounding errors.
-                let rounding = ROUNDING * value.abs().max(first.abs());
-                if difference.is_finite() && difference > rounding {
-                    (deviation, scale) = (deviation.max(difference), scale.max(difference));
-                }
-            }
-            if deviation > 0.0 { deviation / scale } else { 0.0 }
+            let bend = course(|time| self.value.evaluate(time, point), ends, SAMPLES).bend;
+            if bend > 0.0 { bend / self.scale.max(bend) } else { 0.0 }
         };
         self.points.iter().map(deviation_at).fold(0.0, f64::max)
     }
@@ -225,20 +214,15 @@ impl<const D: usize> TimeDependentExpression<D> {
             Step { time: step.time - step.length, length: step.previous_length, previous_length: 0.0 };
         let deviation_at = |point: &Vector<D>| {
             let velocity = |time: f64| self.value.evaluate(time, point);
-            let solved = blend.of(0.0, -integral(before, velocity))
-                + blend.length * velocity(blend.balanced(step).time);
-            let deviation =
-                (blend.end(0.0, solved) - integral(step, velocity)).abs() / (step.length * self.scale);
+            let way = |step: Step| {
+                rule([step.start(), step.time]).map(|[time, weight]| weight * velocity(time)).sum::<f64>()
+            };
+            let solved = blend.of(0.0, -way(before)) + blend.length * velocity(blend.balanced(step).time);
+            let deviation = (blend.end(0.0, solved) - way(step)).abs() / (step.length * self.scale);
             if deviation.is_finite() { deviation } else { 0.0 }
         };
         self.points.iter().map(deviation_at).fold(0.0, f64::max)
     }
-}
-
-/// The integral of a value over a step.
-fn integral(step: Step, value: impl Fn(f64) -> f64) -> f64 {
-    let time = |share: f64| step.time - (1.0 - share) * step.length;
-    step.length * unit_rule().map(|[share, weight]| weight * value(time(share))).sum::<f64>()
 }
 
 /// The centre of the body's bounding box, its corners, and the centres of its sides, edges and faces. Collective.

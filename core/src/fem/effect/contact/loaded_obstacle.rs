@@ -193,7 +193,7 @@ impl<const D: usize> Obstacle<D> {
     }
 
     /// Places as seen from the obstacle: after the last step.
-    pub(super) fn seen_before(&self, place: &Vector<D>) -> Vector<D> {
+    pub fn seen_before(&self, place: &Vector<D>) -> Vector<D> {
         self.seen(place, |motion| motion.converged[0])
     }
 

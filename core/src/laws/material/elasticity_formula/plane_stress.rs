@@ -6,7 +6,7 @@
 
 use super::{Isotropic, Point, StrainElasticity};
 use crate::{
-    laws::{expression::Variable, law::increasing_root, quadrature::unit_rule},
+    laws::{expression::Variable, law::increasing_root, quadrature::rule},
     linear_algebra::tensor::{Mandel, add_scaled, dot, norm},
 };
 
@@ -87,7 +87,7 @@ impl StrainElasticity {
         let [before, end] = strains;
         let Mean { stress, way, missing } = self.mean_on_way(strains);
         let mut sum = [[0.0; S]; S];
-        for [share, weight] in unit_rule() {
+        for [share, weight] in rule([0.0, 1.0]) {
             let tangent = self.tangent(&add_scaled(before, share, &way));
             for (sum, row) in sum.iter_mut().zip(&tangent) {
                 *sum = add_scaled(sum, 2.0 * share * weight, row);
@@ -110,7 +110,7 @@ impl StrainElasticity {
     fn mean_on_way<const S: usize>(&self, [before, end]: [&Mandel<S>; 2]) -> Mean<S> {
         let way = add_scaled(end, -1.0, before);
         let on_way =
-            unit_rule().map(|[share, weight]| (weight, self.stress(&add_scaled(before, share, &way))));
+            rule([0.0, 1.0]).map(|[share, weight]| (weight, self.stress(&add_scaled(before, share, &way))));
         let stress = on_way.fold([0.0; S], |sum, (weight, stress)| add_scaled(&sum, weight, &stress));
         let missing = self.energy_change([before, end]) - dot(&stress, &way);
         let middle = add_scaled(before, 0.5, &way);
