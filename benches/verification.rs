@@ -889,6 +889,29 @@ const TABLES: &[Table] = &[
         runs: &[with("6^3", &["mesh.order=2", "mesh.box.cells=[6, 6, 6]"]), with("12^3", &["mesh.order=2"])],
     },
     Table {
+        page: "mindlin-sphere",
+        name: "meshes",
+        job: "verification/mindlin_sphere",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("12", &["mesh.box.0.cells=[12, 4, 4]", "mesh.box.1.cells=[12, 4, 4]"]),
+            with("24", &[]),
+            with("48", &["mesh.box.0.cells=[48, 16, 16]", "mesh.box.1.cells=[48, 16, 16]"]),
+        ],
+    },
+    Table {
+        page: "mindlin-sphere",
+        name: "quadratic",
+        job: "verification/mindlin_sphere",
+        columns: Columns::Variants,
+        pictured: false,
+        runs: &[
+            with("12", &["mesh.order=2", "mesh.box.0.cells=[12, 4, 4]", "mesh.box.1.cells=[12, 4, 4]"]),
+            with("24", &["mesh.order=2"]),
+        ],
+    },
+    Table {
         page: "agreement",
         name: "schemes",
         job: "papers/wang_cheng_2022",
@@ -1086,6 +1109,7 @@ const UNCERTAIN: &[(&str, &str, f64)] = &[
     ("verification/hertz_slides", "", 1e-2),
     ("verification/elliptic_contact", "force_z", 0.0),
     ("verification/elliptic_contact", "", 1.4e-2),
+    ("verification/mindlin_sphere", "", 1e-3),
     ("orthotropic_strip", "", 0.0),
     ("verification/elliptic_membrane", "", 1e-6),
     ("verification/thick_plate", "", 1e-2),
