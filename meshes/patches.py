@@ -1,5 +1,5 @@
 """Writes meshes of quadratic triangles with curved sides beside itself: an elliptic membrane, a strip with a hole, Cook's panel, a
-roller on a block and a shell.
+roller and a punch on a block, and a shell.
 
     python3 meshes/patches.py
 """
@@ -133,6 +133,29 @@ def roller(cells):
     return mesh
 
 
+def punch(cells):
+    """A section through a punch of the radius 50, whose edge has the radius 10, on a block of the radius 100, in mm, with small cells
+    where its flat face ends."""
+
+    def rounded(share):
+        length = share * (90 + 5 * pi)
+        angle = length / 10
+        return (40 + 10 * sin(angle), 10 - 10 * cos(angle)) if angle < pi / 2 else (50.0, length + 10 - 5 * pi)
+
+    mesh = Mesh()
+    near = [1 - share for share in reversed(graded(6 * cells, 2.0))]
+    far, down = graded(5 * cells, 2.0), graded(8 * cells, 2.0)
+    mesh.patch((near, down), lambda u, v: (40 * u, -200 * v), ("block_axis", "", "surface", "base"))
+    mesh.patch((far, down), lambda u, v: (40 + 60 * u, -200 * v), ("", "", "surface", "base"))
+    mesh.next_body()
+    near = [1 - share for share in reversed(graded(5 * cells, 2.0))]
+    down = [1 - share for share in reversed(graded(7 * cells, 2.0))]
+    mesh.patch((near, down), lambda u, v: (40 * u, 100 * (1 - v)), ("punch_axis", "", "load", "face"))
+    mesh.patch((graded(2 * cells), down), lambda u, v: between((40, 100 * (1 - v)), rounded(1 - v), u), ("", "round", "load", ""))
+    mesh.triangles = [[a, c, b, f, e, d] for a, b, c, d, e, f in mesh.triangles]
+    return mesh
+
+
 def cavity(cells):
     """A section through a shell of the radii 1 and 4."""
 
@@ -146,5 +169,5 @@ def cavity(cells):
 
 if __name__ == "__main__":
     for size, cells in (("coarse", 1), ("medium", 2), ("fine", 4)):
-        for mesh in (membrane, strip, panel, roller, cavity):
+        for mesh in (membrane, strip, panel, roller, punch, cavity):
             mesh(cells).write(f"{mesh.__name__}_{size}")
