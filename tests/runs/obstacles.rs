@@ -522,12 +522,19 @@ fn facets_beside_a_contact_that_sink_into_its_obstacle_are_warned_of() {
     let rises = "normal.unilateral = {}\nwhere = 'x < 0.55'\nobstacle.plane = { point = [0, '0.1*t - 0.05'], normal = [0, 1] }";
     let soft =
         "normal.compliance = { stiffness = 1e5 }\nobstacle.plane = { point = [0, 0], normal = [0, 1] }";
+    // Both halves of the boundary bear on the plane, one of them softly.
+    let plane = "obstacle.plane = { point = [0, 0], normal = [0, 1] }";
+    let halves = &format!(
+        "where = 'x < 0.5'\nnormal.compliance = {{ stiffness = 1e7 }}\n{plane}\n\
+         [[contact]]\non = [\"bottom\"]\nwhere = 'x >= 0.5'\nnormal.compliance = {{ stiffness = 2e5 }}\n{plane}"
+    )[..];
     for (contact, modulus, sinks) in [
         (rigid, 1e5, false),
         (&partly[..], 1e5, true),
         (&partly[..], 1e8, false),
         (rises, 1e5, true),
         (soft, 1e5, false),
+        (halves, 1e5, false),
     ] {
         for ranks in [1, 3] {
             let case = falls(contact, modulus);

@@ -49,7 +49,7 @@ const TIMES: u32 = 16;
 /// nodes from which on it is meant to be round: at nodes on edges facets do not turn.
 const TURNING: f64 = 1e-3;
 const SHARE_OF_CORNERS: usize = 8;
-/// A node of the surface that is this many times as deep in an obstacle as points of its contact is beside the contact.
+/// A node of the surface that is this many times as deep in an obstacle as any point of a contact is beside the contacts.
 const SUNKEN: f64 = 2.0;
 /// A depth of this share of the body's size is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -408,6 +408,12 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     let absolute = session.agree(state.displacement.local())?;
     let displacement = body.seen_by_contacts(&absolute);
     let size = longest_side(session, &body.mesh.nodes);
+    let is_worn = job.contact.iter().any(|table| table.wear.is_some());
+    let deepest = |contact: &Contact<D>| {
+        let Closeness { penetration, held, .. } = contact.closeness.of_all(session);
+        larger(penetration, held)
+    };
+    let of_contacts = body.contacts.iter().map(deepest).fold(0.0, larger);
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
         let Closeness {
@@ -486,10 +492,9 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
         }
         let least = TOO_DEEP * size;
         let inside = Inside::new(&body.mesh, contact, (state.time, least), &absolute);
-        if touched && table.wear.is_none() {
-            let own = larger(larger(penetration, held), 0.0);
+        if touched && !is_worn {
             let deepest = inside.deepest_of_surface(session, body)?;
-            if deepest > least + SUNKEN * own {
+            if deepest > least + SUNKEN * of_contacts {
                 out.push(format!(
                     "contact.{number}: at the end facets beside the boundary {on} lie up to {deepest:.3e} m inside its obstacle, which acts on \
                      that boundary alone: let the contact be `on` them, too (facets that belong to no boundary need a name in the mesh), or move \
