@@ -227,3 +227,56 @@ fn a_traction_that_supports_alone_bear_is_warned_of() {
         }
     }
 }
+
+#[test]
+fn a_traction_that_changes_within_facets_is_warned_of() {
+    let words = "traction.0: facets of the boundary top are too long for it";
+    for (value, is_wrong) in [
+        ("1e6*(x > 0.33)*(x < 0.36)", true),
+        ("1e6*exp(-((x - 0.5)/0.005)^2)", true),
+        ("sin(20*pi*x)^2", true),
+        ("1e6*x^2", false),
+        ("-10*(x > 0.5)", false),
+        ("-10*exp(-((x - 0.5)/0.3)^2)*sin(7*t)", false),
+    ] {
+        for (case, axes) in [
+            (Case::square(10), "0,"),
+            (Case::square(10).set("mesh.order", "2"), "0,"),
+            (Case::cube(10), "0, 0,"),
+        ] {
+            let case = case.set("traction", &format!("[{{on = ['top'], value = [{axes} '{value}']}}]"));
+            let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
+            let said = launch::unwrapped(&outcome.stdout);
+            assert_eq!(said.contains(words), is_wrong, "{value}: {said}");
+        }
+    }
+}
+
+#[test]
+fn a_probe_where_bodies_touch_is_warned_of() {
+    let blocks = "[{ name = 'lower', size = [2, 1], cells = [4, 2] }, \
+                   { name = 'upper', corner = [0.5, 1], size = [1, 1], cells = [3, 2] }]";
+    for (point, is_shared) in
+        [("[1, 1]", true), ("[0.6, 1]", true), ("[1, 1.001]", false), ("[0.1, 1]", false)]
+    {
+        for ranks in [1, 3] {
+            let case = Case::of("pressed_blocks").set("mesh", &format!("{{ rectangle = {blocks} }}"));
+            let case = case
+                .set(
+                    "support",
+                    "[{ on = ['lower.bottom'], fix = 'all' }, { on = ['upper.top'], fix = 'all' }]",
+                )
+                .without("traction")
+                .set(
+                    "contact",
+                    "[{ on = ['upper.bottom'], against = ['lower.top'], normal.unilateral = {} }]",
+                )
+                .without("output")
+                .set("output.folder", "'out'")
+                .set("output.probe", &format!("[{{ name = 'p', point = {point} }}]"));
+            let outcome = launch::run(ranks, &["check", case.written().to_str().expect("a path")]).expect(0);
+            let said = launch::unwrapped(&outcome.stdout);
+            assert_eq!(said.contains("where \"p\" lies, bodies touch"), is_shared, "{point}: {said}");
+        }
+    }
+}

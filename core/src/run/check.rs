@@ -163,7 +163,7 @@ fn report<const D: usize, const S: usize>(
             memory_bytes: MemoryEstimate::new(session, body, &inventory, preconditioner, problem),
             seconds: None,
         },
-        warnings: header::warnings(loaded, ready),
+        warnings: header::warnings(session, loaded, ready),
         output_folder: job.output_folder().display().to_string(),
         motion: match body.contacts.iter().any(|contact| contact.normal.law.depends_on_displacement()) {
             _ if !body.has_form(Form::Mass) => Dynamics::Slow,

@@ -13,7 +13,7 @@ use crate::{
     laws::digits::Digits,
     mesh::Mesh,
     parallel::session::Session,
-    solver::certificate::Statement,
+    solver::{certificate::Statement, stepping::sample_points},
 };
 
 /// What is known before the problem is set up: versions, title, mesh, partition and faults in the body, one line each; with all details, or
@@ -89,9 +89,15 @@ pub(super) fn lines<const D: usize, const S: usize>(
 }
 
 /// Warnings about the job, its certificates and its initial state.
-pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &Setup<D, S>) -> Vec<String> {
+/// Collective.
+pub(super) fn warnings<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    ready: &Setup<D, S>,
+) -> Vec<String> {
     let given = loaded.warnings.iter().chain(&ready.verdict.warnings).chain(&ready.warnings).cloned();
-    let sampled = sampled_loads::warnings(&loaded.job, &steps::landings(&loaded.job));
+    let places = sample_points(session, &ready.body.mesh.nodes);
+    let sampled = sampled_loads::warnings(&loaded.job, &steps::landings(&loaded.job), &places);
     given.chain(steps::warnings(&loaded.job)).chain(sampled).collect()
 }
 

@@ -48,8 +48,12 @@ pub(super) fn candidates(session: &Session, start: &Start, folder: &Path) -> Res
         Start::From(path) => Ok(vec![path.clone()]),
         Start::Newest => {
             let found = newest(session, folder)?;
-            let words =
-                || format!("{}: no checkpoint to continue from; run without --restart", folder.display());
+            let words = || {
+                format!(
+                    "{}: no checkpoint to continue from; run without --restart (a finished run keeps its last state where the job has a [checkpoint] table)",
+                    folder.display()
+                )
+            };
             session.agree(if found.is_empty() { Err(Error::Refused(words())) } else { Ok(found) })
         }
     }

@@ -1,24 +1,28 @@
 //! Loads against the steps that sample them: fixed steps see a load at one time in each step, adaptive ones end at kinks of tables no nearer
 //! to each other than the shortest step.
 
-use super::steps::{Kind, TimeDependent, shortest_step, time_dependent};
+use super::steps::{Kind, shortest_step, time_dependent};
 use crate::{
-    job::{Job, Scalar},
+    job::Job,
     laws::{
         chord::course,
         digits::Digits,
         quadrature::rule,
         step::{Blend, Step},
     },
-    linear_algebra::tensor::larger,
+    linear_algebra::tensor::{Vector, larger},
     solver::stepping::Landings,
 };
 use std::cell::LazyCell;
 
 /// Share of its largest value that a load must reach at times at which steps see it.
 const LEAST_SEEN: f64 = 0.5;
+/// A change of a load of this share of its largest magnitude is worth seeing.
+const WORTH_SEEING: f64 = 0.1;
 /// Share of the largest impulse by which that over the steps may differ after the load has ended; and of the largest way of a support.
 const WRONG_IMPULSE: f64 = 0.1;
+/// How many times as wrong the impulse of a load may be while it acts.
+const WHILE_IT_ACTS: f64 = 2.0;
 /// Share of all its change by which the place of an obstacle or a friction coefficient may be off a straight line within a step, the share of
 /// a step behind its start at which it counts as that at the start, and the parts of a step in which it is seen.
 const BENT: f64 = 0.05;
@@ -29,27 +33,41 @@ const MOST_STEPS: u64 = 20_000;
 /// Steps between the kinks of a load that resolve it.
 const STEPS_A_PIECE: f64 = 5.0;
 
-/// Warnings about loads and motions of a job, the same everywhere on their boundary, of which steps that end at these times see too little or
-/// too much.
-pub(super) fn warnings(job: &Job, landings: &Landings) -> Vec<String> {
+/// Warnings about loads and motions of a job of which steps that end at these times see too little or too much, as they are at these places.
+pub(super) fn warnings<const D: usize>(job: &Job, landings: &Landings, places: &[Vector<D>]) -> Vec<String> {
     let steps = LazyCell::new(|| fixed_steps(landings));
     let has_mass = job.materials().any(|(_, material)| material.density.is_some());
     let mut found = Vec::new();
     for load in time_dependent(job) {
-        if load.value.depends_on_position() {
-            continue;
-        }
         let breakpoints = load.value.breakpoints();
         let kinks = breakpoints.within(landings.end);
-        let words = if job.time.adaptive.is_some() {
-            // Steps end at every jump, and follow obstacles and friction coefficients within their tolerance.
-            let is_resolved = !breakpoints.switches.is_empty() || load.kind == Kind::Followed;
-            passed_over(&load.value, &kinks, shortest_step(job)).filter(|_| !is_resolved)
-        } else if load.kind == Kind::Followed {
-            bent(&load.value, &steps)
+        let words = |place: &[f64]| {
+            let value = |time: f64| load.value.evaluate(time, place);
+            if job.time.adaptive.is_some() {
+                // Steps end at every jump, and follow obstacles and friction coefficients within their tolerance.
+                let is_resolved = !breakpoints.switches.is_empty() || load.kind == Kind::Followed;
+                passed_over(value, &kinks, shortest_step(job)).filter(|_| !is_resolved)
+            } else if load.kind == Kind::Followed {
+                bent(value, &steps)
+            } else {
+                let sampled = Sampled::by(value, job.time.scheme.formula(), &steps, &kinks);
+                sampled
+                    .missed(&kinks)
+                    .or_else(|| sampled.wrong_integral(load.kind, &kinks).filter(|_| has_mass))
+            }
+        };
+        let words = if load.value.depends_on_position() {
+            let few = if job.time.adaptive.is_some() {
+                places.len()
+            } else {
+                (MOST_STEPS as usize / steps.len().max(1)).max(1)
+            };
+            places
+                .iter()
+                .take(few)
+                .find_map(|place| words(place).map(|words| format!("at {place:?} m {words}")))
         } else {
-            let sampled = Sampled::by(&load.value, job.time.scheme.formula(), &steps, &kinks);
-            sampled.missed(&kinks).or_else(|| sampled.wrong_integral(&load, &kinks).filter(|_| has_mass))
+            words(&[])
         };
         found.extend(words.map(|words| format!("{}: {words}", load.key)));
     }
@@ -71,13 +89,60 @@ fn fixed_steps(landings: &Landings) -> Vec<Step> {
     steps
 }
 
+/// The largest distance of a value from another one.
+#[derive(Debug, Clone, Copy)]
+struct Peak {
+    from: f64,
+    /// In the run, with the time.
+    largest: [f64; 2],
+    /// At times at which steps see the value.
+    seen: f64,
+}
+
+impl Peak {
+    fn from(from: f64) -> Self {
+        Self { from, largest: [0.0; 2], seen: 0.0 }
+    }
+
+    fn meet(&mut self, value: f64, time: f64) {
+        let distance = (value - self.from).abs();
+        if distance > self.largest[0] {
+            self.largest = [distance, time];
+        }
+    }
+
+    fn see(&mut self, value: f64) {
+        self.seen = larger(self.seen, (value - self.from).abs());
+    }
+
+    fn is_missed(&self) -> bool {
+        self.seen < LEAST_SEEN * self.largest[0]
+    }
+}
+
+/// The impulse of a load up to a time.
+#[derive(Debug, Clone, Copy, Default)]
+struct Impulse {
+    time: f64,
+    exact: f64,
+    over_steps: f64,
+}
+
+impl Impulse {
+    fn error(&self) -> f64 {
+        (self.over_steps - self.exact).abs()
+    }
+}
+
 /// What the fixed steps of a run see of a value.
 struct Sampled {
-    /// Its largest magnitude, with the time, and the largest one at times at which steps see it.
-    largest: [f64; 2],
-    seen: f64,
-    /// The largest impulse up to the end of a step, that at the end of the run, and that over the steps.
-    impulses: [f64; 3],
+    /// Its magnitude, and its change since the start of the run.
+    magnitude: Peak,
+    change: Peak,
+    /// The largest impulse up to the end of a step, the one that is most wrong, and that at the end of the run.
+    largest_impulse: f64,
+    worst: Impulse,
+    at_end: Impulse,
     /// The value at the end of the run, the longest step, and the last time before which the value is not zero.
     last: f64,
     longest: f64,
@@ -85,9 +150,18 @@ struct Sampled {
 }
 
 impl Sampled {
-    fn by(value: &Scalar, formula: fn(Step) -> Blend, steps: &[Step], kinks: &[f64]) -> Self {
-        let mut found =
-            Self { largest: [0.0; 2], seen: 0.0, impulses: [0.0; 3], last: 0.0, longest: 0.0, ended: 0.0 };
+    fn by(value: impl Fn(f64) -> f64, formula: fn(Step) -> Blend, steps: &[Step], kinks: &[f64]) -> Self {
+        let none = Impulse::default();
+        let mut found = Self {
+            magnitude: Peak::from(0.0),
+            change: Peak::from(value(0.0)),
+            largest_impulse: 0.0,
+            worst: none,
+            at_end: none,
+            last: 0.0,
+            longest: 0.0,
+            ended: 0.0,
+        };
         let mut speeds = [0.0; 2];
         let mut impulse = 0.0;
         let mut kinks = kinks.iter().copied().peekable();
@@ -100,21 +174,25 @@ impl Sampled {
             pieces.push(step.time);
             for to in pieces {
                 for [time, weight] in rule([from, to]) {
-                    let size = value.evaluate(time, &[]);
+                    let size = value(time);
                     impulse += weight * size;
                     found.meet(size, [time, to]);
                 }
-                found.meet(value.evaluate(to, &[]), [to; 2]);
+                found.meet(value(to), [to; 2]);
                 from = to;
             }
             let blend = formula(*step);
-            let balanced = blend.balanced(*step).time;
-            let at_balance = value.evaluate(balanced, &[]);
-            found.seen = larger(found.seen, at_balance.abs());
+            let at_balance = value(blend.balanced(*step).time);
+            found.magnitude.see(at_balance);
+            found.change.see(at_balance);
             let solved = blend.of(speeds[0], speeds[1]) + blend.length * at_balance;
             speeds = [blend.end(speeds[0], solved), speeds[0]];
-            found.impulses = [larger(found.impulses[0], impulse.abs()), impulse, speeds[0]];
-            found.last = value.evaluate(step.time, &[]);
+            found.largest_impulse = larger(found.largest_impulse, impulse.abs());
+            found.at_end = Impulse { time: step.time, exact: impulse, over_steps: speeds[0] };
+            if found.at_end.error() > found.worst.error() {
+                found.worst = found.at_end;
+            }
+            found.last = value(step.time);
             found.longest = larger(found.longest, step.length);
         }
         found
@@ -122,9 +200,8 @@ impl Sampled {
 
     /// Takes a value at a time in a piece that ends at another one.
     fn meet(&mut self, value: f64, [time, end]: [f64; 2]) {
-        if value.abs() > self.largest[0] {
-            self.largest = [value.abs(), time];
-        }
+        self.magnitude.meet(value, time);
+        self.change.meet(value, time);
         if value != 0.0 {
             self.ended = larger(self.ended, end);
         }
@@ -132,52 +209,66 @@ impl Sampled {
 
     /// Words where steps miss most of its largest values.
     fn missed(&self, kinks: &[f64]) -> Option<String> {
-        let [largest, time] = self.largest;
-        (self.seen < LEAST_SEEN * largest).then(|| {
-            format!(
-                "of its largest magnitude {largest:.3e}, at t = {time:.6e} s, steps see at most {:.3e}: choose a time.step of at most {:.1e} s, \
-                 or [time.adaptive]",
-                self.seen,
-                resolving(kinks, self.longest)
-            )
-        })
+        let Self { magnitude, change, .. } = self;
+        let changes = change.largest[0] > WORTH_SEEING * magnitude.largest[0];
+        let (peak, name) = if magnitude.is_missed() {
+            (magnitude, "magnitude")
+        } else if changes && change.is_missed() {
+            (change, "change since the start")
+        } else {
+            return None;
+        };
+        let [largest, time] = peak.largest;
+        Some(format!(
+            "of its largest {name} {largest:.3e}, at t = {time:.6e} s, steps see at most {:.3e}: choose a time.step of at most {:.1e} s, or \
+             [time.adaptive]",
+            peak.seen,
+            resolving(kinks, self.longest)
+        ))
     }
 
-    /// Words where a load that has ended has not left its impulse, or a support has not gone the way of its velocity.
-    fn wrong_integral(&self, load: &TimeDependent<'_>, kinks: &[f64]) -> Option<String> {
-        let [largest, exact, over_steps] = self.impulses;
-        let error = (over_steps - exact).abs() / (WRONG_IMPULSE * largest);
-        let is_wrong = error > 1.0;
-        let [found, right] = [over_steps, exact].map(Digits);
+    /// Words where a load that acts or has ended has not left its impulse, or a support has not gone the way of its velocity.
+    fn wrong_integral(&self, kind: Kind, kinks: &[f64]) -> Option<String> {
+        let error = |impulse: &Impulse| impulse.error() / (WRONG_IMPULSE * self.largest_impulse);
+        let (at_end, worst) = (error(&self.at_end), error(&self.worst));
         let step = resolving(kinks, self.longest);
-        match load.kind {
-            Kind::Force => (is_wrong && self.last == 0.0 && self.ended > 0.0).then(|| {
-                format!(
+        match kind {
+            Kind::Force if at_end > 1.0 && self.last == 0.0 && self.ended > 0.0 => {
+                let [found, right] = [self.at_end.over_steps, self.at_end.exact].map(Digits);
+                Some(format!(
                     "its impulse over the steps is {found} for {right}, because they are too long while it acts: choose a time.step of at most {step:.1e} s, \
                      or let the time until t = {:.6e} s be a stage of its own with such steps",
                     self.ended
-                )
-            }),
-            Kind::Velocity => is_wrong.then(|| {
-                let step = step.min(0.5 * self.longest / error);
+                ))
+            }
+            Kind::Force if worst > WHILE_IT_ACTS => {
+                let [found, right] = [self.worst.over_steps, self.worst.exact].map(Digits);
+                Some(format!(
+                    "its impulse over the steps to t = {:.6e} s is {found} for {right}, because they are too long for its changes: choose a time.step of at \
+                     most {step:.1e} s, or [time.adaptive]",
+                    self.worst.time
+                ))
+            }
+            Kind::Velocity => (at_end > 1.0).then(|| {
+                let [found, right] = [self.at_end.over_steps, self.at_end.exact].map(Digits);
+                let step = step.min(0.5 * self.longest / at_end);
                 format!(
                     "over the steps the support moves by {found} m for {right} m, because they are too long for the scheme: choose scheme = \"bdf2\" or a \
                      time.step of at most {step:.1e} s"
                 )
             }),
-            Kind::State | Kind::Followed => None,
+            Kind::Force | Kind::State | Kind::Followed => None,
         }
     }
 }
 
 /// Words where a value between the ends of a step is far from a linear function of time: a friction coefficient, or the place of an obstacle,
 /// of whose motion to and fro, along its surface in particular, steps see little or another one.
-fn bent(value: &Scalar, steps: &[Step]) -> Option<String> {
-    let at = |time: f64| value.evaluate(time, &[]);
-    let (mut range, mut most, mut longest) = ([at(0.0); 2], [0.0; 2], 0.0);
+fn bent(value: impl Fn(f64) -> f64, steps: &[Step]) -> Option<String> {
+    let (mut range, mut most, mut longest) = ([value(0.0); 2], [0.0; 2], 0.0);
     for step in steps {
         // Beside a jump at the start of the step, the last digits of times matter.
-        let of_step = course(at, [step.start() + BESIDE * step.length, step.time], PARTS);
+        let of_step = course(&value, [step.start() + BESIDE * step.length, step.time], PARTS);
         if of_step.bend > most[0] {
             most = [of_step.bend, step.time];
         }
@@ -203,8 +294,8 @@ fn resolving(kinks: &[f64], longest: f64) -> f64 {
 }
 
 /// Words where adaptive steps of at least this length in s pass over kinks between which a value has most of its size.
-fn passed_over(value: &Scalar, kinks: &[f64], shortest: f64) -> Option<String> {
-    let size = |time: f64| value.evaluate(time, &[]).abs();
+fn passed_over(value: impl Fn(f64) -> f64, kinks: &[f64], shortest: f64) -> Option<String> {
+    let size = |time: f64| value(time).abs();
     let (mut seen, mut largest, mut landed) = (0.0, [0.0; 2], 0.0);
     for &kink in kinks {
         if size(kink) > largest[0] {
@@ -244,7 +335,7 @@ mod tests {
         );
         let job =
             Job::from_text(&text, "job.toml", Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}")).job;
-        warnings(&job, &steps::landings(&job))
+        warnings(&job, &steps::landings(&job), &[[0.5, 0.5], [1.0, 1.0]])
     }
 
     fn triangle(start: f64, width: f64) -> String {
@@ -275,6 +366,32 @@ mod tests {
         for value in resolved {
             assert!(warned(&fixed("implicit_euler"), &value, "").is_empty(), "{value}");
             assert!(warned(ADAPTIVE, &value, "").is_empty(), "{value}");
+        }
+    }
+
+    #[test]
+    fn a_load_that_changes_between_ends_of_steps_is_warned_of_wherever_it_acts() {
+        let dense = "density = 1.0";
+        for scheme in ["implicit_euler", "bdf2"] {
+            // Seen at its least values only, beside an offset.
+            let offset = warned(&fixed(scheme), "1000 + 900*sin(10*pi*t)^2", dense);
+            expect(&offset, "of its largest change since the start 8.5");
+            // At one place of two.
+            let there = warned(&fixed(scheme), "sin(10*pi*t)^2*(x > 0.7)", dense);
+            expect(&there, "at [1.0, 1.0] m of its largest magnitude");
+        }
+        // A pulse whose tail is not zero at the end.
+        let pulse = "exp(-((t - 0.7)/0.02)^2)";
+        expect(&warned(&fixed("implicit_euler"), pulse, dense), "its impulse over the steps to t = 7.0");
+        for resolved in [
+            "1000 + 50*sin(10*pi*t)^2",
+            "1 + t",
+            "sin(pi*t)*x",
+            "5*step(t - 0.513)",
+            "exp(-((t - 0.7)/0.3)^2)",
+            "2*exp(-t)",
+        ] {
+            assert_eq!(warned(&fixed("implicit_euler"), resolved, dense), [""; 0], "{resolved}");
         }
     }
 

@@ -14,7 +14,11 @@ use super::{
 use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
-    io::output::{inventory::Inventory, probed, probes::Probes},
+    io::output::{
+        inventory::Inventory,
+        probed,
+        probes::{self, Probes},
+    },
     job::Loaded,
     linear_algebra::petsc::set_option,
     mesh::Mesh,
@@ -66,6 +70,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     warnings.extend(bonds::warnings(session, job, &body));
     warnings.extend(parts::warnings(session, job, &body.mesh));
     warnings.extend(loads::warnings(session, job, &body));
+    warnings.extend(probes::warning(session, &body.mesh, &job.output)?);
     warnings.extend(touching::warning(session, job, &body.mesh)?);
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);
     warnings.extend(side_words::warnings_of_changes(&earlier, &body.pairs));

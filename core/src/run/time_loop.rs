@@ -86,7 +86,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     began_from.for_each(|state| log.line(&state.words));
     let start_state = identity.start_state.clone();
     header::lines(loaded, &ready, clock.logs_every_step).iter().for_each(|line| log.line(line));
-    header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
+    header::warnings(session, loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let warned = log.warnings().len();
     restored.iter().flat_map(|restored| &restored.warnings).for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;

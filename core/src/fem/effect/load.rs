@@ -6,7 +6,7 @@ use crate::{
     fem::space::{CellShape, Geometry, cell_rule, facet_points, fine_cell_rule},
     job::{BodyForce, Scalar},
     laws::material::ByMaterial,
-    linear_algebra::tensor::{Vector, add_scaled},
+    linear_algebra::tensor::{Vector, add_scaled, norm},
     mesh::Mesh,
 };
 
@@ -50,11 +50,7 @@ impl Traction {
         for &facet in &self.facets {
             let (nodes, points) = facet_points(mesh, facet);
             for point in points {
-                let mut value = evaluate(&self.value, time, &point.place, "traction")?;
-                if let Some(pressure) = &self.pressure {
-                    let pressure = finite(pressure, time, &point.place, || "traction: the pressure".into())?;
-                    value = add_scaled(&value, -pressure, &point.normal);
-                }
+                let value = self.at(time, &point.place, &point.normal)?;
                 for (node, share) in nodes.clone().zip(point.shares) {
                     visit(node, value.map(|value| point.weight * share * value));
                 }
@@ -62,6 +58,64 @@ impl Traction {
         }
         Ok(())
     }
+
+    /// The traction in Pa at a place with this outward normal.
+    fn at<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> Result<Vector<D>> {
+        let value = evaluate(&self.value, time, place, "traction")?;
+        let Some(pressure) = &self.pressure else { return Ok(value) };
+        let pressure = finite(pressure, time, place, || "traction: the pressure".into())?;
+        Ok(add_scaled(&value, -pressure, normal))
+    }
+
+    /// By how much the forces on the facets of this rank differ at `time` from the means of the traction over many parts of each facet, and the sum of
+    /// the magnitudes of the latter, in N.
+    pub fn error_of_rule<const D: usize>(&self, mesh: &Mesh<D>, time: f64) -> Result<[f64; 2]> {
+        let parts = parts::<D>();
+        let mut sums = [0.0; 2];
+        for &facet in &self.facets {
+            let (mut force, mut area, mut normal) = ([0.0; D], 0.0, [0.0; D]);
+            for point in facet_points(mesh, facet).1 {
+                force = add_scaled(&force, point.weight, &self.at(time, &point.place, &point.normal)?);
+                normal = add_scaled(&normal, point.weight, &point.normal);
+                area += point.weight;
+            }
+            if area <= 0.0 {
+                continue;
+            }
+            let (corners, normal) = (mesh.facet_corners(facet), normal.map(|x| x / area));
+            let mut mean = [0.0; D];
+            for shares in &parts {
+                let place = corners
+                    .iter()
+                    .zip(shares)
+                    .fold([0.0; D], |at, (corner, share)| add_scaled(&at, *share, corner));
+                mean = add_scaled(&mean, 1.0 / parts.len() as f64, &self.at(time, &place, &normal)?);
+            }
+            sums[0] += norm(&add_scaled(&force, -area, &mean));
+            sums[1] += area * norm(&mean);
+        }
+        Ok(sums)
+    }
+}
+
+/// The shares of the corners of a facet in the centres of equal parts of it: 16 of an edge, 16 triangles of a face.
+fn parts<const D: usize>() -> Vec<Vector<D>> {
+    let mut found = Vec::new();
+    let mut add = |[own, other]: [f64; 2]| {
+        found.push(std::array::from_fn(|corner| [1.0 - own - other, own, other][corner]));
+    };
+    if D == 2 {
+        (0..16).for_each(|i| add([(f64::from(i) + 0.5) / 16.0, 0.0]));
+    } else {
+        for (i, j) in (0..4).flat_map(|i| (0..4 - i).map(move |j| (i, j))) {
+            // Triangles that stand on a side, and beside them those that stand on a corner.
+            add([i, j].map(|at| (f64::from(at) + 1.0 / 3.0) / 4.0));
+            if i + j < 3 {
+                add([i, j].map(|at| (f64::from(at) + 2.0 / 3.0) / 4.0));
+            }
+        }
+    }
+    found
 }
 
 /// All loads of a job.
@@ -216,6 +270,23 @@ pub(super) fn finite<const D: usize>(
 mod tests {
     use super::*;
     use crate::job::Expression;
+
+    fn centres_are_spread_evenly<const D: usize>() {
+        let parts = parts::<D>();
+        assert_eq!(parts.len(), 16);
+        for corner in 0..D {
+            let mean = parts.iter().map(|shares| shares[corner]).sum::<f64>() / 16.0;
+            assert!((mean - 1.0 / D as f64).abs() < 1e-15, "{corner}: {mean}");
+        }
+        let least = parts.iter().flatten().copied().fold(1.0, f64::min);
+        assert!(least > 0.0 && parts.iter().all(|shares| (shares.iter().sum::<f64>() - 1.0).abs() < 1e-15));
+    }
+
+    #[test]
+    fn centres_of_parts_of_facets_are_spread_evenly() {
+        centres_are_spread_evenly::<2>();
+        centres_are_spread_evenly::<3>();
+    }
 
     #[test]
     fn loads_are_steady_where_neither_tractions_nor_body_forces_depend_on_time() {

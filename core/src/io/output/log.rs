@@ -29,6 +29,8 @@ pub(crate) struct Log {
     /// When the last line of a step was printed.
     stepped: Option<Instant>,
     file: Option<File>,
+    /// The lines so far, until they are written to the file.
+    early: Option<Vec<String>>,
     bar: Option<ProgressBar>,
     warnings: Vec<String>,
 }
@@ -36,7 +38,8 @@ pub(crate) struct Log {
 impl Log {
     /// A log that writes on rank 0 only and has no file yet; without `on_terminal` its lines go to the file only.
     pub(crate) fn new(is_active: bool, on_terminal: bool) -> Self {
-        Self { is_active, on_terminal, stepped: None, file: None, bar: None, warnings: Vec::new() }
+        let early = Some(Vec::new());
+        Self { is_active, on_terminal, stepped: None, file: None, early, bar: None, warnings: Vec::new() }
     }
 
     /// Locks this file for the run, as long as the log exists; creates a missing one if `create` is set.
@@ -58,12 +61,13 @@ impl Log {
         Ok(())
     }
 
-    /// Writes to the file from now on; appends to it if the run continues an earlier one.
+    /// Writes to the file from now on, the lines so far first; appends to it if the run continues an earlier one.
     pub(crate) fn open(&mut self, path: &Path, is_restart: bool) -> Result<()> {
-        match &self.file {
-            Some(file) if !is_restart => file.set_len(0).map_err(|e| Error::unwritable(path, e)),
-            _ => Ok(()),
+        if let Some(file) = self.file.as_ref().filter(|_| !is_restart) {
+            file.set_len(0).map_err(|e| Error::unwritable(path, e))?;
         }
+        self.early.take().into_iter().flatten().for_each(|line| self.file_line(&line));
+        Ok(())
     }
 
     /// Writes lines.
@@ -119,7 +123,9 @@ impl Log {
     }
 
     fn file_line(&mut self, words: &str) {
-        if let Some(file) = &mut self.file {
+        if let Some(early) = &mut self.early {
+            early.push(words.to_owned());
+        } else if let Some(file) = &mut self.file {
             // A failed write to the log must not end the run.
             let _ = writeln!(file, "{words}");
         }

@@ -47,7 +47,7 @@ impl<const D: usize> Probes<D> {
     pub(crate) fn locate(session: &Session, mesh: &Mesh<D>, output: &Output) -> Result<Self> {
         let mut found = Vec::new();
         for Probe { name, point } in &output.probe {
-            let point = std::array::from_fn(|i| point.get(i).copied().unwrap_or(0.0));
+            let point = place_of(point);
             let here = find(mesh, &point);
             let mine = here.as_ref().map_or(f64::MAX, |(cell, _)| f64::from(mesh.cell_ids[*cell]));
             let lowest = -session.largest([-mine])[0];
@@ -142,27 +142,68 @@ impl<const D: usize> Probes<D> {
     }
 }
 
+/// A warning about probes where bodies touch, of which one is taken. Collective, the same on all ranks.
+pub(crate) fn warning<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    output: &Output,
+) -> Result<Option<String>, Agreed> {
+    if output.probe.is_empty() {
+        return Ok(None);
+    }
+    let of_node = mesh.bodies(session)?.of_nodes(mesh);
+    let mut between = Vec::new();
+    for Probe { name, point } in &output.probe {
+        let place = place_of(point);
+        let cells = (0..mesh.cell_count()).filter(|cell| in_cell(mesh, *cell, &place).is_some());
+        let bodies = cells.filter_map(|cell| of_node[mesh.cell(cell)[0] as usize]).map(f64::from);
+        let [first, last] = bodies.fold([f64::INFINITY, f64::NEG_INFINITY], |[first, last], body| {
+            [first.min(body), last.max(body)]
+        });
+        let [first, last] = session.largest([-first, last]);
+        if -first < last {
+            between.push(format!("\"{name}\""));
+        }
+    }
+    Ok((!between.is_empty()).then(|| {
+        format!(
+            "output.probe: where {} lie{}, bodies touch: values are those of the body that comes first in the mesh; move such points a little \
+             into the body that is meant",
+            between.join(", "),
+            if between.len() == 1 { "s" } else { "" }
+        )
+    }))
+}
+
+/// The point of a probe.
+fn place_of<const D: usize>(point: &[f64]) -> Vector<D> {
+    std::array::from_fn(|i| point.get(i).copied().unwrap_or(0.0))
+}
+
 /// The first cell around a point, and its nodes with the values of their shape functions there.
 fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<ProbedCell> {
-    (0..mesh.cell_count()).find_map(|number| {
-        let nodes: Vec<Vector<D>> = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]).collect();
-        let outside = (0..D).any(|i| {
-            let along = nodes.iter().map(|node| node[i]);
-            let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-            // A curved edge goes beyond its nodes, by less than its length.
-            let slack = (high - low) * if mesh.is_curved { 1.0 } else { 1e-9 };
-            point[i] < low - slack || point[i] > high + slack
-        });
-        if outside {
-            return None;
-        }
-        let place = place(&nodes, point)?;
-        let shares = match mesh.order() {
-            1 => place.to_vec(),
-            _ => values(D + 1, &place).to_vec(),
-        };
-        Some((number, mesh.cell_nodes(number).zip(shares).collect()))
-    })
+    (0..mesh.cell_count()).find_map(|number| in_cell(mesh, number, point))
+}
+
+/// The same of one cell, if the point is in it.
+fn in_cell<const D: usize>(mesh: &Mesh<D>, number: usize, point: &Vector<D>) -> Option<ProbedCell> {
+    let nodes: Vec<Vector<D>> = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]).collect();
+    let outside = (0..D).any(|i| {
+        let along = nodes.iter().map(|node| node[i]);
+        let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+        // A curved edge goes beyond its nodes, by less than its length.
+        let slack = (high - low) * if mesh.is_curved { 1.0 } else { 1e-9 };
+        point[i] < low - slack || point[i] > high + slack
+    });
+    if outside {
+        return None;
+    }
+    let place = place(&nodes, point)?;
+    let shares = match mesh.order() {
+        1 => place.to_vec(),
+        _ => values(D + 1, &place).to_vec(),
+    };
+    Some((number, mesh.cell_nodes(number).zip(shares).collect()))
 }
 
 /// Barycentric coordinates of a point in the cell with these nodes, if it is inside.

@@ -52,3 +52,4 @@ pub use step_error::{Norms, StepError};
 pub use step_length::{Breakpoint, Forgets, Landing, Landings, TIME_TOLERANCE, without_rounding};
 pub use step_range::StepRange;
 pub use stepper::{MatrixOfStep, Stepper, StepperSettings};
+pub use time_dependent_data::sample_points;

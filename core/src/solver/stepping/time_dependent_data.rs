@@ -226,7 +226,7 @@ impl<const D: usize> TimeDependentExpression<D> {
 }
 
 /// The centre of the body's bounding box, its corners, and the centres of its sides, edges and faces. Collective.
-fn sample_points<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> Vec<Vector<D>> {
+pub fn sample_points<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> Vec<Vector<D>> {
     let mut mine = [[f64::NEG_INFINITY; D]; 2];
     for node in nodes {
         for i in 0..D {
