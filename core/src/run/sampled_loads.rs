@@ -21,8 +21,11 @@ const LEAST_SEEN: f64 = 0.5;
 const WORTH_SEEING: f64 = 0.1;
 /// Share of the largest impulse by which that over the steps may differ after the load has ended; and of the largest way of a support.
 const WRONG_IMPULSE: f64 = 0.1;
-/// How many times as wrong the impulse of a load may be while it acts.
-const WHILE_IT_ACTS: f64 = 2.0;
+/// A load has ended where it is below this share of its largest magnitude.
+const FADED: f64 = 1e-3;
+/// Values at a place below this share of those at others are rounding errors, and the times at which they are compared.
+const ROUNDING: f64 = 1e-9;
+const TIMES: u32 = 64;
 /// Share of all its change by which the place of an obstacle or a friction coefficient may be off a straight line within a step, the share of
 /// a step behind its start at which it counts as that at the start, and the parts of a step in which it is seen.
 const BENT: f64 = 0.05;
@@ -62,8 +65,14 @@ pub(super) fn warnings<const D: usize>(job: &Job, landings: &Landings, places: &
             } else {
                 (MOST_STEPS as usize / steps.len().max(1)).max(1)
             };
+            let size = |place: &Vector<D>| {
+                let times = (0..=TIMES).map(|at| landings.end * f64::from(at) / f64::from(TIMES));
+                times.map(|time| load.value.evaluate(time, place).abs()).fold(0.0, f64::max)
+            };
+            let least = ROUNDING * places.iter().map(size).fold(0.0, f64::max);
             places
                 .iter()
+                .filter(|place| size(place) > least)
                 .take(few)
                 .find_map(|place| words(place).map(|words| format!("at {place:?} m {words}")))
         } else {
@@ -218,7 +227,7 @@ impl Sampled {
                     self.ended
                 ))
             }
-            Kind::Force if error > WHILE_IT_ACTS => Some(format!(
+            Kind::Force if error > 1.0 && self.last.abs() <= FADED * self.magnitude.largest[0] => Some(format!(
                 "its impulse over the steps is {found} for {right}, because they are too long for its changes: choose a time.step of at most {step:.1e} s, or \
                  [time.adaptive]"
             )),
@@ -361,6 +370,8 @@ mod tests {
             "1 + t",
             "sin(pi*t)*x",
             "5*step(t - 0.513)",
+            "1 + 1000*t",
+            "(1 + 1000*t)*cos(pi*x)",
             "exp(-((t - 0.7)/0.3)^2)",
             "2*exp(-t)",
         ] {
