@@ -26,8 +26,10 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     let mut out = Vec::new();
     for (number, (traction, table)) in body.load.tractions.iter().zip(&job.traction).enumerate() {
         let mut mine = [0.0; 4];
-        let depends_on_place = table.value.iter().chain(&table.pressure).any(Scalar::depends_on_position);
-        for at in 0..=TIMES {
+        let values = || table.value.iter().chain(&table.pressure);
+        let depends_on_place = values().any(Scalar::depends_on_position);
+        let last = if values().any(Scalar::depends_on_time) { TIMES } else { 0 };
+        for at in 0..=last {
             let time = job.time.end * f64::from(at) / f64::from(TIMES);
             // A step at which the traction is no number ends the run with the reason.
             let _ = traction.forces(&body.mesh, time, |node, force| {

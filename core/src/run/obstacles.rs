@@ -409,11 +409,9 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
     let displacement = body.seen_by_contacts(&absolute);
     let size = longest_side(session, &body.mesh.nodes);
     let is_worn = job.contact.iter().any(|table| table.wear.is_some());
-    let deepest = |contact: &Contact<D>| {
-        let Closeness { penetration, held, .. } = contact.closeness.of_all(session);
-        larger(penetration, held)
-    };
-    let of_contacts = body.contacts.iter().map(deepest).fold(0.0, larger);
+    let closeness: Vec<Closeness> =
+        body.contacts.iter().map(|contact| contact.closeness.of_all(session)).collect();
+    let of_contacts = closeness.iter().fold(0.0, |most, of| larger(most, larger(of.penetration, of.held)));
     let mut out = Vec::new();
     for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
         let Closeness {
@@ -428,7 +426,7 @@ pub(super) fn warnings_of_run<const D: usize, const S: usize>(
             shift_to_spread,
             inclination,
             ejection,
-        } = contact.closeness.of_all(session);
+        } = closeness[number];
         let on = table.on.join(", ");
         if slip > LARGEST_SLIP && table.sliding == Sliding::Small {
             out.push(format!(

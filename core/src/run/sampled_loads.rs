@@ -109,7 +109,7 @@ struct Peak {
 }
 
 impl Peak {
-    fn from(from: f64) -> Self {
+    fn away_from(from: f64) -> Self {
         Self { from, largest: [0.0; 2], seen: 0.0 }
     }
 
@@ -145,8 +145,8 @@ struct Sampled {
 impl Sampled {
     fn by(value: impl Fn(f64) -> f64, formula: fn(Step) -> Blend, steps: &[Step], kinks: &[f64]) -> Self {
         let mut found = Self {
-            magnitude: Peak::from(0.0),
-            change: Peak::from(value(0.0)),
+            magnitude: Peak::away_from(0.0),
+            change: Peak::away_from(value(0.0)),
             impulses: [0.0; 3],
             last: 0.0,
             longest: 0.0,

@@ -151,7 +151,11 @@ pub(crate) fn warning<const D: usize>(
     if output.probe.is_empty() {
         return Ok(None);
     }
-    let of_node = mesh.bodies(session)?.of_nodes(mesh);
+    let bodies = mesh.bodies(session)?;
+    if bodies.count < 2 {
+        return Ok(None);
+    }
+    let of_node = bodies.of_nodes(mesh);
     let mut between = Vec::new();
     for Probe { name, point } in &output.probe {
         let place = place_of(point);
