@@ -12,7 +12,7 @@ use clarke::{
 };
 
 /// A place turned by an angle in degrees about an axis.
-fn turned<const D: usize>(place: &Vector<D>, axis: &Vector<3>, degrees: f64) -> Vector<D> {
+pub fn turned<const D: usize>(place: &Vector<D>, axis: &Vector<3>, degrees: f64) -> Vector<D> {
     let x: Vector<3> = std::array::from_fn(|i| place.get(i).copied().unwrap_or(0.0));
     let axis = axis.map(|a| a / norm(axis));
     let (sine, cosine) = degrees.to_radians().sin_cos();

@@ -1,7 +1,9 @@
 //! Resultants of scenes whose forces, pressures and areas are known.
 
 use super::{
-    World, run_on,
+    World,
+    corners::turned,
+    run_on,
     scenes::{any_mesh, brick, crossed, simulation, supports},
 };
 use clarke::{
@@ -167,6 +169,51 @@ fn parts_of_boundaries_are_loaded_by_the_facets_whose_centres_belong_to_them() {
             parts::<3, 6>(&session, &brick([3, 2, 2]), order);
         }
         refused(&session);
+    });
+}
+
+/// A turned block between `normal` supports, pressed on one of them: each takes its own share of the reaction where they meet, in any
+/// order. The mesh has 1.2 m by 1 m or 1 m by 0.8 m below the pressure.
+fn corner<const D: usize, const S: usize>(session: &Session, mut mesh: GlobalMesh<D>) {
+    let axis = if D == 2 { [0.0, 0.0, 1.0] } else { [0.3, -0.2, 1.0] };
+    let way = |vector: [f64; D]| turned(&vector, &axis, 25.0);
+    mesh.nodes.iter_mut().for_each(|place| *place = way(*place));
+    let up = way(std::array::from_fn(|i| if i == D - 1 { 1.0 } else { 0.0 }));
+    let hypothesis = if D == 2 { "hypothesis = \"plane_strain\"\n" } else { "" };
+    let sides = if D == 2 { vec!["bottom", "left"] } else { vec!["bottom", "left", "front"] };
+    for first in 0..sides.len() {
+        let mut sides = sides.clone();
+        sides.rotate_left(first);
+        let support = |side: &&str| format!("[[support]]\non = [\"{side}\"]\nfix = \"normal\"\n");
+        let text = format!(
+            "{}[time]\nscheme = \"implicit_euler\"\nend = 0.02\nstep = 0.01\n[solver]\ntolerance = 1e-13\n\
+             [material]\n{hypothesis}elasticity = {{ youngs_modulus = 100, poisson_ratio = 0.3 }}\n\
+             viscosity = {{ volumetric = 1, shear = 4 }}\n{}\
+             [[traction]]\non = [\"top\"]\nvalue = {:?}\n[[contact]]\non = [\"top\"]\nnormal.unilateral.gap = 1.0\n",
+            any_mesh::<D>(),
+            sides.iter().map(support).collect::<String>(),
+            up.map(|x| -3.0 * x),
+        );
+        let (rows, _) = last::<D, S>(session, &mesh, &text);
+        let area = if D == 2 { 1.2 } else { 0.8 };
+        for (source, force, _) in rows {
+            let carried = match source {
+                Source::Support(at) if sides[at] == "bottom" => 3.0 * area,
+                Source::Traction(_) => -3.0 * area,
+                _ => 0.0,
+            };
+            for (found, along) in force.into_iter().zip([up[0], up[D - 1]]) {
+                close(found, carried * along, &format!("{source:?} of {sides:?}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn supports_along_normals_share_the_reaction_of_a_corner() {
+    run_on(&[1, 2, 3], |World { session, .. }| {
+        corner::<2, 4>(&session, crossed([4, 3]));
+        corner::<3, 6>(&session, brick([3, 2, 2]));
     });
 }
 

@@ -5,7 +5,7 @@ use super::{
     coupling::Coupling,
     effect::{ContactAreas, Form, Supports, SurfaceForce},
     pairs::{Pair, is_exchanged, pair_of},
-    space::Held,
+    space::INDEPENDENT,
     state::State,
 };
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
     job::Support,
     linear_algebra::{
         petsc::DistributedVector,
-        tensor::{Vector, add_scaled},
+        tensor::{Vector, add_scaled, dot, dual_basis, norm, outside},
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -84,10 +84,8 @@ pub struct BalancedMotion<'a> {
 pub struct Resultants<const D: usize> {
     /// The sources, in the order of the rows.
     pub sources: Vec<Source>,
-    /// Local components that supports hold, in order, each with the first support that holds it.
-    held: Vec<(u32, u32)>,
-    /// Local nodes that supports hold in directions other than axes, ascending, each with the first support that holds it.
-    slanted: Vec<(u32, u32)>,
+    /// The directions in which supports hold local nodes, by node.
+    holds: Vec<Hold<D>>,
     /// For each local node its share of the mass and of the first moments of mass of this rank's cells; empty without inertia.
     masses: Vec<(f64, Vector<D>)>,
     /// The same of the force on a body that moves at 1 m/s, where damping by the mass resists it.
@@ -110,35 +108,8 @@ impl<const D: usize> Resultants<D> {
         supports: &[Support],
     ) -> Result<Self, Agreed> {
         let mesh = &body.mesh;
-        let (mut first, mut holder) = (vec![None; mesh.nodes.len() * D], vec![None; mesh.nodes.len()]);
-        for (at, support) in supports.iter().enumerate() {
-            let Supports { held, .. } = session.agree(Supports::new(
-                session,
-                mesh,
-                std::slice::from_ref(support),
-                &state.velocity,
-            ))?;
-            let components = first.iter_mut().zip(held.flags()).filter(|(_, holds)| **holds);
-            components.for_each(|(first, _)| *first = first.or(Some(at as u32)));
-            let holds = |node: &usize| held.free_count(*node) < D;
-            for node in (0..mesh.nodes.len()).filter(holds) {
-                holder[node] = holder[node].or(Some(at as u32));
-            }
-        }
-        // Forces on the axis of a body of revolution across it are balanced all around.
-        let is_held_alone = |(component, _): &(usize, &Option<u32>)| {
-            let is_balanced = component % D == 0 && mesh.is_on_axis(&mesh.nodes[component / D]);
-            body.held.flags()[*component] && !is_balanced
-        };
-        let held: Vec<(u32, u32)> = first
-            .iter()
-            .enumerate()
-            .filter(is_held_alone)
-            .filter_map(|(at, support)| Some((at as u32, support.or(holder[at / D])?)))
-            .collect();
-        let slanted: Vec<(u32, u32)> =
-            body.held.slanted().iter().filter_map(|at| Some((at.node, holder[at.node as usize]?))).collect();
-        let has_held = |node: &u32| holder[*node as usize].is_some();
+        let holds = holds(session, body, state, supports)?;
+        let has_held = |node: &u32| holds.binary_search_by_key(node, |hold| hold.node).is_ok();
         let cell_has_held = |cell: usize| mesh.cell_nodes(cell).any(|node| has_held(&node));
         let runs = body.geometry.runs.iter();
         body.request_support_forces(
@@ -166,8 +137,7 @@ impl<const D: usize> Resultants<D> {
         let sums = vec![0.0; sources.len() * Resultant::<D>::WIDTH + body.contacts.len() * AREAS];
         Ok(Self {
             sources,
-            held,
-            slanted,
+            holds,
             masses,
             drags,
             steady: None,
@@ -221,11 +191,11 @@ impl<const D: usize> Resultants<D> {
         motion: BalancedMotion<'_>,
         load: Option<&DistributedVector>,
     ) -> Result<()> {
-        let Self { sources, held, slanted, masses, drags, steady, surface, sums, largest } = self;
+        let Self { sources, holds, masses, drags, steady, surface, sums, largest } = self;
         let mesh = &body.mesh;
         let (resultants, areas) = sums[0].split_at_mut(sources.len() * Resultant::<D>::WIDTH);
         resultants.fill(0.0);
-        let mut sums = Sums { sources, held, slanted, directions: &body.held, mesh, values: resultants };
+        let mut sums = Sums { sources, holds, mesh, values: resultants };
         let BalancedMotion { time, displacement, velocity, before, length } = motion;
         let (displacement, velocity, before) = (displacement.local()?, velocity.local()?, before.local()?);
         if let Some(load) = load {
@@ -240,7 +210,7 @@ impl<const D: usize> Resultants<D> {
             }
             sums.react_to_all(&load);
         }
-        if !(held.is_empty() && slanted.is_empty()) {
+        if !holds.is_empty() {
             let velocities = [&velocity[..], &before[..]];
             body.with_support_forces(velocities, length, |forces| sums.react_to_all(forces));
         }
@@ -277,6 +247,64 @@ impl<const D: usize> Resultants<D> {
     }
 }
 
+/// A direction in which a support holds a node and no support before it does.
+#[derive(Debug)]
+struct Hold<const D: usize> {
+    /// Local number.
+    node: u32,
+    /// Position in the job.
+    support: usize,
+    /// Unit vector.
+    direction: Vector<D>,
+    /// The vector whose product with a force is the part along this direction of what supports take of it.
+    dual: Vector<D>,
+}
+
+/// The directions in which supports hold local nodes: of each support its own, so that it takes no force in which it does not hold.
+/// Collective.
+fn holds<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    state: &State,
+    supports: &[Support],
+) -> Result<Vec<Hold<D>>, Agreed> {
+    let Body { mesh, held, .. } = body;
+    let mut directions = Vec::new();
+    // Forces on the axis of a body of revolution across it are balanced all around.
+    let radial: Vector<D> = std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 });
+    let on_axis = (0..mesh.nodes.len()).filter(|node| mesh.is_on_axis(&mesh.nodes[*node]));
+    directions.extend(on_axis.map(|node| (node, None, radial)));
+    for (at, support) in supports.iter().enumerate() {
+        let alone = Supports::new(session, mesh, std::slice::from_ref(support), &state.velocity);
+        let alone = session.agree(alone)?.held;
+        for node in 0..mesh.nodes.len() {
+            let (frame, free) = alone.frame(node);
+            directions.extend(frame[free..].iter().map(|direction| (node, Some(at), *direction)));
+        }
+    }
+    directions.sort_by_key(|(node, ..)| *node);
+    let mut holds = Vec::new();
+    for at_node in directions.chunk_by(|a, b| a.0 == b.0) {
+        let (mut span, mut independent, mut owners) = (Vec::new(), Vec::new(), Vec::new());
+        for (node, support, direction) in at_node {
+            // Boundaries with one normal where they meet hold along this one.
+            let part = add_scaled(direction, -1.0, &held.free_part(*node, direction));
+            let length = norm(&part);
+            let part = part.map(|x| x / length);
+            if let Some(rest) = outside(&part, &span, INDEPENDENT).filter(|_| length > INDEPENDENT) {
+                span.push(rest);
+                independent.push(part);
+                owners.push(support);
+            }
+        }
+        let duals = dual_basis(&independent, 0.0).into_iter().flatten();
+        holds.extend(owners.iter().zip(independent).zip(duals).filter_map(|((owner, direction), dual)| {
+            Some(Hold { node: at_node[0].0 as u32, support: (**owner)?, direction, dual })
+        }));
+    }
+    Ok(holds)
+}
+
 /// For each node its share of a sum that `add` makes of nodal vectors, and of its first moments.
 fn shares_of_nodes<const D: usize>(
     nodes: &[Vector<D>],
@@ -296,9 +324,7 @@ const AREAS: usize = 5;
 /// The resultants of this rank while they are summed.
 struct Sums<'a, const D: usize> {
     sources: &'a [Source],
-    held: &'a [(u32, u32)],
-    slanted: &'a [(u32, u32)],
-    directions: &'a Held<D>,
+    holds: &'a [Hold<D>],
     mesh: &'a Mesh<D>,
     values: &'a mut [f64],
 }
@@ -330,20 +356,14 @@ impl<const D: usize> Sums<'_, D> {
         self.put(source, force, &moment);
     }
 
-    /// Adds a force at a node, and the reactions of the supports that hold components there.
+    /// Adds a force at a node, and the reactions of the supports that hold it.
     fn add_and_react(&mut self, source: Source, node: u32, force: &Vector<D>) {
         self.add(source, node, force);
-        for i in 0..D {
-            let component = node as usize * D + i;
-            if self.directions.flags()[component]
-                && let Ok(at) = self.held.binary_search_by_key(&(component as u32), |held| held.0)
-            {
-                self.react(component, self.held[at].1, force[i]);
-            }
-        }
-        if let Ok(at) = self.slanted.binary_search_by_key(&node, |slanted| slanted.0) {
-            self.react_along_held(self.slanted[at], force);
-        }
+        let first = self.holds.partition_point(|hold| hold.node < node);
+        self.holds[first..]
+            .iter()
+            .take_while(|hold| hold.node == node)
+            .for_each(|hold| self.react(hold, force));
     }
 
     /// The sides of a contact in the job: that of the nodes with the law, and the other one.
@@ -404,26 +424,15 @@ impl<const D: usize> Sums<'_, D> {
 
     /// Adds the reactions of all supports to nodal forces, of all local nodes or of the owned ones.
     fn react_to_all(&mut self, forces: &[f64]) {
-        let (held, slanted) = (self.held, self.slanted);
-        for &(component, support) in held.iter().take_while(|(at, _)| (*at as usize) < forces.len()) {
-            self.react(component as usize, support, forces[component as usize]);
-        }
-        for &at in slanted.iter().take_while(|(node, _)| (*node as usize) * D < forces.len()) {
-            self.react_along_held(at, &std::array::from_fn(|i| forces[at.0 as usize * D + i]));
+        for hold in self.holds.iter().take_while(|hold| (hold.node as usize) * D < forces.len()) {
+            self.react(hold, &std::array::from_fn(|i| forces[hold.node as usize * D + i]));
         }
     }
 
-    /// Adds the reaction of a support to the part of a force along the directions in which it holds a node.
-    fn react_along_held(&mut self, (node, support): (u32, u32), force: &Vector<D>) {
-        let free = self.directions.free_part(node as usize, force);
-        self.add(Source::Support(support as usize), node, &std::array::from_fn(|i| free[i] - force[i]));
-    }
-
-    /// Adds the reaction of a support to a force at a component that it holds.
-    fn react(&mut self, component: usize, support: u32, force: f64) {
-        let mut reaction = [0.0; D];
-        reaction[component % D] = -force;
-        self.add(Source::Support(support as usize), (component / D) as u32, &reaction);
+    /// Adds the reaction of a support to a force, along a direction in which it holds the node.
+    fn react(&mut self, hold: &Hold<D>, force: &Vector<D>) {
+        let reaction = -dot(&hold.dual, force);
+        self.add(Source::Support(hold.support), hold.node, &hold.direction.map(|x| reaction * x));
     }
 
     /// Adds the tractions, the reactions that supports have taken over, and as body forces the rest of the nodal loads at owned nodes.

@@ -3,7 +3,7 @@
 use super::load::finite;
 use crate::{
     error::{Error, Result},
-    fem::space::{Held, SurfacePoint, facets, surface_points},
+    fem::space::{Held, INDEPENDENT, SurfacePoint, facets, surface_points},
     job::{Fix, FixedDirections, Scalar, Support},
     laws::{quadrature::rule, step::Step},
     linear_algebra::{
@@ -15,8 +15,6 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// A unit direction with a smaller part outside of the span of others depends on them.
-const INDEPENDENT: f64 = 1e-9;
 /// Share of the first step over which the initial velocity of moving supports is found.
 const START_SHARE: f64 = 1e-4;
 

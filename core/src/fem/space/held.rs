@@ -4,7 +4,7 @@ use super::surface::{FACE_AND_MIRROR_IMAGE, SurfacePoint};
 use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm, outside};
 
 /// A unit direction with a smaller part outside of a span is in this span.
-const INDEPENDENT: f64 = 1e-9;
+pub const INDEPENDENT: f64 = 1e-9;
 
 /// The parts of nodal vectors that supports hold: components along axes, and directions that are not along an axis.
 #[derive(Debug, Clone, PartialEq, Default)]

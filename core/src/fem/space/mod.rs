@@ -17,7 +17,7 @@ mod surface;
 pub use assembly::{CellMatrix, assemble, assemble_numbers};
 pub use batch::{Batch, Inputs, Integrity, Needs, Nodal};
 pub use geometry::{Cell, CellRun, CellShape, Geometry, Simplex, SimplexPack};
-pub use held::{Held, Slanted};
+pub use held::{Held, INDEPENDENT, Slanted};
 pub use kernels::NodalPacks;
 pub use linear_subspace::linear_subspace;
 pub use quadratic::{
