@@ -12,7 +12,7 @@
 //! of these times, unless it came through a surface that faces the same way as the boundary, or the steps resolve the motion: the depths at
 //! the ends of the step and of a neighbour show this depth, up to a share of their differences. A motion that they resolve may touch between
 //! their ends, with an error that is that of the scheme. A point that touches at an end is not missed there; it must be deeper than in the
-//! obstacle at rest, and than these depths differ. An obstacle that jumps as the step begins takes a point with it that it touches at the
+//! obstacle at rest, and than these depths differ or bend from one step to the next, as under a roller that starts or stops. An obstacle that jumps as the step begins takes a point with it that it touches at the
 //! end: its depth right after the jump, less and less until the end of the step, is none of these depths.
 
 use super::obstacles::Gap;
@@ -37,6 +37,8 @@ const HALVINGS_TO_ENTRY: usize = 30;
 const FAR: f64 = 0.25;
 /// The share of the differences of depths at the ends of steps up to which they show the depth between them: four steps in a period do.
 const RESOLVED: f64 = 0.1;
+/// The depth within a step over the second difference of the depths at the ends of steps up to which they show it: twice that of a parabola.
+const BENT: f64 = 0.25;
 /// Share of a step within which an obstacle that has moved to a point has jumped there.
 const EARLY: f64 = 0.01;
 /// The half-width for derivatives of the distance, as a share of the coordinates.
@@ -123,6 +125,7 @@ impl Gap {
             way: &|[from, to]| if has_other_side { way(&offset(from), to) } else { 0.0 },
             ends,
             around: &|on| [depth_at(start - length, -on), depth_at(end + length, 1.0 + on)],
+            left_behind: &|| depth_at(end, 0.0),
             // The straight way between two places at a round obstacle lies inside of it even where it rests, wherever it is in the step.
             at_rest: &|| {
                 let at = |time: f64| inner_times().map(|share| depth_at(time, share)).fold(0.0, f64::max);
@@ -181,6 +184,7 @@ impl<const D: usize> GivenGap<D> {
             way: &|_| 0.0,
             ends: [depth_at(*start, 0.0), depth_at(*end, 1.0)],
             around: &|on| [depth_at(start - length, -on), depth_at(end + length, 1.0 + on)],
+            left_behind: &|| depth_at(*end, 0.0),
             at_rest: &|| 0.0,
             is_in_front: &|_| true,
             rounding: ROUNDING * larger(*body_size, larger(before.abs(), after.abs())),
@@ -204,6 +208,8 @@ struct Course<'a> {
     ends: [f64; 2],
     /// At the start of the step before and at the end of the step after, as if both were as long, where the point went on by this share.
     around: &'a dyn Fn(f64) -> [f64; 2],
+    /// At the end of the step if the point has stayed where it was.
+    left_behind: &'a dyn Fn() -> f64,
     /// Largest depth on the way of the point if the obstacle rests.
     at_rest: &'a dyn Fn() -> f64,
     /// Whether the surface that the point meets there is not one behind it, through which the obstacle leaves the body's side.
@@ -234,7 +240,12 @@ impl Course<'_> {
             most - depths.iter().copied().fold(f64::INFINITY, f64::min)
         };
         if touches {
-            return beyond > spread(&[around[0], ends[0], ends[1], around[1]]);
+            // By the motion of the obstacle alone, in the step before, in this one and in the next.
+            let [before, now, next] =
+                [ends[0] - around[0], (self.left_behind)() - ends[0], around[1] - ends[1]];
+            let bend = [now - before, next - now].into_iter().map(f64::abs).filter(|bend| bend.is_finite());
+            let shown = BENT * bend.fold(0.0, f64::max);
+            return beyond > spread(&[around[0], ends[0], ends[1], around[1]]).max(shown);
         }
         // Where one neighbour has a jump, the other one shows the course.
         let sides = [([around[0], ends[0], ends[1]], share), ([around[1], ends[1], ends[0]], 1.0 - share)];
@@ -418,6 +429,24 @@ mod tests {
         assert!(!passes(&belt, [[0.0, 0.0]; 2]), "it moves along itself");
         for gap in driven("-0.3 + 0.25*sin(pi*t/2)^2") {
             assert!(!passes(&gap, rest), "it is inside at the end, which the gap shows: {gap:?}");
+        }
+    }
+
+    #[test]
+    fn a_roller_that_starts_or_stops_presses_the_points_under_it_all_the_time() {
+        for way in ["0.002*max(t, 0)", "0.002*min(t, 1)"] {
+            let centre = vec![expression(way), expression("-0.5")];
+            let roller =
+                Gap::Sphere(Sphere { centre, radius: 0.5, hollow: false, rotation: None, axis: None });
+            let given = expression(&format!("(0.5*x - {way})^2"));
+            for number in -4..=8 {
+                let x = 5e-4 * f64::from(number);
+                let high = |centre: f64| (0.25 - (x - centre) * (x - centre)).sqrt() - 0.5;
+                assert!(!passes(&roller, [0.0, 0.002].map(|centre| [x, high(centre)])), "{way}, {x}");
+                let closed = [0.0, 0.002].map(|centre| (x - centre) * (x - centre));
+                let point = GivenGap { times: [0.0, 1.0], place: [2.0 * x, 0.0], closed, body_size: 1e-4 };
+                assert!(!point.comes_and_goes(&given), "{way}, {x}");
+            }
         }
     }
 
