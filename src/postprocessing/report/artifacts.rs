@@ -3,16 +3,19 @@
 use super::{
     scale::extent,
     table::{ROUNDING, Table},
+    view::{dot, normals},
 };
 use crate::{
     error::{Error, Result},
     fem::effect::ENERGIES,
     io::output::{
         columns::{HISTORY, PROBES, PROFILES, RESULTANTS},
-        field_list::{DISPLACEMENT, SLIDING_VELOCITY, VELOCITY, VON_MISES},
+        field_list::{
+            CONTACT_PRESSURE, CONTACT_TRACTION, DISPLACEMENT, SLIDING_VELOCITY, VELOCITY, VON_MISES,
+        },
         field_snapshot::Snapshot,
     },
-    job::{Job, Loaded},
+    job::{Contact, Job, Loaded},
 };
 use serde_json::Value;
 use std::{
@@ -108,8 +111,8 @@ impl RunFiles {
             let largest = Snapshot::largest(&folder.join("fields.vtkhdf"), &drawn_times(snapshot));
             found.rounding = found.rounding(&largest.unwrap_or_default());
         }
-        let Self { snapshot, rounding, probes, profiles, history, .. } = &mut found;
-        snapshot.iter_mut().for_each(|snapshot| snapshot.clear_below(rounding));
+        let Self { snapshot, rounding, probes, profiles, history, job, .. } = &mut found;
+        snapshot.iter_mut().for_each(|snapshot| complete(snapshot, rounding, job.as_ref()));
         let tables = [probes, profiles, history].into_iter().flatten();
         tables.for_each(|table| table.clear_below(rounding));
         Ok(found)
@@ -150,7 +153,7 @@ impl RunFiles {
     /// The fields at one of their times, without rounding errors.
     pub(super) fn snapshot_at(&self, step: usize) -> Result<Snapshot> {
         let mut snapshot = Snapshot::read_at(&self.folder.join("fields.vtkhdf"), Some(step))?;
-        snapshot.clear_below(&self.rounding);
+        complete(&mut snapshot, &self.rounding, self.job.as_ref());
         Ok(snapshot)
     }
 
@@ -178,6 +181,25 @@ impl RunFiles {
         self.gaps.push(MissingFile { file, why, lacking });
         None
     }
+}
+
+/// Clears rounding errors, up to which size they are, and adds the contact pressure where the file has tractions alone: their part along the
+/// normal, and all of the traction of a node that touches alone. Those of bonds and of contact memory are not pressures.
+fn complete(snapshot: &mut Snapshot, rounding: &BTreeMap<String, f64>, job: Option<&Job>) {
+    snapshot.clear_below(rounding);
+    let Some(tractions) = snapshot.vectors(&CONTACT_TRACTION) else { return };
+    let is_pressed = |contact: &Contact| contact.adhesion.is_none() && contact.memory.is_none();
+    let is_known = job.is_some_and(|job| job.contact.iter().all(is_pressed));
+    if !is_known || snapshot.fields.contains_key(CONTACT_PRESSURE.name) {
+        return;
+    }
+    let nodes: Vec<usize> = (0..tractions.len()).filter(|node| tractions[*node] != [0.0; 3]).collect();
+    let mut pressures = vec![0.0; tractions.len()];
+    for (&node, normal) in nodes.iter().zip(normals(snapshot, &nodes)) {
+        let [along, whole] = [normal, tractions[node]].map(|direction| dot(direction, tractions[node]));
+        pressures[node] = if along.is_nan() { whole.sqrt() } else { along };
+    }
+    snapshot.fields.insert(CONTACT_PRESSURE.name, pressures);
 }
 
 /// The numbers of the times of the field file that are drawn: evenly spaced, the last among them, fewer of a large body.
@@ -213,4 +235,35 @@ fn refuse_other_paths(folder: &Path) -> Result<()> {
         return Ok(());
     }
     refuse(format!("{shown} is not the output folder of a run: it holds none of {}", SIGNS.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_contact_pressure_is_the_part_of_tractions_along_the_normal() {
+        let square = |tractions: [[f64; 3]; 4]| Snapshot {
+            nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+            cells: vec![0, 1, 2, 0, 2, 3],
+            corners: 3,
+            fields: BTreeMap::from([(CONTACT_TRACTION.name, tractions.as_flattened().to_vec())]),
+            ..Snapshot::default()
+        };
+        let text = "[mesh.rectangle]\nsize = [1, 1]\ncells = [1, 1]\n[material]\nhypothesis = 'plane_strain'\n\
+                    elasticity = { youngs_modulus = 1e9, poisson_ratio = 0.3 }\n[time]\nscheme = 'bdf2'\nend = 1\nstep = 0.1\n";
+        let job = Job::from_text(text, "job.toml", Path::new("."), &[]).expect("a job").job;
+        let pressures = |mut snapshot: Snapshot| {
+            complete(&mut snapshot, &BTreeMap::new(), Some(&job));
+            snapshot.values(&CONTACT_PRESSURE).map(<[f64]>::to_vec)
+        };
+        let bottom = [[2.0, -3.0, 0.0], [2.0, 1.0, 0.0], [0.0; 3], [0.0; 3]];
+        assert_eq!(pressures(square(bottom)), Some(vec![3.0, -1.0, 0.0, 0.0]));
+        let corner = [[0.0; 3], [3.0, -4.0, 0.0], [0.0; 3], [0.0; 3]];
+        assert_eq!(pressures(square(corner)), Some(vec![0.0, 5.0, 0.0, 0.0]));
+        let mut known = square(bottom);
+        known.fields.insert(CONTACT_PRESSURE.name, vec![7.0; 4]);
+        assert_eq!(pressures(known), Some(vec![7.0; 4]));
+        assert_eq!(pressures(Snapshot::default()), None);
+    }
 }
