@@ -45,7 +45,14 @@ fn a_run_of_one_step_is_repeated_with_shorter_ones() {
     let case = relaxing("implicit_euler", 1.0).run_and_keep(1);
     assert_holds(&case.results());
     let plain = relaxing("implicit_euler", 1.0).set("output.error_estimate", "false").run_and_keep(1);
-    assert!(plain.results().summary()["error_of_steps"].is_null());
+    let results = plain.results();
+    assert!(results.summary()["error_of_steps"].is_null());
+    assert!(
+        results.number("error_of_mesh") < 1.1e-10,
+        "that by the mesh is estimated at the end of every run"
+    );
+    let log = results.text("run.log");
+    assert!(log.contains("by the steps not estimated: [output] error_estimate = true"), "{log}");
 }
 
 /// A pulse runs through an absorbing end within a few steps.

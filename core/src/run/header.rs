@@ -192,7 +192,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
     log.line(format!("files      {}", job.output_folder().display()));
 }
 
-/// Logs the estimated errors, and what half of them would take.
+/// Logs the estimated errors, and what half of them would take or how they are estimated.
 fn errors(log: &mut Log, job: &Job, summary: &Summary) {
     let Errors { error_of_mesh, doubt_of_mesh, error_of_steps, order_of_steps } = summary.errors;
     let two_digits = |number: f64| {
@@ -222,5 +222,9 @@ fn errors(log: &mut Log, job: &Job, summary: &Summary) {
         };
         let error = percent(error);
         log.line(format!("errors     by the steps {error} of stress and velocity at the end{more}"));
+    } else if !job.output.error_estimate && summary.status == "completed" {
+        log.line(
+            "errors     by the steps not estimated: [output] error_estimate = true repeats the run for it",
+        );
     }
 }

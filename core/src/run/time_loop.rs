@@ -494,12 +494,16 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         result.and_then(|exit| closed.map(|()| exit))
     }
 
-    /// Estimates the errors of the state at the end, if the job asks for them. Collective.
+    /// Estimates the errors of the state at the end: that by the mesh and, if the job asks for it, that by the steps. Collective.
     fn errors(&mut self) -> Result<Errors, Agreed> {
-        let Self { session, began_on: Some((loaded, mesh)), simulation, log, deadline, .. } = self else {
-            return Ok(Errors::default());
+        let Self { session, job, began_on, simulation, log, deadline, .. } = self;
+        let of_mesh = error_of_mesh(session, job, simulation)?;
+        let errors = Errors {
+            error_of_mesh: of_mesh.map(|error| error.relative),
+            doubt_of_mesh: of_mesh.and_then(|error| error.doubt).map(Doubt::words),
+            ..Errors::default()
         };
-        let of_mesh = error_of_mesh(session, &loaded.job, simulation)?;
+        let Some((loaded, mesh)) = began_on else { return Ok(errors) };
         log.quiet_line("errors     the run is repeated with other steps");
         let is_interrupted = || session.stop_requested().is_some() || deadline.passed(session).is_some();
         let of_steps = error_of_steps(session, loaded, (mesh, simulation), is_interrupted)?;
@@ -507,10 +511,9 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             log.line(format!("errors     those of the steps are unknown: {reason}"));
         }
         Ok(Errors {
-            error_of_mesh: of_mesh.map(|error| error.relative),
-            doubt_of_mesh: of_mesh.and_then(|error| error.doubt).map(Doubt::words),
             error_of_steps: of_steps.as_ref().ok().map(|error| error.relative),
             order_of_steps: of_steps.ok().and_then(|error| error.order),
+            ..errors
         })
     }
 

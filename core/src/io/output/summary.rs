@@ -169,11 +169,11 @@ pub struct Summary {
     pub inventory: Inventory,
 }
 
-/// The estimated errors of the state at the end of a run; only with `[output] error_estimate`, and where they are known.
+/// The estimated errors of the state at the end of a run that has completed.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Errors {
-    /// Estimated error of the stress at the end by the mesh, relative: twice the relative error indicator, at most 1; only with `[output]
-    /// error_estimate`, and where it is known.
+    /// Estimated error of the stress at the end by the mesh, relative: twice the relative error indicator, at most 1; missing where a
+    /// material has no elasticity or one by an expression.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of the stress at the end by the mesh, relative")]
     pub error_of_mesh: Option<f64>,
@@ -181,7 +181,8 @@ pub struct Errors {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "why the error by the mesh is uncertain")]
     pub doubt_of_mesh: Option<&'static str>,
-    /// Estimated error of stress and velocity at the end by the time steps, likewise; uncertain where `order_of_steps` is missing.
+    /// Estimated error of stress and velocity at the end by the time steps, relative; only with `[output] error_estimate`, and uncertain where
+    /// `order_of_steps` is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of stress and velocity at the end by the steps, relative")]
     pub error_of_steps: Option<f64>,

@@ -29,9 +29,8 @@ pub struct Output {
     /// then contains the norm over the body and its ratio to the norm of the stress. Every material must have elasticity.
     #[schemars(extend("also" = "remesh, refinement, adaptive mesh"))]
     pub error_indicator: bool,
-    /// Whether the errors of the state at the end are estimated, relative to the state in the norm of energy: that of the stress by
-    /// the mesh, with the error indicator, and that of stress and velocity by the time steps. For the latter the run is repeated
-    /// without output, with steps two and four times as long, which takes about three quarters of its time; where it can't have
+    /// Whether the error of stress and velocity at the end by the time steps is estimated, relative to these in the norm of energy; the
+    /// error of the stress by the mesh, with the error indicator, is estimated at the end of every run. The run is repeated without output, with steps two and four times as long, which takes about three quarters of its time; where it can't have
     /// longer steps, with steps half as long, which takes twice its time. Not included is the error of bodies that slide along each other
     /// with `sliding = "finite"`: what nodes face is found anew after a quarter of a facet, whatever the steps.
     pub error_estimate: bool,
