@@ -253,6 +253,41 @@ fn a_traction_that_changes_within_facets_is_warned_of() {
 }
 
 #[test]
+fn what_changes_within_cells_is_warned_of() {
+    for (key, value, is_wrong) in [
+        ("body_force", "[{ value = [0, '2e4*(abs(x - 0.55) < 0.012)'] }]", true),
+        ("body_force", "[{ value = [0, '2e4*exp(-((x - 0.55)/0.2)^2)*cos(3*t)'] }]", false),
+        ("gravity", "{ acceleration = [0, '-9.81*exp(-((y - 0.5)/0.01)^2)'] }", true),
+        ("gravity", "{ acceleration = [0, '-9.81*(1 + x)'] }", false),
+        ("initial.velocity", "['abs(x - 0.55) < 0.012', 0]", true),
+        ("initial.velocity", "['exp(-((x - 0.5)/0.01)^2)', 0]", true),
+        ("initial.velocity", "['0.1*sin(pi*x)', 'x*y']", false),
+        ("initial.stress", "{ xx = '1e3*(abs(x - 0.5) < 0.012)' }", true),
+        ("initial.stress", "{ xx = '1e3*(1 - y)' }", false),
+    ] {
+        for order in ["1", "2"] {
+            let case = Case::square(10).set("mesh.order", order).set(key, value);
+            let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
+            let said = launch::unwrapped(&outcome.stdout);
+            assert_eq!(
+                said.contains("cells are too large for it"),
+                is_wrong,
+                "{key} = {value}, {order}: {said}"
+            );
+        }
+    }
+    for (flux, is_wrong) in [("1e5*(abs(x - 0.55) < 0.012)", true), ("1e5*x*(1 - x)", false)] {
+        let case = Case::square(10)
+            .set("material.heat", "{ conductivity = 50, capacity = 500 }")
+            .set("initial.temperature", "293")
+            .set("heat", &format!("[{{ on = ['top'], flux = '{flux}' }}]"));
+        let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
+        let said = launch::unwrapped(&outcome.stdout);
+        assert_eq!(said.contains("heat.0: facets are too large for it"), is_wrong, "{flux}: {said}");
+    }
+}
+
+#[test]
 fn a_probe_where_bodies_touch_is_warned_of() {
     let blocks = "[{ name = 'lower', size = [2, 1], cells = [4, 2] }, \
                    { name = 'upper', corner = [0.5, 1], size = [1, 1], cells = [3, 2] }]";

@@ -1,6 +1,6 @@
 //! Regions with their own material.
 
-use crate::{case::Case, hdf5_file::NumberFile, results::assert_same_answer};
+use crate::{case::Case, hdf5_file::NumberFile, launch, results::assert_same_answer};
 
 const HISTORY: &str = "viscoplastic_history";
 
@@ -37,6 +37,25 @@ fn regions_of_the_same_material_are_the_body_of_one_material_to_the_last_bit() {
         assert_same_answer(&results, &other, 1e-12, what);
         assert_eq!(results.summary()["certificates"], other.summary()["certificates"], "{what}");
         assert_eq!(results.summary()["inventory"], other.summary()["inventory"], "{what}");
+    }
+}
+
+#[test]
+fn regions_without_mass_beside_others_with_mass_are_warned_of() {
+    for (place, words) in [
+        (
+            "region.0.material",
+            "region.0.material without density: its cells have neither inertia nor weight, as those of material",
+        ),
+        (
+            "material",
+            "material without density: its cells have neither inertia nor weight, as those of region.0.material",
+        ),
+    ] {
+        let case = wheel().without(&format!("{place}.density"));
+        let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
+        let said = launch::unwrapped(&outcome.stdout);
+        assert!(said.contains(words), "{said}");
     }
 }
 

@@ -206,6 +206,46 @@ fn all(session: &Session) {
     }
 }
 
+/// A block falls from rest, or is thrown along a plane and stopped by friction, under constant forces: the error of its displacement as a
+/// share of its way.
+fn drift(session: &Session, scheme: &str) {
+    let head = |tolerance: f64| {
+        head(scheme, 0.25, 0.1, tolerance)
+            + "density = 1000\nviscosity = { volumetric = 1e6, shear = 1e6 }\n[gravity]\nacceleration = [0, -9.81]\n"
+    };
+    let moved = |run: &Simulation<2, 4>, axis: usize| {
+        let displacement = run.state.displacement.owned().expect("values");
+        let [way, nodes] = session.sum([
+            displacement.chunks_exact(2).map(|u| u[axis]).sum::<f64>(),
+            displacement.len() as f64 / 2.0,
+        ]);
+        way / nodes
+    };
+    let fallen = |run: &Simulation<2, 4>| {
+        let way = 0.5 * 9.81 * run.state.time * run.state.time;
+        (moved(run, 1) + way).abs() / (0.5 * 9.81 * 0.0625)
+    };
+    falls(session, &format!("fall, {scheme}"), head, fallen, (1e-3, [0.5, 4e-2]));
+    let thrown = |tolerance: f64| {
+        head(tolerance)
+            + "[initial]\nvelocity = [1, 0]\n[[contact]]\non = [\"bottom\"]\nnormal.unilateral = {}\n\
+               friction.coulomb.coefficient = 0.5\n"
+    };
+    let stopped = |run: &Simulation<2, 4>| {
+        let (rate, last) = (0.5 * 9.81, 1.0 / (0.5 * 9.81));
+        let time = run.state.time.min(last);
+        (moved(run, 0) - time + 0.5 * rate * time * time).abs() / (0.5 * last)
+    };
+    falls(session, &format!("stop, {scheme}"), thrown, stopped, (1e-3, [0.6, 5e-2]));
+}
+
+#[test]
+fn bodies_under_constant_forces_are_where_they_should_be() {
+    run_on(&[1, 2], |world| {
+        ["lagged_euler", "implicit_euler"].iter().for_each(|scheme| drift(&world.session, scheme))
+    });
+}
+
 #[test]
 fn errors_of_stress_creep_damage_bonds_and_memory_fall_with_the_tolerance() {
     run_on(&[1, 2], |world| all(&world.session));

@@ -20,6 +20,8 @@ pub(super) struct Materials {
     pub tables: Vec<usize>,
     /// The number of tables that cells of the body have.
     pub table_count: usize,
+    /// Their keys in the job.
+    keys: Vec<String>,
     /// For each region of the mesh the number of its table.
     of_region: Vec<usize>,
     /// The material of each cell of this rank; empty if no property varies.
@@ -50,6 +52,7 @@ impl Materials {
             all: Vec::new(),
             tables: Vec::new(),
             table_count: used.len(),
+            keys: used.iter().map(|&at| given[at].0.clone()).collect(),
             of_region,
             of_cells: Vec::new(),
         };
@@ -75,6 +78,23 @@ impl Materials {
             found.all.push(material);
         }
         Ok(found)
+    }
+
+    /// A warning of cells without mass beside others with mass.
+    pub(super) fn warning_of_mass(&self) -> Option<String> {
+        let with_mass = |has: bool| -> Vec<&str> {
+            let tables = self.all[..self.table_count].iter().zip(&self.keys);
+            tables.filter(|(of, _)| of.density.is_some() == has).map(|(_, key)| &**key).collect()
+        };
+        let (with, without) = (with_mass(true), with_mass(false));
+        (!with.is_empty() && !without.is_empty()).then(|| {
+            format!(
+                "{} without density: its cells have neither inertia nor weight, as those of {} have; a region takes nothing from [material]: \
+                 give the density again, or none to both",
+                without.join(", "),
+                with.join(", ")
+            )
+        })
     }
 
     /// The materials of the cells of tables with expressions, each with its table; notes them in the cells.

@@ -36,6 +36,7 @@ mod time_loop;
 mod touching;
 mod trial;
 mod units;
+mod within_cells;
 
 pub use accuracy::{Doubt, EndState, ErrorOfMesh, error_of_mesh, error_of_steps, with_steps};
 pub use build::normal_law;

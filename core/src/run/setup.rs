@@ -10,6 +10,7 @@ use super::{
     restored::{StartState, sides_before, start_file, transfer},
     side_words, steps, touching,
     validate::refuse_free_bodies,
+    within_cells,
 };
 use crate::{
     error::{Exit, Result},
@@ -67,9 +68,11 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let began_from = transfer(session, (loaded, from), &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;
     let mut warnings = obstacles::warnings(session, job, &body, &state)?;
+    warnings.extend(materials.warning_of_mass());
     warnings.extend(bonds::warnings(session, job, &body));
     warnings.extend(parts::warnings(session, job, &body.mesh));
     warnings.extend(loads::warnings(session, job, &body));
+    warnings.extend(within_cells::warnings(session, job, &body)?);
     warnings.extend(probes::warning(session, &body.mesh, &job.output)?);
     warnings.extend(touching::warning(session, job, &body.mesh)?);
     warnings.extend(parts::warnings_of_heat(session, job, &body)?);

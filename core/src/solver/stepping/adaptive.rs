@@ -8,6 +8,8 @@
 //! in the compliance norm, relative to the present stress without viscosity, or to a twentieth of the largest so far: a stress that
 //! relaxes keeps its accuracy, and one that vanishes does not stop the run. It includes the stress caused by the velocity
 //! error in the step, and the errors of viscoplastic histories, damage, the bonding of adhesion and the memory pressure of contact.
+//! First-order schemes move bodies at the velocity at one end of a step; where inertia alone resists, the error of their displacement is
+//! measured, too, relative to the way so far: that of the velocity vanishes under constant forces.
 //! What friction and wear keep, and the motions of obstacles moved by forces, are measured against their own largest deviations from
 //! their values at the start, bonds and memory also against their own largest forces: a state of friction may change little beside a
 //! large normal stress, and a bond hold little of it, and still determine the motion.
@@ -55,6 +57,9 @@ pub struct StepLevel {
     pub velocity: f64,
     /// Largest norm of the stress so far.
     pub stress: f64,
+    /// The way so far, the norm of the displacement in each step added up, with that of the step tried at the start.
+    #[serde(default)]
+    pub way: f64,
     /// Largest deviations of the quantities of contacts from their values at the start so far.
     #[serde(default)]
     pub contact: [f64; CONTACT_QUANTITIES],
@@ -96,6 +101,12 @@ impl StepLevel {
         }
         self.surface = self.surface.max(surface.size);
         self.temperatures = temperature.map(|found| self.range_with(found)).or(self.temperatures);
+    }
+
+    /// Keeps the norms of a step that is tried at the start of the run.
+    fn keep_tried(&mut self, found: &StepError) {
+        self.keep_largest(found);
+        self.way = self.way.max(found.way.size);
     }
 
     /// The lowest and the highest temperature in K so far and in a step.
@@ -164,6 +175,7 @@ impl<const D: usize> Adaptive<D> {
                     outcome.landed_on = landing.name.filter(|_| step.time == landing.time);
                     let of_quantities = self.squares(found);
                     self.step_level.keep_largest(&found);
+                    self.step_level.way += found.way.size;
                     let is_limited = self.adjust_level(step, error);
                     self.limits.count(of_quantities, [is_limited, error > self.settings.tolerance]);
                     return Ok(outcome);
@@ -171,7 +183,7 @@ impl<const D: usize> Adaptive<D> {
                 Ok((_, error, found)) => {
                     // The trial step at rest had no solution: a shorter one says how large velocity and stress will be.
                     if self.is_at_rest() {
-                        self.step_level.keep_largest(&found);
+                        self.step_level.keep_tried(&found);
                     }
                     self.reject(step, self.level_within_tolerance(step, error));
                 }
@@ -279,7 +291,7 @@ impl<const D: usize> Adaptive<D> {
         let step = next_step(times_before(state, target), self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
             Ok((_, error, found)) => {
-                self.step_level.keep_largest(&found);
+                self.step_level.keep_tried(&found);
                 if !self.is_acceptable(step, error) {
                     self.shorten(step, self.level_within_tolerance(step, error).min(0));
                 }
@@ -315,7 +327,7 @@ impl<const D: usize> Adaptive<D> {
 
     /// The squares of these errors of the quantities that [`StepLimits`] counts.
     fn squares(&self, found: StepError) -> [f64; QUANTITIES] {
-        let StepError { error, size, negligible, rounding, contact, surface, temperature } = found;
+        let StepError { error, size, negligible, rounding, way, contact, surface, temperature } = found;
         let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.step_level.velocity.max(size.velocity);
         let largest_stress = self.step_level.stress.max(size.stress);
@@ -335,6 +347,7 @@ impl<const D: usize> Adaptive<D> {
         {
             *out = ratio(found.error, largest.max(found.size).max(found.negligible));
         }
+        ratios[QUANTITIES - 2] = ratio(way.error, self.step_level.way + way.size);
         if let Some(found) = temperature {
             let [lowest, highest] = self.step_level.range_with(found);
             ratios[QUANTITIES - 1] = ratio(found.error, (highest - lowest).max(NEGLIGIBLE_WARMTH * highest));
@@ -494,6 +507,25 @@ mod tests {
         adaptive.step_level.temperatures = None;
         let rounding = StepError { temperature: Some(even), ..StepError::default() };
         assert!(adaptive.relative(rounding) <= 1e-3, "a body of one temperature");
+    }
+
+    #[test]
+    fn errors_of_displacements_are_measured_against_the_way_so_far() {
+        let mut adaptive = adaptive();
+        let found = |error, size| StepError {
+            way: Deviation { error, size, negligible: 0.0 },
+            ..StepError::default()
+        };
+        assert_eq!(adaptive.relative(found(0.5, 1.0)), 0.5, "a step from rest");
+        adaptive.step_level.keep_tried(&found(1.0, 7.0));
+        adaptive.step_level.keep_largest(&found(1.0, 9.0));
+        assert_eq!(
+            adaptive.relative(found(0.5, 1.0)),
+            0.0625,
+            "of the way of the step tried and of this one"
+        );
+        assert_eq!(adaptive.relative(found(0.0, 0.0)), 0.0);
+        assert!(adaptive.relative(found(f64::NAN, 1.0)).is_nan());
     }
 
     #[test]

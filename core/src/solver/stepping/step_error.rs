@@ -51,6 +51,9 @@ pub struct StepError {
     /// Without inertia, errors of velocities and stresses below these are rounding errors of displacements, as of a body that moves as a
     /// whole.
     pub rounding: Norms,
+    /// The displacement in the step in the mass norm in kg^(1/2) m, with its error: that of first-order schemes, which move the body at the velocity
+    /// at one end of the step; 0 under others and without inertia.
+    pub way: Deviation,
     /// Norms of the quantities of contacts, squares in the calculation of the step.
     pub contact: [Deviation; CONTACT_QUANTITIES],
     /// Norms of the forces of bonds and contact memory.
@@ -78,6 +81,8 @@ pub(super) struct SolvedStep<'a> {
     pub flow_start: FlowStart<'a>,
     /// The states from which the step starts.
     pub blend: Blend,
+    /// The order of the scheme.
+    pub order: u32,
 }
 
 impl ErrorWorkspace {
@@ -89,7 +94,7 @@ impl ErrorWorkspace {
         state: &State,
         solved: SolvedStep<'_>,
     ) -> Result<StepError> {
-        let SolvedStep { step, velocity, flow_start, blend } = solved;
+        let SolvedStep { step, velocity, flow_start, blend, order } = solved;
         let curvature = Curvature::of(step);
         let trial = velocity.local()?;
         let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
@@ -118,6 +123,8 @@ impl ErrorWorkspace {
         };
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
         let strains = blend.length * blend.length * square(elastic, strained);
+        let drifts = (order == 1).then_some(form).flatten().filter(|form| *form == Form::Mass);
+        let of_way = square(drifts, strained);
         let stresses = [strains + histories.error, histories.size];
         let [velocity, all_velocity] = [square(form, curved), square(form, &trial)];
         let [error, size] = [surface.error, surface.size];
@@ -139,6 +146,7 @@ impl ErrorWorkspace {
             size,
             of_velocity,
             of_stress,
+            of_way,
         ]);
         // Obstacles that forces move, alike on all ranks.
         for motion in body.obstacle_motions() {
@@ -147,7 +155,7 @@ impl ErrorWorkspace {
             squares[0] += error / unit;
             squares[2] += size / unit;
         }
-        let [velocity, stress, all_velocity, all_stress, error, size, of_velocity, of_stress] =
+        let [velocity, stress, all_velocity, all_stress, error, size, of_velocity, of_stress, of_way] =
             squares.map(|square| if square > 0.0 { square.sqrt() } else { square });
         // With mass both norms are roots of energies: a free body has a stress of rounding errors, a fixed one a velocity of
         // rounding errors. Without mass the square of a velocity norm is a power.
@@ -157,6 +165,11 @@ impl ErrorWorkspace {
             size: Norms { velocity: all_velocity, stress: all_stress },
             negligible: Norms { velocity: NEGLIGIBLE / unit, stress: NEGLIGIBLE * unit },
             rounding: Norms { velocity: ROUNDING * of_velocity, stress: ROUNDING * of_stress },
+            way: Deviation {
+                error: step.length * of_way,
+                size: if drifts.is_some() { step.length * all_velocity } else { 0.0 },
+                negligible: 0.0,
+            },
             contact,
             surface: Deviation { error, size, negligible: NEGLIGIBLE * NEGLIGIBLE * all_stress },
             temperature: None,

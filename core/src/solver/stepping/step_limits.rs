@@ -3,7 +3,7 @@
 use crate::fem::effect::CONTACT_QUANTITIES;
 
 /// Number of the quantities whose errors limit steps.
-pub(super) const QUANTITIES: usize = CONTACT_QUANTITIES + 4;
+pub(super) const QUANTITIES: usize = CONTACT_QUANTITIES + 5;
 
 const NAMES: [&str; QUANTITIES] = [
     "velocities",
@@ -15,6 +15,7 @@ const NAMES: [&str; QUANTITIES] = [
     "the angle of an obstacle",
     "the angular velocity of an obstacle",
     "bonds or contact memory",
+    "displacements",
     "temperatures",
 ];
 

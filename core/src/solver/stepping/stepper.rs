@@ -437,8 +437,13 @@ impl Stepper {
         self.finish(body, state, step)?;
         self.trial.update_ghosts()?;
         let blend = self.integrator.blend();
-        let solved =
-            SolvedStep { step, velocity: &self.trial, flow_start: self.integrator.flow_start(state), blend };
+        let solved = SolvedStep {
+            step,
+            velocity: &self.trial,
+            flow_start: self.integrator.flow_start(state),
+            blend,
+            order: self.scheme.order(),
+        };
         self.workspace.error(session, body, state, solved)
     }
 
