@@ -55,6 +55,16 @@ fn a_run_of_one_step_is_repeated_with_shorter_ones() {
     assert!(log.contains("by the steps not estimated: [output] error_estimate = true"), "{log}");
 }
 
+#[test]
+fn an_error_beside_a_state_that_has_decayed_is_called_a_share_of_the_largest() {
+    for (end, is_of_largest) in [("1.0", false), ("4.0", true)] {
+        let case = relaxing("lagged_euler", 0.05).set("time.end", end).run_and_keep(1);
+        let (results, words) = (case.results(), "a twentieth of the largest stress and velocity of the run");
+        assert_eq!(results.summary()["reference_of_steps"].as_str(), is_of_largest.then_some(words));
+        assert_eq!(results.text("run.log").contains(words), is_of_largest, "{end}");
+    }
+}
+
 /// A pulse runs through an absorbing end within a few steps.
 #[test]
 fn an_error_of_states_that_do_not_approach_each_other_is_uncertain() {

@@ -230,7 +230,7 @@ fn a_traction_that_supports_alone_bear_is_warned_of() {
 
 #[test]
 fn a_traction_that_changes_within_facets_is_warned_of() {
-    let words = "traction.0: facets of the boundary top are too long for it";
+    let words = "traction.0: facets of the boundary top are too large for it";
     for (value, is_wrong) in [
         ("1e6*(x > 0.33)*(x < 0.36)", true),
         ("1e6*exp(-((x - 0.5)/0.005)^2)", true),
@@ -283,7 +283,11 @@ fn what_changes_within_cells_is_warned_of() {
             .set("heat", &format!("[{{ on = ['top'], flux = '{flux}' }}]"));
         let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
         let said = launch::unwrapped(&outcome.stdout);
-        assert_eq!(said.contains("heat.0: facets are too large for it"), is_wrong, "{flux}: {said}");
+        assert_eq!(
+            said.contains("heat.0: facets of the boundary top are too large for it"),
+            is_wrong,
+            "{flux}: {said}"
+        );
     }
 }
 

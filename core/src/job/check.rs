@@ -215,6 +215,19 @@ fn check_claims(job: &Job, table: &mut Table<'_>) {
             }
         }
     }
+    for (number, contact) in job.contact.iter().enumerate() {
+        let has = |names: &[String], all: &[String]| names.iter().any(|name| all.contains(name));
+        let is_reverse = |other: &Contact| {
+            (contact.part.is_none() || other.part.is_none())
+                && has(&contact.on, &other.against)
+                && has(&contact.against, &other.on)
+        };
+        if let Some(earlier) = job.contact[..number].iter().position(is_reverse) {
+            let path = format!("contact.{number}.against");
+            let help = "a pair of boundaries has one contact law: delete one of the tables, or give each its part by `where`";
+            table.fault(&path, format!("these boundaries face each other in contact.{earlier}, too"), help);
+        }
+    }
     for (number, traction) in job.traction.iter().enumerate() {
         for (index, name) in traction.on.iter().enumerate().filter(|(_, name)| holds(name)) {
             table.warn(format!(

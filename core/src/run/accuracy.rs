@@ -67,6 +67,8 @@ pub struct ErrorOfSteps {
     pub order: Option<f64>,
     /// The norm of stress and velocity at the end in J^(1/2), in two dimensions (J/m)^(1/2); at least a twentieth of the largest in the run.
     pub norm: f64,
+    /// Whether the norm is that of the largest.
+    pub is_of_largest: bool,
 }
 
 /// Stress and velocity at the end of a run.
@@ -176,7 +178,8 @@ pub fn error_of_steps<const D: usize, const S: usize>(
         Err(reason) => return Ok(Err(reason)),
     };
     let most = far.iter().map(|far| far.most).fold(near.most, larger);
-    let norm = end.distance(session, body, None)?.max(LEAST_SHARE * (2.0 * most).sqrt());
+    let (at_end, least_norm) = (end.distance(session, body, None)?, LEAST_SHARE * (2.0 * most).sqrt());
+    let norm = at_end.max(least_norm);
     let ratio = |one: &EndState<S>, other: &EndState<S>| one.steps as f64 / other.steps as f64;
     let distance = end.distance(session, body, Some(&near))?;
     let first = ratio(&end, &near);
@@ -198,7 +201,7 @@ pub fn error_of_steps<const D: usize, const S: usize>(
     let least = loaded.job.solver.tolerance;
     // States that are equal within the tolerance show none.
     let order = if error <= least { order.or(Some(1.0)) } else { order };
-    Ok(Ok(ErrorOfSteps { relative: larger(error, least), order, norm }))
+    Ok(Ok(ErrorOfSteps { relative: larger(error, least), order, norm, is_of_largest: least_norm > at_end }))
 }
 
 const INTERRUPTED: &str = "interrupted";

@@ -194,7 +194,8 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
 
 /// Logs the estimated errors, and what half of them would take or how they are estimated.
 fn errors(log: &mut Log, job: &Job, summary: &Summary) {
-    let Errors { error_of_mesh, doubt_of_mesh, error_of_steps, order_of_steps } = summary.errors;
+    let Errors { error_of_mesh, doubt_of_mesh, error_of_steps, reference_of_steps, order_of_steps } =
+        summary.errors;
     let two_digits = |number: f64| {
         let unit = 10f64.powf(number.log10().floor() - 1.0);
         Digits((number / unit).round() * unit)
@@ -220,8 +221,8 @@ fn errors(log: &mut Log, job: &Job, summary: &Summary) {
             ),
             false => more,
         };
-        let error = percent(error);
-        log.line(format!("errors     by the steps {error} of stress and velocity at the end{more}"));
+        let (error, of) = (percent(error), reference_of_steps.unwrap_or("stress and velocity at the end"));
+        log.line(format!("errors     by the steps {error} of {of}{more}"));
     } else if !job.output.error_estimate && summary.status == "completed" {
         log.line(
             "errors     by the steps not estimated: [output] error_estimate = true repeats the run for it",

@@ -1,10 +1,10 @@
-//! The areas on which tractions act, tractions that act on supports alone, and those that change within facets.
+//! The areas on which tractions act, and tractions that act on supports alone.
 
 use crate::{
     fem::{body::Body, space::facet_points},
     job::{Job, Scalar},
     laws::digits::Digits,
-    linear_algebra::tensor::{larger, norm},
+    linear_algebra::tensor::norm,
     parallel::session::Session,
 };
 use serde::Serialize;
@@ -13,11 +13,8 @@ use serde::Serialize;
 const TIMES: u32 = 16;
 /// A free share of forces below this is a rounding error.
 const FREE: f64 = 1e-9;
-/// Share of the forces by which those on facets may differ from the means of a traction over them.
-const WRONG: f64 = 0.1;
 
-/// Warnings about tractions along directions that supports hold at all their nodes, and about those whose changes the points of facets do not see.
-/// Collective, with the same warnings on all ranks.
+/// Warnings about tractions along directions that supports hold at all their nodes. Collective, with the same warnings on all ranks.
 pub(super) fn warnings<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
@@ -25,10 +22,9 @@ pub(super) fn warnings<const D: usize, const S: usize>(
 ) -> Vec<String> {
     let mut out = Vec::new();
     for (number, (traction, table)) in body.load.tractions.iter().zip(&job.traction).enumerate() {
-        let mut mine = [0.0; 4];
-        let values = || table.value.iter().chain(&table.pressure);
-        let depends_on_place = values().any(Scalar::depends_on_position);
-        let last = if values().any(Scalar::depends_on_time) { TIMES } else { 0 };
+        let mut mine = [0.0; 2];
+        let mut values = table.value.iter().chain(&table.pressure);
+        let last = if values.any(Scalar::depends_on_time) { TIMES } else { 0 };
         for at in 0..=last {
             let time = job.time.end * f64::from(at) / f64::from(TIMES);
             // A step at which the traction is no number ends the run with the reason.
@@ -36,20 +32,8 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 mine[0] += norm(&force);
                 mine[1] += norm(&body.held.free_part(node as usize, &force));
             });
-            if depends_on_place && let Ok([error, means]) = traction.error_of_rule(&body.mesh, time) {
-                mine[2] += error;
-                mine[3] += means;
-            }
         }
-        let [all, free, error, means] = session.sum(mine);
-        if error > WRONG * larger(all, means) {
-            out.push(format!(
-                "traction.{number}: facets of the boundary {} are too long for it: by its values at their points it differs by {:.0} % from its \
-                 means over them: refine the boundary where it changes, or select facets by `where`",
-                table.on.join(", "),
-                100.0 * error / larger(all, means)
-            ));
-        }
+        let [all, free] = session.sum(mine);
         if all > 0.0 && free <= FREE * all {
             out.push(format!(
                 "traction.{number}: supports hold the boundary {} in every direction in which it acts, so that nothing but their forces \

@@ -43,6 +43,9 @@ use std::time::{Duration, Instant};
 /// About how many steps are logged; of longer runs only every n-th step is.
 const LOGGED_STEPS: u64 = 1000;
 
+/// What the error by the steps is a share of where the state at the end is smaller.
+const OF_LARGEST: &str = "a twentieth of the largest stress and velocity of the run";
+
 /// Bytes reserved for the line of a step in the log.
 const LINE: usize = 512;
 
@@ -512,6 +515,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
         Ok(Errors {
             error_of_steps: of_steps.as_ref().ok().map(|error| error.relative),
+            reference_of_steps: of_steps
+                .as_ref()
+                .ok()
+                .filter(|error| error.is_of_largest)
+                .map(|_| OF_LARGEST),
             order_of_steps: of_steps.ok().and_then(|error| error.order),
             ..errors
         })

@@ -5,7 +5,7 @@ use crate::{
     fem::{
         body::Body,
         effect::Traction,
-        space::{cell_rule, fine_cell_rule},
+        space::{cell_rule, evenly_spread, fine_cell_rule},
     },
     job::{Job, Scalar},
     linear_algebra::tensor::{add_scaled, larger, norm},
@@ -16,10 +16,10 @@ use crate::{
 const TIMES: u32 = 4;
 /// Share of a quantity by which its values at the points of cells may differ from its means over them.
 const WRONG: f64 = 0.1;
-/// Parts of each edge of a cell whose centres are looked at; fewer where a mesh has more cells.
-const PARTS: [usize; 4] = [12, 8, 4, 2];
-/// The most centres on all ranks.
-const MOST_CENTRES: usize = 1_000_000;
+/// Parts of each edge of a cell that are looked at; fewer where a mesh has more cells.
+const PARTS: [usize; 3] = [12, 8, 4];
+/// The most places on all ranks.
+const MOST_PLACES: usize = 1_000_000;
 /// The most components of a quantity: those of a stress.
 const COMPONENTS: usize = 6;
 
@@ -67,40 +67,54 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     }
     all.retain(|seen| seen.values.iter().any(|value| value.depends_on_position()));
     let mut out = Vec::new();
-    let mut warn = |name: &str, what: &str, mine: [f64; 3]| {
+    let mut warn = |name: &str, [what, remedy]: [&str; 2], mine: [f64; 3]| {
         let [error, seen, means] = session.sum(mine);
         let size = larger(seen, means);
         if error > WRONG * size {
             out.push(format!(
-                "{name}: {what} are too large for it: by its values at their points it differs by {:.0} % from its means over them; refine the \
-                 mesh where it changes",
+                "{name}: {what} are too large for it: by its values at their points it differs by {:.0} % from its means over them; refine \
+                 {remedy}",
                 100.0 * error / size
             ));
         }
     };
     if !all.is_empty() {
         let cells = session.total(body.mesh.cell_count());
-        let is_fitting = |parts: &&usize| cells * centres::<D>(**parts).len() <= MOST_CENTRES;
-        let parts = PARTS.iter().find(is_fitting).unwrap_or(&PARTS[PARTS.len() - 1]);
-        let centres = centres::<D>(*parts);
-        all.iter().for_each(|seen| warn(&seen.name, "cells", error_in_cells(job, body, seen, &centres)));
+        let places = |parts: &usize| evenly_spread(D + 1, *parts);
+        let is_fitting = |places: &Vec<[f64; 4]>| cells * places.len() <= MOST_PLACES;
+        let places = PARTS.iter().map(places).find(is_fitting).unwrap_or_else(|| places(&2));
+        let weight = 1.0 / places.len() as f64;
+        let places: Vec<Point> = places.into_iter().map(|place| (place, weight)).collect();
+        for seen in &all {
+            let words = ["cells", "the mesh where it changes"];
+            warn(&seen.name, words, error_in_cells(job, body, seen, &places));
+        }
+    }
+    let mut on_facets = |name: String, on: &[String], load: &Traction| {
+        let mut mine = [0.0; 3];
+        for time in times(job, &load.value.iter().chain(&load.pressure).collect::<Vec<_>>()) {
+            // A step at which the load is no number ends the run with the reason.
+            if let Ok([error, means]) = load.error_of_rule(&body.mesh, time) {
+                (mine[0], mine[2]) = (mine[0] + error, mine[2] + means);
+            }
+            let _ = load.forces(&body.mesh, time, |_, force| mine[1] += norm(&force));
+        }
+        let what = format!("facets of the boundary {}", on.join(", "));
+        warn(&name, [&what, "the boundary where it changes, or select facets by `where`"], mine);
+    };
+    for (number, (load, table)) in body.load.tractions.iter().zip(&job.traction).enumerate() {
+        if load.value.iter().chain(&load.pressure).any(Scalar::depends_on_position) {
+            on_facets(format!("traction.{number}"), &table.on, load);
+        }
     }
     for (number, table) in job.heat.iter().enumerate() {
         let coefficient = table.convection.as_ref().map(|convection| &convection.coefficient);
-        let Some(value) = table.flux.as_ref().or(coefficient).filter(|value| value.depends_on_position())
-        else {
-            continue;
-        };
-        let facets = part_of(session, &body.mesh, ("heat", &table.on), table.part.as_ref())?;
-        let flux = Traction { facets, value: vec![value.clone()], pressure: None };
-        let mut mine = [0.0; 3];
-        for time in times(job, &[value]) {
-            if let Ok([error, means]) = flux.error_of_rule(&body.mesh, time) {
-                (mine[0], mine[2]) = (mine[0] + error, mine[2] + means);
-            }
-            let _ = flux.forces(&body.mesh, time, |_, force| mine[1] += norm(&force));
+        let value = table.flux.as_ref().or(coefficient);
+        if let Some(value) = value.filter(|value| value.depends_on_position()) {
+            let facets = part_of(session, &body.mesh, ("heat", &table.on), table.part.as_ref())?;
+            let load = Traction { facets, value: vec![value.clone()], pressure: None };
+            on_facets(format!("heat.{number}"), &table.on, &load);
         }
-        warn(&format!("heat.{number}"), "facets", mine);
     }
     Ok(out)
 }
@@ -118,7 +132,7 @@ fn error_in_cells<const D: usize, const S: usize>(
     job: &Job,
     body: &Body<D, S>,
     Seen { values, points, .. }: &Seen<'_>,
-    centres: &[Point],
+    places: &[Point],
 ) -> [f64; 3] {
     let mut sums = [0.0; 3];
     for time in times(job, values) {
@@ -137,7 +151,7 @@ fn error_in_cells<const D: usize, const S: usize>(
                 }
                 mean
             };
-            let (seen, whole) = (mean(points), mean(centres));
+            let (seen, whole) = (mean(points), mean(places));
             let parts = [norm(&add_scaled(&seen, -1.0, &whole)), norm(&seen), norm(&whole)];
             let volume = cell.whole().volume;
             sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += volume * part);
@@ -166,54 +180,26 @@ fn at_nodes<const D: usize>(order: usize) -> Vec<Point> {
     corners.chain(edges).filter(|(_, weight)| *weight != 0.0).collect()
 }
 
-/// Places in a cell that are spread evenly: the centres of those of its parts that are turned as the cell, by this number of parts of an edge.
-fn centres<const D: usize>(parts: usize) -> Vec<Point> {
-    let mut found: Vec<[usize; 4]> = vec![[0; 4]];
-    for corner in 0..D {
-        let longer = |given: [usize; 4]| {
-            let left = parts - 1 - given.iter().sum::<usize>();
-            (0..=left).map(move |count| {
-                let mut given = given;
-                given[corner] = count;
-                given
-            })
-        };
-        found = found.into_iter().flat_map(longer).collect();
-    }
-    let weight = 1.0 / found.len() as f64;
-    let place = |mut counts: [usize; 4]| {
-        counts[D] = parts - 1 - counts.iter().sum::<usize>();
-        let share = |corner: usize| (counts[corner] as f64 + 1.0 / (D + 1) as f64) / parts as f64;
-        (std::array::from_fn(|corner| if corner <= D { share(corner) } else { 0.0 }), weight)
-    };
-    found.into_iter().map(place).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn is_a_mean<const D: usize>(points: &[Point], count: usize) {
-        assert_eq!(points.len(), count);
-        for corner in 0..=D {
+    fn is_a_mean<const D: usize>(points: &[Point]) {
+        for corner in 0..4 {
             let mean: f64 = points.iter().map(|(shares, weight)| weight * shares[corner]).sum();
-            assert!((mean - 1.0 / (D + 1) as f64).abs() < 1e-14, "{corner}: {mean}");
+            let centre = if corner <= D { 1.0 / (D + 1) as f64 } else { 0.0 };
+            assert!((mean - centre).abs() < 1e-14, "{corner}: {mean}");
         }
-        let sum: f64 = points.iter().map(|(_, weight)| weight).sum();
-        assert!(
-            (sum - 1.0).abs() < 1e-14
-                && points.iter().all(|(shares, _)| shares[D + 1..] == [0.0; 4][D + 1..])
-        );
+        assert!((points.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs() < 1e-14);
     }
 
     #[test]
     fn means_over_cells_are_exact_of_linear_functions() {
-        is_a_mean::<2>(&centres::<2>(12), 78);
-        is_a_mean::<3>(&centres::<3>(4), 20);
-        is_a_mean::<2>(&at_nodes::<2>(1), 3);
-        is_a_mean::<3>(&at_nodes::<3>(1), 4);
-        is_a_mean::<2>(&at_nodes::<2>(2), 3);
-        is_a_mean::<3>(&at_nodes::<3>(2), 10);
-        is_a_mean::<2>(&[centre_of_all::<2>()], 1);
+        is_a_mean::<2>(&at_nodes::<2>(1));
+        is_a_mean::<3>(&at_nodes::<3>(1));
+        is_a_mean::<2>(&at_nodes::<2>(2));
+        is_a_mean::<3>(&at_nodes::<3>(2));
+        is_a_mean::<2>(&[centre_of_all::<2>()]);
+        is_a_mean::<3>(&[centre_of_all::<3>()]);
     }
 }

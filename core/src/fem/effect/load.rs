@@ -3,7 +3,7 @@
 use super::{EnergyKind, Role};
 use crate::{
     error::{Error, Result},
-    fem::space::{CellShape, Geometry, cell_rule, facet_points, fine_cell_rule},
+    fem::space::{CellShape, Geometry, cell_rule, evenly_spread, facet_points, fine_cell_rule},
     job::{BodyForce, Scalar},
     laws::material::ByMaterial,
     linear_algebra::tensor::{Vector, add_scaled, norm},
@@ -18,6 +18,9 @@ pub const WORK: EnergyKind = EnergyKind::new(
     "work of loads, moving supports and obstacles whose motion is prescribed, on the body since time 0; with an \
      obstacle that a force moves, also that of the guide that keeps it on its direction",
 );
+
+/// Parts of each edge of a facet at whose places the mean of a traction is taken, of segments and of triangles.
+const PARTS: [usize; 2] = [16, 5];
 
 /// A force per area on facets of this rank.
 #[derive(Debug)]
@@ -70,7 +73,7 @@ impl Traction {
     /// By how much the forces on the facets of this rank differ at `time` from the means of the traction over many parts of each facet, and the sum of
     /// the magnitudes of the latter, in N.
     pub fn error_of_rule<const D: usize>(&self, mesh: &Mesh<D>, time: f64) -> Result<[f64; 2]> {
-        let parts = parts::<D>();
+        let parts = evenly_spread(D, PARTS[D - 2]);
         let mut sums = [0.0; 2];
         for &facet in &self.facets {
             let (mut force, mut area, mut normal) = ([0.0; D], 0.0, [0.0; D]);
@@ -96,26 +99,6 @@ impl Traction {
         }
         Ok(sums)
     }
-}
-
-/// The shares of the corners of a facet in the centres of equal parts of it: 16 of an edge, 16 triangles of a face.
-fn parts<const D: usize>() -> Vec<Vector<D>> {
-    let mut found = Vec::new();
-    let mut add = |[own, other]: [f64; 2]| {
-        found.push(std::array::from_fn(|corner| [1.0 - own - other, own, other][corner]));
-    };
-    if D == 2 {
-        (0..16).for_each(|i| add([(f64::from(i) + 0.5) / 16.0, 0.0]));
-    } else {
-        for (i, j) in (0..4).flat_map(|i| (0..4 - i).map(move |j| (i, j))) {
-            // Triangles that stand on a side, and beside them those that stand on a corner.
-            add([i, j].map(|at| (f64::from(at) + 1.0 / 3.0) / 4.0));
-            if i + j < 3 {
-                add([i, j].map(|at| (f64::from(at) + 2.0 / 3.0) / 4.0));
-            }
-        }
-    }
-    found
 }
 
 /// All loads of a job.
@@ -270,23 +253,6 @@ pub(super) fn finite<const D: usize>(
 mod tests {
     use super::*;
     use crate::job::Expression;
-
-    fn centres_are_spread_evenly<const D: usize>() {
-        let parts = parts::<D>();
-        assert_eq!(parts.len(), 16);
-        for corner in 0..D {
-            let mean = parts.iter().map(|shares| shares[corner]).sum::<f64>() / 16.0;
-            assert!((mean - 1.0 / D as f64).abs() < 1e-15, "{corner}: {mean}");
-        }
-        let least = parts.iter().flatten().copied().fold(1.0, f64::min);
-        assert!(least > 0.0 && parts.iter().all(|shares| (shares.iter().sum::<f64>() - 1.0).abs() < 1e-15));
-    }
-
-    #[test]
-    fn centres_of_parts_of_facets_are_spread_evenly() {
-        centres_are_spread_evenly::<2>();
-        centres_are_spread_evenly::<3>();
-    }
 
     #[test]
     fn loads_are_steady_where_neither_tractions_nor_body_forces_depend_on_time() {

@@ -23,7 +23,7 @@ pub use linear_subspace::linear_subspace;
 pub use quadratic::{
     MOST_NODES, MassCoefficients, OPPOSITE, edges, nodal_forces, node_count, offsets, place_in_cell, values,
 };
-pub use quadrature::{CellRule, MOST_POINTS, cell_rule, facet_rule, fine_cell_rule};
+pub use quadrature::{CellRule, MOST_POINTS, cell_rule, evenly_spread, facet_rule, fine_cell_rule};
 pub use surface::{
     FacetPoint, SurfacePoint, corner_means, facet_points, facet_sizes, facets, longest_side, omits_corners,
     smooth_points, surface_means, surface_points,

@@ -116,6 +116,29 @@ pub(super) const fn fine_facet_rule<const D: usize>() -> FacetRule {
     if D == 2 { FINE_EDGE } else { FINE_FACE }
 }
 
+/// Places in a segment, triangle or tetrahedron that are spread evenly, by the shares of its corners: the centres of those of its parts that
+/// are turned as the whole, with this number of parts of an edge.
+pub fn evenly_spread(corners: usize, parts: usize) -> Vec<[f64; 4]> {
+    let mut found: Vec<[usize; 4]> = vec![[0; 4]];
+    for corner in 0..corners - 1 {
+        let longer = |given: [usize; 4]| {
+            let left = parts - 1 - given.iter().sum::<usize>();
+            (0..=left).map(move |count| {
+                let mut given = given;
+                given[corner] = count;
+                given
+            })
+        };
+        found = found.into_iter().flat_map(longer).collect();
+    }
+    let place = |mut counts: [usize; 4]| {
+        counts[corners - 1] = parts - 1 - counts.iter().sum::<usize>();
+        let share = |corner: usize| (counts[corner] as f64 + 1.0 / corners as f64) / parts as f64;
+        std::array::from_fn(|corner| if corner < corners { share(corner) } else { 0.0 })
+    };
+    found.into_iter().map(place).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,5 +189,19 @@ mod tests {
         check_fine(fine_facet_rule::<2>(), 1);
         check_fine(fine_facet_rule::<3>(), 2);
         assert!(fine_cell_rule::<3>().len() == MOST_POINTS && fine_cell_rule::<2>().len() <= MOST_POINTS);
+    }
+
+    #[test]
+    fn evenly_spread_places_have_their_mean_in_the_centre() {
+        for (corners, parts, count) in [(2, 16, 16), (3, 5, 15), (3, 12, 78), (4, 4, 20)] {
+            let places = evenly_spread(corners, parts);
+            assert_eq!(places.len(), count);
+            for corner in 0..4 {
+                let mean = places.iter().map(|shares| shares[corner]).sum::<f64>() / count as f64;
+                let centre = if corner < corners { 1.0 / corners as f64 } else { 0.0 };
+                assert!((mean - centre).abs() < 1e-14, "{corner}: {mean}");
+            }
+            assert!(places.iter().all(|shares| (shares.iter().sum::<f64>() - 1.0).abs() < 1e-14));
+        }
     }
 }

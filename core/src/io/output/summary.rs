@@ -186,6 +186,10 @@ pub struct Errors {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(title = "estimated error of stress and velocity at the end by the steps, relative")]
     pub error_of_steps: Option<f64>,
+    /// What `error_of_steps` is a share of where that is not the state at the end, which has become smaller.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(title = "what the error by the steps is a share of")]
+    pub reference_of_steps: Option<&'static str>,
     /// The order at which `error_of_steps` falls with the steps; missing where the states of longer steps show none that is near that of the scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub order_of_steps: Option<f64>,

@@ -109,7 +109,7 @@ pub enum ProbedQuantity {
     PrincipalStress,
     /// Minus the mean of the three normal stresses in Pa.
     Pressure,
-    /// The components of the strain of the displacement.
+    /// The components of the strain of the displacement; in plane stress those in the plane, and 0 for zz.
     Strain,
     /// The acceleration in m/s^2 in the equations of the step.
     Acceleration,
