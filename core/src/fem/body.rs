@@ -355,7 +355,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             pair.form(session, &self.mesh, &places)?;
         }
         let shares = (&shares(&self.mesh, &pairs)[..], inclined(&pairs, &self.held));
-        self.coupling = Some(Coupling::new(session, &self.mesh, shares, &self.held)?);
+        self.coupling = Some(Coupling::new(&self.mesh, shares, &self.held));
         let seen = seen_by_contacts(self.coupling.as_ref(), &self.held, &displacement);
         for pair in pairs.iter().filter(|pair| pair.slides) {
             let touches = touches.as_ref().map(|touches| (&touches[pair.contact][..], has_mass));

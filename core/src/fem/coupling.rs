@@ -161,8 +161,8 @@ pub struct Coupling<const D: usize> {
     held_together: Vec<HeldTogether<D>>,
     /// The slave nodes that are inclined to supports, ascending.
     inclined: Vec<Inclined<D>>,
-    /// The blocks of `T` of all ranks: for each slave node, by global numbers, its masters and how they move its free components.
-    blocks: BTreeMap<u32, Vec<(u32, Block<D>)>>,
+    /// The blocks of `T`: for each slave node owned here, by global numbers, its masters and how they move its free components.
+    blocks: Blocks<D>,
     pool: Pool,
 }
 
@@ -200,19 +200,18 @@ impl<const D: usize> HeldTogether<D> {
 
 impl<const D: usize> Coupling<D> {
     /// For the pairs whose slave nodes this rank owns, in their order, with those that are inclined to supports, on a mesh with the ghosts
-    /// that [`needed_ghosts`] lists. Collective.
+    /// that [`needed_ghosts`] lists.
     pub fn new(
-        session: &Session,
         mesh: &Mesh<D>,
         (pairs, inclined): (&[MasterShare], Vec<Inclined<D>>),
         held: &Held<D>,
-    ) -> Result<Self, Agreed> {
+    ) -> Self {
         let local = |global: u32| match mesh.ghosts.binary_search(&global) {
             Ok(ghost) => mesh.owned + ghost,
             Err(_) => mesh.owned_node(global),
         };
         let (mut slaves, mut masters, mut held_together) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut numbers, mut values) = (Vec::new(), Vec::new());
+        let mut blocks = Blocks::new();
         for of_slave in pairs.chunk_by(|a, b| a.slave == b.slave) {
             let slave = local(of_slave[0].slave);
             let inclined = find(&inclined, slave as u32);
@@ -220,7 +219,6 @@ impl<const D: usize> Coupling<D> {
             for pair in of_slave {
                 let master = local(pair.master);
                 masters.push((master as u32, pair.share));
-                numbers.extend([pair.slave, pair.master]);
                 let columns = (0..D).map(|j| {
                     let unit = std::array::from_fn(|i| if i == j { pair.share } else { 0.0 });
                     let free = held.free_part(master, &unit);
@@ -228,30 +226,21 @@ impl<const D: usize> Coupling<D> {
                     inclined.map_or(moved, |at| add_scaled(&moved, dot(&at.held, &free), &at.opening))
                 });
                 let columns: Vec<Vector<D>> = columns.collect();
-                values.extend((0..D * D).map(|k| columns[k % D][k / D]));
+                let block = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
+                blocks.entry(pair.slave).or_default().push((pair.master, block));
             }
             let faced = of_slave.iter().zip(&masters[first..]).filter(|(pair, _)| pair.is_faced);
             let faced: Vec<(u32, f64)> = faced.map(|(_, master)| *master).collect();
             held_together.extend(HeldTogether::of(held, slave as u32, &faced));
             slaves.push((slave as u32, first..masters.len()));
         }
-        let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);
-        let mut blocks: BTreeMap<u32, Vec<(u32, Block<D>)>> = BTreeMap::new();
-        for (pair, block) in numbers.chunks_exact(2).zip(values.chunks_exact(D * D)) {
-            blocks.entry(pair[0]).or_default().push((pair[1], block_at(block, 0)));
-        }
         let (owned, pool) = (mesh.owned, Pool::default());
-        Ok(Self { owned, slaves, masters, held_together, inclined, blocks, pool })
+        Self { owned, slaves, masters, held_together, inclined, blocks, pool }
     }
 
     /// The slave nodes owned here with their masters and the shares of these, by local numbers.
     pub fn slaves(&self) -> impl Iterator<Item = (u32, &[(u32, f64)])> {
         self.slaves.iter().map(|(slave, range)| (*slave, &self.masters[range.clone()]))
-    }
-
-    /// Whether a node of any rank, by its global number, is a slave.
-    pub fn is_slave(&self, global: u32) -> bool {
-        self.blocks.contains_key(&global)
     }
 
     /// Adds `factor` times the free parts of the values of the surface that they face to those of slave nodes, whose held parts are those of
@@ -405,12 +394,14 @@ impl<const D: usize> Coupling<D> {
     /// `T^T K T` at free components, given the rows of `K` on this rank. Collective.
     pub fn transform(&self, session: &Session, mesh: &Mesh<D>, rows: BlockRows) -> Result<BlockRows, Agreed> {
         let first = mesh.first_node as u32;
+        let of_others = self.blocks_of_others(session, mesh, &rows.columns)?;
+        let blocks = |node: u32| self.blocks.get(&node).or_else(|| of_others.get(&node));
         let mut sums: Vec<Option<Row<D>>> = vec![None; mesh.owned];
         for (row, sums) in sums.iter_mut().enumerate() {
             let range = rows.offsets[row]..rows.offsets[row + 1];
-            let has_slaves = rows.columns[range.clone()].iter().any(|&column| self.is_slave(column));
+            let has_slaves = rows.columns[range.clone()].iter().any(|column| blocks(*column).is_some());
             if has_slaves {
-                *sums = Some(self.times_basis(&rows, range));
+                *sums = Some(times_basis(&rows, range, &blocks));
             }
         }
         // A node that many slave nodes face: their rows are added before they are sent.
@@ -468,18 +459,47 @@ impl<const D: usize> Coupling<D> {
         Ok(out)
     }
 
-    /// A row of `K T`, given the range of its entries in `K`.
-    fn times_basis(&self, rows: &BlockRows, range: Range<usize>) -> Row<D> {
-        let mut sums = BTreeMap::new();
-        for at in range {
-            let (column, entry) = (rows.columns[at], block_at(&rows.values, at));
-            add_block(&mut sums, column, &entry);
-            for (master, block) in self.blocks.get(&column).into_iter().flatten() {
-                add_block(&mut sums, *master, &product(&entry, block));
-            }
-        }
-        sums
+    /// The blocks of those of these nodes, by global numbers, that are slaves of other ranks. Collective.
+    fn blocks_of_others(
+        &self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        nodes: &[u32],
+    ) -> Result<Blocks<D>, Agreed> {
+        let others = nodes.iter().copied().filter(|node| mesh.owner(*node) != session.rank());
+        let answer = |node: u32| {
+            let of_node = self.blocks.get(&node).into_iter().flatten();
+            of_node
+                .flat_map(|(master, block)| {
+                    std::iter::once(f64::from(*master)).chain(block.as_flattened().iter().copied())
+                })
+                .collect()
+        };
+        let of_others = mesh.ask_owners(session, others, answer)?;
+        let slaves = of_others.into_iter().filter(|(_, answer)| !answer.is_empty());
+        let of_slave = |(node, answer): (u32, Vec<f64>)| {
+            let records = answer.chunks_exact(1 + D * D);
+            (node, records.map(|record| (record[0] as u32, block_at(&record[1..], 0))).collect())
+        };
+        Ok(slaves.map(of_slave).collect())
     }
+}
+
+/// A row of `K T`, given the range of its entries in `K` and the blocks of slaves.
+fn times_basis<'a, const D: usize>(
+    rows: &BlockRows,
+    range: Range<usize>,
+    blocks: impl Fn(u32) -> Option<&'a Vec<(u32, Block<D>)>>,
+) -> Row<D> {
+    let mut sums = BTreeMap::new();
+    for at in range {
+        let (column, entry) = (rows.columns[at], block_at(&rows.values, at));
+        add_block(&mut sums, column, &entry);
+        for (master, block) in blocks(column).into_iter().flatten() {
+            add_block(&mut sums, *master, &product(&entry, block));
+        }
+    }
+    sums
 }
 
 /// The inclination at a slave node, if there is one, of these, ascending.
@@ -489,6 +509,8 @@ fn find<const D: usize>(inclined: &[Inclined<D>], slave: u32) -> Option<&Incline
 
 /// An entry of a matrix for the components of two nodes.
 type Block<const D: usize> = [[f64; D]; D];
+/// For slave nodes, by global numbers, their masters and how these move their free components.
+type Blocks<const D: usize> = BTreeMap<u32, Vec<(u32, Block<D>)>>;
 /// The entries of a row, by columns.
 type Row<const D: usize> = BTreeMap<u32, Block<D>>;
 
@@ -511,12 +533,13 @@ fn product<const D: usize>(a: &Block<D>, b: &Block<D>) -> Block<D> {
 pub fn ghosts_of_surfaces<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
-    [slaves, masters]: [Vec<u32>; 2],
+    (slaves, masters): (BTreeSet<u32>, Vec<u32>),
 ) -> Result<Vec<u32>, Agreed> {
-    let slaves: BTreeSet<u32> = gather(session.world(), &slaves)?.into_iter().collect();
     let masters: BTreeSet<u32> = gather(session.world(), &masters)?.into_iter().collect();
     let nodes = |cell: usize| mesh.cell_nodes(cell).map(|node| mesh.global_node(node));
-    let has_slave = |cell: &usize| nodes(*cell).any(|node| slaves.contains(&node));
+    let mut all = slaves.clone();
+    all.extend(mesh.among(session, mesh.ghosts.iter().copied(), &slaves)?);
+    let has_slave = |cell: &usize| nodes(*cell).any(|node| all.contains(&node));
     let around: BTreeSet<u32> = (0..mesh.cell_count()).filter(has_slave).flat_map(nodes).collect();
     let own = mesh.first_node as u32..(mesh.first_node + mesh.owned) as u32;
     let takes_part = !around.is_empty() || masters.iter().any(|node| own.contains(node));
@@ -531,26 +554,31 @@ pub fn needed_ghosts<const D: usize>(
     mesh: &Mesh<D>,
     pairs: &[MasterShare],
 ) -> Result<Vec<u32>, Agreed> {
-    let numbers: Vec<u32> = pairs.iter().flat_map(|pair| [pair.slave, pair.master]).collect();
-    let numbers = gather(session.world(), &numbers)?;
     let mut masters: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    numbers.chunks_exact(2).for_each(|pair| masters.entry(pair[0]).or_default().push(pair[1]));
-    // The nodes around each slave, at its owner.
+    pairs.iter().for_each(|pair| masters.entry(pair.slave).or_default().push(pair.master));
+    let of_ghosts = mesh.ask_owners(session, mesh.ghosts.iter().copied(), |node| {
+        masters.get(&node).into_iter().flatten().map(|master| f64::from(*master)).collect()
+    })?;
+    let of_ghosts = of_ghosts.into_iter().filter(|(_, masters)| !masters.is_empty());
+    masters
+        .extend(of_ghosts.map(|(ghost, masters)| (ghost, masters.into_iter().map(|x| x as u32).collect())));
+    // The nodes around each slave with their masters, at its owner.
     let mut outgoing = vec![Vec::new(); session.ranks()];
     let mut needed = BTreeSet::new();
     for cell in 0..mesh.cell_count() {
         for slave in mesh.cell_nodes(cell).map(|node| mesh.global_node(node)) {
-            let Some(masters) = masters.get(&slave) else { continue };
-            needed.extend(masters);
+            let Some(of_slave) = masters.get(&slave) else { continue };
+            needed.extend(of_slave);
             let list = &mut outgoing[mesh.owner(slave)];
-            mesh.cell_nodes(cell).for_each(|node| list.extend([slave, mesh.global_node(node)]));
+            for node in mesh.cell_nodes(cell).map(|node| mesh.global_node(node)) {
+                let its_masters = masters.get(&node).into_iter().flatten();
+                list.extend(std::iter::once(&node).chain(its_masters).flat_map(|other| [slave, *other]));
+            }
         }
     }
     let mut coupled: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
     for pair in exchange_lists(session.world(), &outgoing)?.chunks_exact(2) {
-        let around = coupled.entry(pair[0]).or_default();
-        around.insert(pair[1]);
-        around.extend(masters.get(&pair[1]).into_iter().flatten());
+        coupled.entry(pair[0]).or_default().insert(pair[1]);
     }
     // Those of their masters, at the owners of these.
     let mut outgoing = vec![Vec::<u32>::new(); session.ranks()];

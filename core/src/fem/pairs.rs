@@ -1,14 +1,15 @@
-//! The pairs of nodes and facing surfaces of contact between bodies.
+//! The pairs of nodes and facing surfaces of contact between bodies. Each rank has the facets of both sides on its own cells, and those of the
+//! other side on other ranks that its slave facets may face.
 
 use super::coupling::{Inclined, MasterShare};
 use crate::{
     fem::space::{
         Held, SurfacePoint, longest_side,
         mortar::{Contribution, Facet, Normals, contributions, direction, shorter, smooth_direction},
-        smooth_points, surface_points,
+        surface_points,
     },
     linear_algebra::tensor::{Vector, add_scaled, dot, dual_basis, larger, norm, outside},
-    mesh::{Mesh, shape::facet_normal},
+    mesh::Mesh,
     parallel::{
         agreement::Agreed,
         exchange::{exchange_lists, gather},
@@ -19,6 +20,9 @@ use std::{
     borrow::Cow,
     collections::{BTreeMap, BTreeSet},
 };
+use surfaces::{FaceNormals, curvatures, facets_of, facing_facets, nodes_at, places_of};
+
+mod surfaces;
 
 /// A node of the slave side that faces the other side.
 #[derive(Debug, Clone, PartialEq)]
@@ -138,7 +142,7 @@ pub struct Sharing {
     pub on: Vec<u32>,
     /// The other side.
     pub against: Vec<u32>,
-    /// The nodes of the other side on all ranks, by global numbers.
+    /// The nodes of the other side that nodes owned here face, by global numbers.
     pub faced: BTreeSet<u32>,
 }
 
@@ -161,12 +165,12 @@ pub struct Pair<const D: usize> {
     /// Whether the undeformed surfaces count as touching wherever they face each other.
     pub is_closed: bool,
     /// The nodes of the slave side, by global numbers, whose part of the surface others of their facets stand for: they belong to other
-    /// contacts, too, or supports prevent their law. The same on all ranks.
+    /// contacts, too, or supports prevent their law. Of those that this rank owns and those of its facets.
     pub lawless: BTreeSet<u32>,
-    /// Nodes of the slave side, by global numbers, that carry the law of another pair that shares it. The same on all ranks.
+    /// Nodes of the slave side owned here, by global numbers, that carry the law of another pair that shares it.
     pub of_others: BTreeSet<u32>,
     /// The contacts that share facets of the slave side, with this one; none if there is no other. `on` and `against` are then those of all of
-    /// them, and each facet faces the other sides of all those that have it. The same on all ranks.
+    /// them, and each facet faces the other sides of all those that have it. The same contacts on all ranks.
     pub sharing: Vec<Sharing>,
     /// Whether facets of this rank face the other side of which none of the nodes carries a law, because of `lawless`.
     pub is_bare: bool,
@@ -208,7 +212,7 @@ impl<const D: usize> Pair<D> {
         self.sharing.iter().any(|sharing| sharing.contact == other.contact)
     }
 
-    /// The contact with a node of the other side, by its global number.
+    /// The contact with a node of the other side that a node owned here faces, by its global number.
     pub fn contact_with(&self, master: u32) -> usize {
         let sharing = self.sharing.iter().find(|sharing| sharing.faced.contains(&master));
         sharing.map_or(self.contact, |sharing| sharing.contact)
@@ -221,17 +225,19 @@ impl<const D: usize> Pair<D> {
         mesh: &Mesh<D>,
         places: &[Vector<D>],
     ) -> Result<Vec<Contribution<D>>, Agreed> {
-        let depth = DEEPEST * longest_side(session, places);
-        let of_facets = |on: &[u32], masters: &[Facet<D>]| {
-            let slaves: Vec<Facet<D>> = on.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
-            contributions(&slaves, masters, [depth, f64::INFINITY])
+        let reach = [DEEPEST * longest_side(session, places), f64::INFINITY];
+        let of_facets =
+            |on: &[u32], masters: &[Facet<D>]| contributions(&facets_of(mesh, places, on), masters, reach);
+        let facing = |on: &[u32], against: &[u32]| {
+            let [on, against] = [on, against].map(|facets| facets_of(mesh, places, facets));
+            facing_facets((session, mesh), &on, against, reach)
         };
         if self.sharing.is_empty() {
-            return Ok(of_facets(&self.on, &gather_facets(session, mesh, places, &self.against)?));
+            return Ok(of_facets(&self.on, &facing(&self.on, &self.against)?));
         }
         let mut masters = Vec::new();
         for sharing in &self.sharing {
-            masters.push(gather_facets(session, mesh, places, &sharing.against)?);
+            masters.push(facing(&sharing.on, &sharing.against)?);
         }
         // Facets by which of the contacts have them.
         let mut kinds: BTreeMap<Vec<bool>, Vec<u32>> = BTreeMap::new();
@@ -252,22 +258,15 @@ impl<const D: usize> Pair<D> {
     /// Lets nodes face those at the same place on the other side, of a mesh that was split; nodes that both sides have carry no law.
     /// Collective.
     pub fn join(&mut self, session: &Session, mesh: &Mesh<D>) -> Result<(), Agreed> {
-        let bits = |place: &Vector<D>| place.map(f64::to_bits);
-        let nodes: BTreeSet<u32> = self.against.iter().flat_map(|facet| mesh.facet_nodes(*facet)).collect();
-        let numbers: Vec<u32> = nodes.iter().map(|node| mesh.global_node(*node)).collect();
-        let places: Vec<f64> = nodes.iter().flat_map(|node| mesh.nodes[*node as usize]).collect();
-        let (numbers, places) = (gather(session.world(), &numbers)?, gather(session.world(), &places)?);
-        let twins: BTreeMap<[u64; D], u32> = places
-            .chunks_exact(D)
-            .map(|place| std::array::from_fn(|i| place[i].to_bits()))
-            .zip(numbers)
-            .collect();
-        let points = surface_points(session, mesh, &self.on)?.into_iter().filter(|point| point.weight > 0.0);
-        let paired = points.filter_map(|SurfacePoint { node, normal, weight }| {
-            let twin = *twins.get(&bits(&mesh.nodes[node as usize]))?;
-            let masters = vec![(twin, 1.0)];
+        let mut points = surface_points(session, mesh, &self.on)?;
+        points.retain(|point| point.weight > 0.0);
+        let places: Vec<Vector<D>> = points.iter().map(|point| mesh.nodes[point.node as usize]).collect();
+        let twins = nodes_at(session, mesh, &self.against, &places)?;
+        let twins = points.into_iter().zip(twins);
+        let paired = twins.filter_map(|(SurfacePoint { node, normal, weight }, twin)| {
+            let masters = vec![(twin?, 1.0)];
             let (distance, stretch) = (0.0, 1.0);
-            (twin != mesh.global_node(node)).then_some(PairedNode {
+            (twin != Some(mesh.global_node(node))).then_some(PairedNode {
                 node,
                 normal,
                 weight,
@@ -302,25 +301,45 @@ impl<const D: usize> Pair<D> {
         Edges { sharpness, ends: ends > 0.0 }
     }
 
-    /// The nodes that carry the law, and those on which their velocities depend or may depend as bodies slide, by global numbers on all
-    /// ranks. Collective.
-    pub fn nodes_of_all(&self, session: &Session, mesh: &Mesh<D>) -> Result<[BTreeSet<u32>; 2], Agreed> {
-        let own: Vec<u32> = self.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
-        let facets = self.against.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-        let faced: Vec<u32> = match self.slides {
-            true => facets.map(|node| mesh.global_node(node)).collect(),
-            false => self.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master).collect(),
-        };
-        let all = |nodes: &[u32]| -> Result<BTreeSet<u32>, Agreed> {
-            Ok(gather(session.world(), nodes)?.into_iter().collect())
-        };
-        Ok([all(&own)?, all(&faced)?])
+    /// The nodes owned here that carry the law, by global numbers.
+    pub fn carrying(&self, mesh: &Mesh<D>) -> BTreeSet<u32> {
+        self.nodes.iter().map(|node| mesh.global_node(node.node)).collect()
+    }
+
+    /// The nodes owned here on which the velocities of those that carry the law depend, or may depend as bodies slide, by global numbers.
+    /// Collective.
+    pub fn faced(&self, session: &Session, mesh: &Mesh<D>) -> Result<BTreeSet<u32>, Agreed> {
+        if self.slides {
+            return mesh.named(session, mesh.nodes_of_facets(&self.against));
+        }
+        mesh.named(session, self.nodes.iter().flat_map(|node| &node.masters).map(|(master, _)| *master))
+    }
+
+    /// Lets nodes of the slave side, of which each rank gives those that it owns, by global numbers, leave their part of the surface to
+    /// neighbours, and finds anew what those face. Collective.
+    pub fn leave(
+        &mut self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        lawless: impl IntoIterator<Item = u32>,
+    ) -> Result<(), Agreed> {
+        let own = mesh.first_node as u32..(mesh.first_node + mesh.owned) as u32;
+        let mut all: BTreeSet<u32> = self.lawless.iter().copied().filter(|node| own.contains(node)).collect();
+        all.extend(lawless);
+        self.lawless = mesh.among(session, mesh.nodes_of_facets(&self.on), &all)?;
+        self.lawless.extend(all);
+        self.form(session, mesh, &mesh.nodes)
     }
 
     /// Finds what nodes face, with the local nodes of the mesh at `places` in m. Collective.
     pub fn form(&mut self, session: &Session, mesh: &Mesh<D>, places: &[Vector<D>]) -> Result<(), Agreed> {
         let is_own = |node: u32| !self.of_others.contains(&mesh.global_node(node));
         let (mut found, is_bare) = self.paired_nodes(session, mesh, places)?;
+        for at in 0..self.sharing.len() {
+            let faced = mesh.named(session, mesh.nodes_of_facets(&self.sharing[at].against))?;
+            let masters = found.iter().flat_map(|node| &node.masters).map(|(master, _)| *master);
+            self.sharing[at].faced = mesh.among(session, masters, &faced)?;
+        }
         found.retain(|node| is_own(node.node));
         if self.is_closed {
             found.iter_mut().for_each(|node| node.distance = 0.0);
@@ -397,33 +416,40 @@ impl<const D: usize> Pair<D> {
         mesh: &Mesh<D>,
         places: &[Vector<D>],
     ) -> Result<(Vec<PairedNode<D>>, bool), Agreed> {
-        let normals = FaceNormals::of(session, mesh, [&self.on, &self.against])?;
+        let mut normals = FaceNormals::of(session, mesh, [&self.on, &self.against])?;
         let mut all = self.contributions(session, mesh, places)?;
-        let at = gather_places(session, mesh, places, [&self.on, &self.against])?;
         if mesh.order() == 2 {
+            let nodes =
+                all.iter().flat_map(|one| one.masters.iter().map(|(master, _)| *master).chain([one.node]));
+            let at = places_of(session, mesh, places, nodes)?;
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
-        let curvatures = curvatures(&gather_facets(session, mesh, places, &self.on)?);
-        let own = self.on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-        let own: BTreeSet<u32> = own.map(|node| mesh.global_node(node)).collect();
+        let curvatures = curvatures(session, mesh, &facets_of(mesh, places, &self.on))?;
+        let own: BTreeSet<u32> = mesh.nodes_of_facets(&self.on).collect();
+        let leaves = session.total(self.lawless.len()) > 0;
         let mut lawless = self.lawless.clone();
         loop {
             let sums = sum_of_contributions(session, mesh, (&all, &own), &lawless)?;
             let covered = sums.iter().filter(|(_, sum)| sum.whole > 0.0 && !sum.masters.is_empty());
-            let bearing: Vec<u32> =
+            let bearing: BTreeSet<u32> =
                 covered.filter(|(_, sum)| !sum.carries_a_law()).map(|(node, _)| *node).collect();
-            let further = gather(session.world(), &bearing)?;
-            if further.is_empty() {
+            if session.total(bearing.len()) == 0 {
                 let is_bare = |of_facet: &[Contribution<D>]| {
                     let sum = |part: fn(&Contribution<D>) -> f64| of_facet.iter().map(part).sum::<f64>();
                     of_facet.iter().all(|one| lawless.contains(&one.node))
                         && sum(|one| one.weight) > LEAST_STRETCH * sum(|one| one.whole)
                 };
-                let is_bare = !self.lawless.is_empty() && all.chunks_exact(per_facet(mesh)).any(is_bare);
+                let is_bare = leaves && all.chunks_exact(per_facet(mesh)).any(is_bare);
+                let nodes = || sums.iter().flat_map(|(node, sum)| sum.masters.keys().chain([node])).copied();
+                let at = places_of(session, mesh, places, nodes())?;
+                if self.slides {
+                    normals.add_others(session, mesh, nodes())?;
+                }
                 let surface = Surface { places: &at, curvatures: &curvatures, normals: &normals };
                 return Ok((paired(mesh, sums, &surface, self.slides), is_bare));
             }
-            lawless.extend(further);
+            lawless.extend(mesh.among(session, own.iter().copied(), &bearing)?);
+            lawless.extend(bearing);
         }
     }
 }
@@ -503,8 +529,6 @@ pub fn inclined<const D: usize>(pairs: &[Pair<D>], held: &Held<D>) -> Vec<Inclin
 
 /// How many times as far as a curved boundary turns within the facets around a node it is inclined at most to a plane of symmetry.
 const CURVED: f64 = 4.0;
-/// Cosine of the angle up to which the mean normal of a part of the surface is that of a face (20 degrees).
-const SAME_FACE: f64 = 0.94;
 /// The held part of a normal is a rounding error below this.
 const ROUNDING: f64 = 1e-6;
 /// The least free part of a normal along which a node may open the boundary.
@@ -520,68 +544,6 @@ const LEAST_SPREAD: f64 = 1e-3;
 /// The deepest penetration of undeformed bodies at which they face each other, as a share of the longest side of the box around them; it
 /// is larger where facets are.
 const DEEPEST: f64 = 0.05;
-
-/// The outward unit normals of the faces around the nodes of both sides of a pair, in the undeformed bodies, by global numbers. The same on
-/// all ranks.
-struct FaceNormals<const D: usize>(BTreeMap<u32, Vec<Vector<D>>>);
-
-impl<const D: usize> FaceNormals<D> {
-    /// Those of these facets. Collective.
-    fn of(session: &Session, mesh: &Mesh<D>, sides: [&[u32]; 2]) -> Result<Self, Agreed> {
-        let mut own = Vec::new();
-        for side in sides {
-            for point in smooth_points(session, mesh, side)? {
-                own.push(f64::from(mesh.global_node(point.node)));
-                own.extend(point.normal);
-            }
-        }
-        let mut normals: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
-        for record in gather(session.world(), &own)?.chunks_exact(D + 1) {
-            normals.entry(record[0] as u32).or_default().push(std::array::from_fn(|i| record[i + 1]));
-        }
-        Ok(Self(normals))
-    }
-
-    /// The normal at a node of the face of which a part has this mean normal.
-    fn at(&self, node: u32, mean: &Vector<D>) -> Vector<D> {
-        let faces = self.0.get(&node).into_iter().flatten();
-        let same = faces.filter(|normal| dot(normal, mean) > SAME_FACE);
-        same.max_by(|a, b| dot(a, mean).total_cmp(&dot(b, mean))).copied().unwrap_or(*mean)
-    }
-}
-
-/// A facet of this rank.
-fn facet_of<const D: usize>(mesh: &Mesh<D>, places: &[Vector<D>], facet: u32) -> Facet<D> {
-    let of_corners = mesh.facets[facet as usize];
-    let nodes = mesh.facet_nodes(facet).map(|node| mesh.global_node(node)).collect();
-    let turns = of_corners.map(|node| mesh.turn(&mesh.nodes[node as usize]));
-    let undeformed = Facet::new(Vec::new(), mesh.facet_corners(facet)).normal;
-    Facet { turns, undeformed, ..Facet::new(nodes, of_corners.map(|node| places[node as usize])) }
-}
-
-/// These facets of all ranks. Collective.
-fn gather_facets<const D: usize>(
-    session: &Session,
-    mesh: &Mesh<D>,
-    places: &[Vector<D>],
-    facets: &[u32],
-) -> Result<Vec<Facet<D>>, Agreed> {
-    let own: Vec<Facet<D>> = facets.iter().map(|facet| facet_of(mesh, places, *facet)).collect();
-    let nodes: Vec<u32> = own.iter().flat_map(|facet| facet.nodes.iter().copied()).collect();
-    let places: Vec<f64> = own.iter().flat_map(|facet| facet.corners.as_flattened()).copied().collect();
-    let normals: Vec<f64> = own.iter().flat_map(|facet| facet.undeformed).collect();
-    let (nodes, places) = (gather(session.world(), &nodes)?, gather(session.world(), &places)?);
-    let normals = gather(session.world(), &normals)?;
-    let per_facet = if mesh.order() == 2 { D + D * (D - 1) / 2 } else { D };
-    let corners = places.chunks_exact(D * D);
-    let corners = corners.map(|all| std::array::from_fn(|a| std::array::from_fn(|i| all[a * D + i])));
-    let facets = nodes.chunks_exact(per_facet).zip(corners.zip(normals.as_chunks().0));
-    let facet = |(nodes, (at, undeformed)): (&[u32], (_, &Vector<D>))| {
-        let undeformed = *undeformed;
-        Facet { undeformed, ..Facet::new(nodes.to_vec(), at) }
-    };
-    Ok(facets.map(facet).collect())
-}
 
 /// Axes of space.
 fn axes_of_space<const D: usize>() -> [Vector<D>; D] {
@@ -623,22 +585,6 @@ fn axes_along_first<const D: usize>(
         axes[k] = axis;
     }
     Ok(axes)
-}
-
-/// The places in m of the nodes of these facets of all ranks, by global numbers. Collective.
-fn gather_places<const D: usize>(
-    session: &Session,
-    mesh: &Mesh<D>,
-    places: &[Vector<D>],
-    facets: [&[u32]; 2],
-) -> Result<BTreeMap<u32, Vector<D>>, Agreed> {
-    let nodes = facets.into_iter().flatten().flat_map(|facet| mesh.facet_nodes(*facet));
-    let own: BTreeMap<u32, Vector<D>> =
-        nodes.map(|node| (mesh.global_node(node), places[node as usize])).collect();
-    let numbers: Vec<u32> = own.keys().copied().collect();
-    let values: Vec<f64> = own.into_values().flatten().collect();
-    let (numbers, values) = (gather(session.world(), &numbers)?, gather(session.world(), &values)?);
-    Ok(numbers.into_iter().zip(values.as_chunks().0.iter().copied()).collect())
 }
 
 /// The integral of a multiplier times the distance between two quadratic surfaces, which bulge between the corners of their facets as far as
@@ -783,31 +729,6 @@ fn sum_of_contributions<const D: usize>(
     Ok(sums)
 }
 
-/// How curved the surface of these facets is at their nodes, by global numbers, as [`PairedNode::curvature`].
-fn curvatures<const D: usize>(facets: &[Facet<D>]) -> BTreeMap<u32, f64> {
-    let mut normals: BTreeMap<u32, Vector<D>> = BTreeMap::new();
-    for facet in facets {
-        let area = norm(&facet_normal(&facet.corners));
-        for node in &facet.nodes[..D] {
-            let sum = normals.entry(*node).or_insert([0.0; D]);
-            *sum = add_scaled(sum, area, &facet.normal);
-        }
-    }
-    let mut largest: BTreeMap<u32, f64> = BTreeMap::new();
-    for facet in facets {
-        let turned = |node: &u32| {
-            let normal = &normals[node];
-            norm(&add_scaled(&facet.normal, -1.0 / norm(normal), normal))
-        };
-        let most = facet.nodes[..D].iter().map(turned).fold(0.0, larger);
-        for node in &facet.nodes {
-            let of_node = largest.entry(*node).or_default();
-            *of_node = larger(*of_node, most);
-        }
-    }
-    largest
-}
-
 /// Both sides of a pair, by the global numbers of nodes.
 struct Surface<'a, const D: usize> {
     /// Places in m.
@@ -907,7 +828,10 @@ fn face_along_normal<const D: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{
+        surfaces::{sums_of_normals, turns_from},
+        *,
+    };
 
     /// What a segment of 1 m between two slave nodes has that faces the whole of another one at a distance of 3 m.
     fn segment() -> [Contribution<2>; 2] {
@@ -1003,7 +927,7 @@ mod tests {
         };
         for count in [3, 7, 40] {
             let (facets, _) = arc(count, 0, true);
-            let node = at(facets[0].normal, curvatures(&facets)[&0]);
+            let node = at(facets[0].normal, turns_from(&facets, &sums_of_normals(&facets))[&0]);
             assert_eq!(node.inclination(&held), None, "{count} facets");
             assert_eq!(node.point(&held).normal, [1.0, 0.0], "{count} facets");
         }

@@ -11,6 +11,7 @@ mod global;
 mod hanging;
 mod lookup;
 mod midsides;
+mod owners;
 pub mod partition;
 pub mod piece;
 mod rigid;

@@ -48,7 +48,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let effects = session.agree(effects(&materials.all, &geometry, &initial_stress, comparison))?;
     let load = load(session, job, &mesh, &materials.all)?;
     let elastic_support = elastic_support::<D, S>(session, job, &mesh, &supports.held, materials)?;
-    let coupling = coupling(session, &mesh, &pairs, &supports.held)?;
+    let coupling = coupling(&mesh, &pairs, &supports.held);
     let (mut contacts, parts) = contacts(session, job, &mesh, &pairs, &supports)?;
     let Supports { held, motion } = supports;
     let points = |at: usize| -> Result<Vec<SurfacePoint<D>>> {

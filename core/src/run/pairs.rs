@@ -71,24 +71,22 @@ pub(super) fn find<const D: usize>(
     }
     sides.settle(&mut pairs)?;
     let shares = shares(mesh, &pairs);
-    let global =
-        |facet: &u32| mesh.facet_nodes(*facet).map(|node| mesh.global_node(node)).collect::<Vec<_>>();
     let mut slaves: BTreeSet<u32> = shares.iter().map(|share| share.slave).collect();
     let mut masters: BTreeSet<u32> = shares.iter().map(|share| share.master).collect();
     let mut ghosts = needed_ghosts(session, mesh, &shares)?;
     for pair in pairs.iter().filter(|pair| pair.slides) {
-        let on: BTreeSet<u32> = pair.nodes.iter().map(|node| mesh.global_node(node.node)).collect();
-        let against: BTreeSet<u32> = pair.against.iter().flat_map(global).collect();
-        let without_law = pair.on.iter().flat_map(global).filter(|node| !on.contains(node));
+        let on = pair.carrying(mesh);
+        let against: BTreeSet<u32> = mesh.nodes_of_facets(&pair.against).collect();
+        let without_law = mesh.nodes_of_facets(&pair.on).filter(|node| !on.contains(node));
         let others = without_law.chain(against.iter().copied()).collect();
-        ghosts.extend(ghosts_of_surfaces(session, mesh, [on.iter().copied().collect(), others])?);
+        ghosts.extend(ghosts_of_surfaces(session, mesh, (on.clone(), others))?);
         // Nodes that leave their part of the surface to neighbours for the time being carry no law.
-        let beside: Vec<u32> = pair.nodes.iter().flat_map(|node| node.neighbours.iter().copied()).collect();
-        let beside: BTreeSet<u32> = gather(session.world(), &beside)?.into_iter().collect();
+        let beside = pair.nodes.iter().flat_map(|node| node.neighbours.iter().copied());
+        let beside = mesh.named(session, beside)?;
         slaves.extend(on.difference(&beside));
         masters.extend(against);
     }
-    refuse_chains(session, job, mesh, [&slaves, &masters])?;
+    refuse_chains(session, job, mesh, [slaves, masters])?;
     mesh.add_ghosts(session, ghosts)?;
     Ok(pairs)
 }
@@ -100,39 +98,36 @@ fn refuse_joined<const D: usize>(
     (number, contact): (usize, &job::Contact),
     sides: [&[u32]; 2],
 ) -> Result<(), Agreed> {
-    let nodes_of = |facets: &[u32]| -> Result<BTreeSet<u32>, Agreed> {
-        let nodes = facets.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-        let numbers: Vec<u32> = nodes.map(|node| mesh.global_node(node)).collect();
-        Ok(gather(session.world(), &numbers)?.into_iter().collect())
-    };
+    let nodes_of = |facets: &[u32]| mesh.named(session, mesh.nodes_of_facets(facets));
     let shared = &nodes_of(sides[0])? & &nodes_of(sides[1])?;
-    if shared.is_empty() {
+    if session.total(shared.len()) == 0 {
         return Ok(());
     }
     let bodies = mesh.bodies(session)?;
-    let records_of = |facets: &[u32]| -> Result<Vec<f64>, Agreed> {
-        let mut own = Vec::new();
-        for &facet in facets {
+    // The bodies that have the nodes owned here on either side.
+    let bodies_on = |facets: &[u32]| -> Result<BTreeMap<u32, BTreeSet<u64>>, Agreed> {
+        let told = facets.iter().flat_map(|&facet| {
             let body = bodies.of_cell[mesh.facet_cells[facet as usize] as usize];
-            for node in mesh.facet_nodes(facet).filter(|node| shared.contains(&mesh.global_node(*node))) {
-                own.extend([f64::from(mesh.global_node(node)), f64::from(body)]);
-                own.extend(mesh.nodes[node as usize]);
-            }
+            mesh.facet_nodes(facet).map(move |node| (mesh.global_node(node), [f64::from(body)]))
+        });
+        let mut found: BTreeMap<u32, BTreeSet<u64>> = BTreeMap::new();
+        for (node, [body]) in mesh.tell_owners(session, told)? {
+            found.entry(node).or_default().insert(body as u64);
         }
-        gather(session.world(), &own)
+        Ok(found)
     };
-    let [on, against] = [records_of(sides[0])?, records_of(sides[1])?];
-    let joined = on
-        .chunks_exact(2 + D)
-        .find(|one| against.chunks_exact(2 + D).any(|other| one[0] == other[0] && one[1] != other[1]));
+    let [on, against] = [bodies_on(sides[0])?, bodies_on(sides[1])?];
+    let joined = on.iter().find(|(node, bodies)| {
+        against.get(node).is_some_and(|others| others.len() > 1 || bodies.len() > 1 || *bodies != others)
+    });
     session.agree(match joined {
         None => Ok(()),
-        Some(at) => Err(Error::Refused(format!(
+        Some((node, _)) => Err(Error::Refused(format!(
             "contact.{number}: the boundaries {} and {} share the node at {:?} m: the bodies are joined there; write the mesh with separate \
              nodes",
             contact.on.join(", "),
             contact.against.join(", "),
-            &at[2..]
+            mesh.nodes[mesh.owned_node(*node)]
         ))),
     })
 }
@@ -164,14 +159,10 @@ fn refuse_chains<const D: usize>(
     session: &Session,
     job: &Job,
     mesh: &Mesh<D>,
-    [slaves, masters]: [&BTreeSet<u32>; 2],
+    [slaves, masters]: [BTreeSet<u32>; 2],
 ) -> Result<(), Agreed> {
-    let [slaves, masters] = [slaves, masters].map(|nodes| nodes.iter().copied().collect::<Vec<_>>());
-    let slaves: BTreeSet<u32> = gather(session.world(), &slaves)?.into_iter().collect();
-    let masters: BTreeSet<u32> = gather(session.world(), &masters)?.into_iter().collect();
-    let own = mesh.first_node as u32..(mesh.first_node + mesh.owned) as u32;
-    let both = slaves.intersection(&masters).find(|node| own.contains(node));
-    session.agree(match both {
+    let (slaves, masters) = (mesh.named(session, slaves)?, mesh.named(session, masters)?);
+    session.agree(match slaves.intersection(&masters).next() {
         None => Ok(()),
         Some(&node) => Err(Error::Refused(format!(
             "contact: the node at {:?} m carries the law of one contact between bodies, and another one has it on the other side; {}{}",
@@ -183,17 +174,13 @@ fn refuse_chains<const D: usize>(
     })
 }
 
-/// The change of basis by these pairs, if there are any. Collective.
+/// The change of basis by these pairs, if there are any.
 pub(super) fn coupling<const D: usize>(
-    session: &Session,
     mesh: &Mesh<D>,
     pairs: &[Pair<D>],
     held: &Held<D>,
-) -> Result<Option<Coupling<D>>, Agreed> {
-    if pairs.is_empty() {
-        return Ok(None);
-    }
-    Coupling::new(session, mesh, (&shares(mesh, pairs), inclined(pairs, held)), held).map(Some)
+) -> Option<Coupling<D>> {
+    (!pairs.is_empty()).then(|| Coupling::new(mesh, (&shares(mesh, pairs), inclined(pairs, held)), held))
 }
 
 /// The shares of the masters that a node of a pair faces on the other side, each with the length of the free part of a direction there.

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::pairs::{Exchange, Pair, Sharing, pair_of},
-    parallel::{agreement::Agreed, exchange::gather},
+    parallel::agreement::Agreed,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -73,16 +73,6 @@ impl<const D: usize> Sides<'_, D> {
     /// The same for pairs, given by their positions, that have one slave side.
     fn share_side(&self, pairs: &mut [Pair<D>], group: &[usize]) -> Result<(), Agreed> {
         let Self { session, mesh, .. } = *self;
-        let all = |nodes: Vec<u32>| -> Result<BTreeSet<u32>, Agreed> {
-            Ok(gather(session.world(), &nodes)?.into_iter().collect())
-        };
-        let nodes_of = |facets: &[u32]| -> Vec<u32> {
-            facets
-                .iter()
-                .flat_map(|facet| mesh.facet_nodes(*facet))
-                .map(|node| mesh.global_node(node))
-                .collect()
-        };
         // Of each node, the position of the pair of which it faces the largest part.
         let mut most: BTreeMap<u32, (usize, f64)> = BTreeMap::new();
         for &at in group {
@@ -97,19 +87,15 @@ impl<const D: usize> Sides<'_, D> {
         let (mut sharing, mut carrying) = (Vec::new(), Vec::new());
         for &at in group {
             let Pair { contact, on, against, .. } = pairs[at].clone();
-            let faced = all(nodes_of(&against))?;
-            sharing.push(Sharing { contact, on, against, faced });
-            carrying.push(all(most
-                .iter()
-                .filter(|(_, (of, _))| *of == at)
-                .map(|(node, _)| *node)
-                .collect())?);
+            sharing.push(Sharing { contact, on, against, faced: BTreeSet::new() });
+            let of_pair = most.iter().filter(|(_, (of, _))| *of == at);
+            carrying.push(of_pair.map(|(node, _)| *node).collect::<BTreeSet<u32>>());
         }
         let of_all = |facets: fn(&Sharing) -> &Vec<u32>| -> Vec<u32> {
             sharing.iter().flat_map(facets).copied().collect::<BTreeSet<u32>>().into_iter().collect()
         };
         let (on, against) = (of_all(|sharing| &sharing.on), of_all(|sharing| &sharing.against));
-        let own = all(nodes_of(&on))?;
+        let own = mesh.named(session, mesh.nodes_of_facets(&on))?;
         let lawless: BTreeSet<u32> = group.iter().flat_map(|at| pairs[*at].lawless.clone()).collect();
         for (place, &at) in group.iter().enumerate() {
             let pair = &mut pairs[at];
@@ -123,7 +109,7 @@ impl<const D: usize> Sides<'_, D> {
             pair.sharing.clone_from(&sharing);
             pair.on.clone_from(&on);
             pair.against.clone_from(&against);
-            pair.form(session, mesh, &mesh.nodes)?;
+            pair.leave(session, mesh, [])?;
         }
         Ok(())
     }
@@ -134,19 +120,18 @@ impl<const D: usize> Sides<'_, D> {
         let Self { session, job, mesh, .. } = *self;
         let (mut slaves, mut both) = (Vec::new(), Vec::new());
         for pair in &*pairs {
-            let [own, faced] = pair.nodes_of_all(session, mesh)?;
-            both.push(&own | &faced);
+            let own = pair.carrying(mesh);
+            both.push(&own | &pair.faced(session, mesh)?);
             slaves.push(own);
         }
         let mut of_obstacles = Vec::new();
         for (number, contact) in job.contact.iter().enumerate() {
             if pair_of(pairs, number).is_none() {
                 let on = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
-                let nodes = on.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-                of_obstacles.extend(nodes.map(|node| mesh.global_node(node)));
+                of_obstacles.extend(mesh.nodes_of_facets(&on));
             }
         }
-        let of_obstacles: BTreeSet<u32> = gather(session.world(), &of_obstacles)?.into_iter().collect();
+        let of_obstacles = mesh.named(session, of_obstacles)?;
         for at in 0..pairs.len() {
             let contact = &job.contact[pairs[at].contact];
             if contact.against.is_empty() || !contact.is_without_scale() {
@@ -158,20 +143,18 @@ impl<const D: usize> Sides<'_, D> {
             let is_shared = |node: &u32| {
                 of_obstacles.contains(node) || others.iter().any(|other| both[*other].contains(node))
             };
-            let shared = own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared);
+            let shared: Vec<u32> =
+                own.iter().flat_map(|own| &slaves[*own]).copied().filter(is_shared).collect();
             let pair = &mut pairs[at];
-            pair.lawless.extend(shared);
-            if pair.lawless.is_empty() {
+            if session.total(pair.lawless.len() + shared.len()) == 0 {
                 continue;
             }
-            pair.form(session, mesh, &mesh.nodes)?;
+            pair.leave(session, mesh, shared)?;
             if !pair.sharing.is_empty() || session.total(pair.nodes.len()) > 0 {
                 continue;
             }
             if let Some(mut other) = self.exchanged(pair, Exchange::Shared)? {
-                let [own, _] = other.nodes_of_all(session, mesh)?;
-                other.lawless.extend(own.into_iter().filter(is_shared));
-                other.form(session, mesh, &mesh.nodes)?;
+                other.leave(session, mesh, other.carrying(mesh).into_iter().filter(is_shared))?;
                 *pair = other;
             }
             session.agree(if session.total(pair.nodes.len()) > 0 {
@@ -198,23 +181,21 @@ impl<const D: usize> Sides<'_, D> {
             if contact.against.is_empty() || !rubs(contact) || !contact.is_without_scale() {
                 continue;
             }
-            let mut inclined: BTreeSet<u32> =
-                gather(session.world(), &self.inclined(pair))?.into_iter().collect();
-            let [own, _] = pair.nodes_of_all(session, mesh)?;
+            let inclined = self.inclined(pair)?;
+            let around = || mesh.nodes_of_facets(&pair.on);
+            let carrying = mesh.among(session, around(), &pair.carrying(mesh))?;
+            let others_are = mesh.among(session, around(), &inclined)?;
             let mut kept = Vec::new();
             for facet in &pair.on {
-                let nodes = mesh.facet_nodes(*facet).map(|node| mesh.global_node(node));
-                let nodes: Vec<u32> = nodes.filter(|node| own.contains(node)).collect();
-                if nodes.iter().all(|node| inclined.contains(node)) {
+                let nodes: Vec<u32> =
+                    mesh.nodes_of_facets([facet]).filter(|node| carrying.contains(node)).collect();
+                if nodes.iter().all(|node| others_are.contains(node)) {
                     kept.extend(nodes);
                 }
             }
-            gather(session.world(), &kept)?.iter().for_each(|node| {
-                inclined.remove(node);
-            });
-            if !inclined.is_empty() {
-                pair.lawless.extend(inclined);
-                pair.form(session, mesh, &mesh.nodes)?;
+            let left = &inclined - &mesh.named(session, kept)?;
+            if session.total(left.len()) > 0 {
+                pair.leave(session, mesh, left)?;
             }
         }
         Ok(())

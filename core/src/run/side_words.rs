@@ -6,14 +6,14 @@ use crate::{
     fem::{
         body::Body,
         effect::Contact,
-        pairs::{Edges, Exchange, Pair},
+        pairs::{Edges, Exchange, Pair, PairedNode},
         state::State,
     },
     job::{self, Job, Side},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
-    parallel::{agreement::Agreed, exchange::gather, session::Session},
+    parallel::{agreement::Agreed, session::Session},
 };
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The angle in rad (10 degrees) of edges over faces whose nodes carry the law from which on the user is warned: forces along an inclined
 /// face are 18 % of those across.
@@ -125,13 +125,8 @@ pub(super) fn exchange_of_sides<const D: usize, const S: usize>(
         .collect();
     let mut other = pair.clone().exchanged(Exchange::Requested);
     other.form(session, mesh, &places)?;
-    let own: Vec<u32> = other
-        .nodes
-        .iter()
-        .filter(|node| node.meets_end)
-        .flat_map(|node| node.faced().map(|(own, _)| *own).collect::<Vec<_>>())
-        .collect();
-    let own: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
+    let at_end = other.nodes.iter().filter(|node| node.meets_end);
+    let own = mesh.named(session, at_end.flat_map(PairedNode::faced).map(|(own, _)| *own))?;
     let at_own = seen.iter().filter(|(node, _)| own.contains(&mesh.global_node(*node as u32)));
     let [at_own] = session.largest([at_own.map(|(_, [p, _])| *p).fold(0.0, larger)]);
     let side = if pair.exchange.is_some() { "on" } else { "against" };

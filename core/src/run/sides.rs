@@ -16,7 +16,7 @@ use crate::{
         tensor::{Vector, add_scaled, dot, larger, norm},
     },
     mesh::{Mesh, other_side},
-    parallel::{agreement::Agreed, exchange::gather, session::Session},
+    parallel::{agreement::Agreed, session::Session},
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,8 +43,6 @@ pub(super) struct Sides<'a, const D: usize> {
     earlier: &'a BTreeMap<usize, bool>,
     /// What supports hold on this rank.
     held: Held<D>,
-    /// The directions in which they hold nodes of pairs on all ranks, orthonormal, by global numbers.
-    directions: BTreeMap<u32, Vec<Vector<D>>>,
 }
 
 impl<'a, const D: usize> Sides<'a, D> {
@@ -54,33 +52,13 @@ impl<'a, const D: usize> Sides<'a, D> {
         (mesh, materials): (&'a Mesh<D>, &'a Materials),
         earlier: &'a BTreeMap<usize, bool>,
     ) -> Result<Self, Agreed> {
-        let (held, directions) = (Held::default(), BTreeMap::new());
-        let mut sides = Self { session, job, mesh, materials, earlier, held, directions };
+        let mut sides = Self { session, job, mesh, materials, earlier, held: Held::default() };
         let ignores_supports = |contact: &job::Contact| contact.side != Side::Auto && !rubs(contact);
         if job.contact.iter().all(|contact| contact.against.is_empty() || ignores_supports(contact)) {
             return Ok(sides);
         }
         let layout = session.agree(DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts))?;
         sides.held = session.agree(Supports::of_body(session, mesh, &job.support, &layout))?.held;
-        let names = job.contact.iter().flat_map(|contact| contact.on.iter().chain(&contact.against));
-        let nodes: BTreeSet<u32> =
-            facets(mesh, names).into_iter().flat_map(|facet| mesh.facet_nodes(facet)).collect();
-        let mut records = Vec::new();
-        for node in nodes {
-            let (frame, free) = sides.held.frame(node as usize);
-            for direction in &frame[free..] {
-                records.push(f64::from(mesh.global_node(node)));
-                records.extend(direction);
-            }
-        }
-        for record in gather(session.world(), &records)?.chunks_exact(1 + D) {
-            let of_node = sides.directions.entry(record[0] as u32).or_default();
-            let direction = std::array::from_fn(|i| record[1 + i]);
-            // Each rank that has the node tells the same.
-            if !of_node.contains(&direction) {
-                of_node.push(direction);
-            }
-        }
         Ok(sides)
     }
 
@@ -114,10 +92,11 @@ impl<'a, const D: usize> Sides<'a, D> {
             Some(true) => pair.exchanged(Exchange::Continued),
             _ => pair,
         })?;
-        let is_held = |pair: &Pair<D>| session.total(self.conflicts(pair).len()) > 0;
-        if is_held(&first) {
+        let is_held =
+            |pair: &Pair<D>| -> Result<bool, Agreed> { Ok(session.total(self.conflicts(pair)?.len()) > 0) };
+        if is_held(&first)? {
             let other = formed(first.clone().exchanged(Exchange::Held))?;
-            return Ok(if is_held(&other) { first } else { other });
+            return Ok(if is_held(&other)? { first } else { other });
         }
         if earlier.is_some() {
             return Ok(first);
@@ -127,7 +106,7 @@ impl<'a, const D: usize> Sides<'a, D> {
             if is_smoother((session, mesh), [&first, &other]) {
                 return Ok(first);
             }
-            if !is_held(&other) && is_smoother((session, mesh), [&other, &first]) {
+            if !is_held(&other)? && is_smoother((session, mesh), [&other, &first]) {
                 return Ok(other);
             }
         }
@@ -135,7 +114,7 @@ impl<'a, const D: usize> Sides<'a, D> {
         let overlaps = |pair: &Pair<D>| !pair.slides && overlap(session, pair) > ROUNDING * size;
         if overlaps(&first) {
             let other = formed(first.clone().exchanged(Exchange::Sharper))?;
-            if !is_held(&other) && !overlaps(&other) {
+            if !is_held(&other)? && !overlaps(&other) {
                 return Ok(other);
             }
         }
@@ -145,13 +124,13 @@ impl<'a, const D: usize> Sides<'a, D> {
         } else if faced > STIFFER * own {
             None
         } else {
-            is_coarser(session, &first)?.then_some(Exchange::Coarser)
+            is_coarser(session, mesh, &first)?.then_some(Exchange::Coarser)
         };
         if let Some(reason) = reason
             && !self.meets_another(&first)?
         {
             let other = formed(first.clone().exchanged(reason))?;
-            let is_worse = is_held(&other) || overlaps(&other) && !overlaps(&first);
+            let is_worse = is_held(&other)? || overlaps(&other) && !overlaps(&first);
             return Ok(if is_worse { first } else { other });
         }
         Ok(first)
@@ -199,15 +178,16 @@ impl<'a, const D: usize> Sides<'a, D> {
             if !self.is_free(pair) || pair.exchange.is_some() {
                 continue;
             }
-            let [_, faced] = pair.nodes_of_all(session, mesh)?;
-            let mut is_faced = false;
+            let faced = pair.faced(session, mesh)?;
+            let mut shared = 0;
             for other in pairs.iter().filter(|other| other.contact != pair.contact) {
                 if meet(session, &other.on, &pair.against) {
-                    let [own, _] = other.nodes_of_all(session, mesh)?;
-                    is_faced |= own.intersection(&faced).next().is_some();
+                    shared += other.carrying(mesh).intersection(&faced).count();
                 }
             }
-            if is_faced && let Some(other) = self.exchanged(pair, Exchange::Faced)? {
+            if session.total(shared) > 0
+                && let Some(other) = self.exchanged(pair, Exchange::Faced)?
+            {
                 pairs[at - 1] = other;
                 at = 0;
             }
@@ -233,41 +213,50 @@ impl<'a, const D: usize> Sides<'a, D> {
         let mut other = pair.clone().exchanged(why);
         other.lawless.clear();
         other.form(session, mesh, &mesh.nodes)?;
-        let held = self.conflicts(&other);
+        let held = self.conflicts(&other)?;
         let is_held = session.total(held.len()) > 0;
-        if is_held && self.job.contact[pair.contact].is_without_scale() {
-            other.lawless = gather(session.world(), &held)?.into_iter().collect();
-            other.form(session, mesh, &mesh.nodes)?;
+        let leaves = self.job.contact[pair.contact].is_without_scale();
+        if is_held && leaves {
+            other.leave(session, mesh, held)?;
         }
         let facing = other.nodes.iter().filter(|node| !node.masters.is_empty()).count();
-        let is_left = is_held && (other.lawless.is_empty() || session.total(usize::from(other.is_bare)) > 0);
+        let is_left = is_held && (!leaves || session.total(usize::from(other.is_bare)) > 0);
         Ok((session.total(facing) > 0 && !is_left).then_some(other))
     }
 
     /// The nodes owned here whose law supports prevent, by global numbers.
-    fn conflicts(&self, pair: &Pair<D>) -> Vec<u32> {
+    fn conflicts(&self, pair: &Pair<D>) -> Result<BTreeSet<u32>, Agreed> {
         let rubs = rubs(&self.job.contact[pair.contact]);
-        let held = |node: &&PairedNode<D>| {
-            conflict(node, &self.held, rubs, |direction| self.facing(node, direction)).is_some()
-        };
-        pair.nodes.iter().filter(held).map(|node| self.mesh.global_node(node.node)).collect()
+        self.nodes_where(pair, |node, facing| conflict(node, &self.held, rubs, facing).is_some())
     }
 
     /// The nodes owned here of which [`slides_with_masters`] holds, by global numbers.
-    pub(super) fn inclined(&self, pair: &Pair<D>) -> Vec<u32> {
-        let slides = |node: &&PairedNode<D>| {
-            slides_with_masters(node, &self.held, |direction| self.facing(node, direction))
-        };
-        pair.nodes.iter().filter(slides).map(|node| self.mesh.global_node(node.node)).collect()
+    pub(super) fn inclined(&self, pair: &Pair<D>) -> Result<BTreeSet<u32>, Agreed> {
+        self.nodes_where(pair, |node, facing| slides_with_masters(node, &self.held, facing))
     }
 
-    /// The shares of what a node faces, each with the length of the free part of a direction there.
-    fn facing(&self, node: &PairedNode<D>, direction: &Vector<D>) -> Vec<(f64, f64)> {
-        let free = |master: &u32| {
-            let held = self.directions.get(master).into_iter().flatten();
-            norm(&held.fold(*direction, |left, held| add_scaled(&left, -dot(held, direction), held)))
+    /// The nodes owned here of which this holds, by global numbers, given with each node the shares of what it faces, each with the length of
+    /// the free part of a direction there.
+    fn nodes_where(
+        &self,
+        pair: &Pair<D>,
+        holds: impl Fn(&PairedNode<D>, &dyn Fn(&Vector<D>) -> Vec<(f64, f64)>) -> bool,
+    ) -> Result<BTreeSet<u32>, Agreed> {
+        let Self { session, mesh, .. } = *self;
+        let masters = pair.nodes.iter().flat_map(PairedNode::faced).map(|(master, _)| *master);
+        let directions = mesh.ask_owners(session, masters, |node| {
+            let (frame, free) = self.held.frame(mesh.owned_node(node));
+            frame[free..].as_flattened().to_vec()
+        })?;
+        let facing = |node: &PairedNode<D>, direction: &Vector<D>| {
+            let free = |master: &u32| {
+                let held = directions[master].as_chunks::<D>().0.iter();
+                norm(&held.fold(*direction, |left, held| add_scaled(&left, -dot(held, direction), held)))
+            };
+            node.faced().map(|(master, share)| (*share, free(master))).collect()
         };
-        node.faced().map(|(master, share)| (*share, free(master))).collect()
+        let found = pair.nodes.iter().filter(|node| holds(node, &|direction| facing(node, direction)));
+        Ok(found.map(|node| mesh.global_node(node.node)).collect())
     }
 
     /// The number of nodes that carry the law of one pair and are faced in another one, where the law does not leave them to their neighbours.
@@ -278,27 +267,21 @@ impl<'a, const D: usize> Sides<'a, D> {
         }
         let (mut carrying, mut faced) = (Vec::new(), Vec::new());
         for pair in pairs {
-            let [own, other] = pair.nodes_of_all(session, mesh)?;
-            carrying.push(own);
-            faced.push(other);
+            carrying.push(pair.carrying(mesh));
+            faced.push(pair.faced(session, mesh)?);
         }
         let of_pair = |at: usize| {
             let others = faced.iter().enumerate().filter(|(other, _)| *other != at);
             others.map(|(_, faced)| carrying[at].intersection(faced).count()).sum::<usize>()
         };
         let leaves = |at: &usize| job.contact[pairs[*at].contact].is_without_scale();
-        Ok((0..pairs.len()).filter(|at| !leaves(at)).map(of_pair).sum())
+        Ok(session.total((0..pairs.len()).filter(|at| !leaves(at)).map(of_pair).sum()))
     }
 
     /// Whether another contact has nodes of either side of a pair.
     fn meets_another(&self, pair: &Pair<D>) -> Result<bool, Agreed> {
         let Self { session, mesh, job, .. } = *self;
-        let nodes_of = |facets: &[u32]| -> Vec<u32> {
-            let nodes = facets.iter().flat_map(|facet| mesh.facet_nodes(*facet));
-            nodes.map(|node| mesh.global_node(node)).collect()
-        };
-        let own = [nodes_of(&pair.on), nodes_of(&pair.against)].concat();
-        let own: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
+        let own = mesh.named(session, mesh.nodes_of_facets(pair.on.iter().chain(&pair.against)))?;
         let others = job.contact.iter().enumerate().filter(|(number, _)| *number != pair.contact);
         let names: Vec<String> = others
             .flat_map(|(_, other)| {
@@ -306,8 +289,8 @@ impl<'a, const D: usize> Sides<'a, D> {
                 other.on.iter().chain(&other.against).cloned().chain(faults)
             })
             .collect();
-        let others = nodes_of(&facets(mesh, &names));
-        Ok(session.total(others.iter().filter(|node| own.contains(node)).count()) > 0)
+        let others = mesh.named(session, mesh.nodes_of_facets(&facets(mesh, &names)))?;
+        Ok(session.total(others.intersection(&own).count()) > 0)
     }
 }
 
@@ -393,14 +376,12 @@ fn overlap<const D: usize>(session: &Session, pair: &Pair<D>) -> f64 {
 }
 
 /// Whether the nodes of a pair face more than twice as many nodes as they are, in space more than four times as many. Collective.
-fn is_coarser<const D: usize>(session: &Session, pair: &Pair<D>) -> Result<bool, Agreed> {
+fn is_coarser<const D: usize>(session: &Session, mesh: &Mesh<D>, pair: &Pair<D>) -> Result<bool, Agreed> {
     let facing = pair.nodes.iter().filter(|node| !node.masters.is_empty());
     let slaves = session.total(facing.count());
-    let own: BTreeSet<u32> =
-        pair.nodes.iter().flat_map(PairedNode::faced).map(|(master, _)| *master).collect();
-    let own: Vec<u32> = own.into_iter().collect();
-    let masters: BTreeSet<u32> = gather(session.world(), &own)?.into_iter().collect();
-    Ok(masters.len() > (1 << (D - 1)) * slaves)
+    let masters = pair.nodes.iter().flat_map(PairedNode::faced).map(|(master, _)| *master);
+    let masters = session.total(mesh.named(session, masters)?.len());
+    Ok(masters > (1 << (D - 1)) * slaves)
 }
 
 #[cfg(test)]

@@ -134,6 +134,57 @@ pub fn contributions<const D: usize>(
     result
 }
 
+/// The numbers of the master facets, ascending, that may form a pair with one of these slave facets, as [`contributions`] has them.
+pub fn facing<const D: usize>(slaves: &[Facet<D>], masters: &[Facet<D>], reach: [f64; 2]) -> Vec<usize> {
+    let search = Search::new(masters, reach);
+    let near = |facet| {
+        let slave = Slave::new(facet);
+        let mut near = search.near(&slave);
+        near.retain(|at| slave.is_faced_by(&masters[*at]));
+        near
+    };
+    let mut all: Vec<usize> = slaves.iter().flat_map(near).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// At most this many boxes, low and high corners in m, around all of these facets that are finite.
+pub fn boxes_around<const D: usize>(facets: &[Facet<D>], most: usize) -> Vec<[Vector<D>; 2]> {
+    let finite = facets.iter().filter(|facet| facet.is_finite());
+    let mut found = Vec::new();
+    join_boxes(&mut finite.map(Facet::bounds).collect::<Vec<_>>(), most, &mut found);
+    found
+}
+
+/// Joins boxes into at most this many, one at least, of neighbours.
+fn join_boxes<const D: usize>(boxes: &mut [[Vector<D>; 2]], most: usize, joined: &mut Vec<[Vector<D>; 2]>) {
+    let Some(first) = boxes.first() else { return };
+    let [low, high] = boxes.iter().fold(*first, |[low, high], [other_low, other_high]| {
+        let lower = std::array::from_fn(|i| low[i].min(other_low[i]));
+        [lower, std::array::from_fn(|i| high[i].max(other_high[i]))]
+    });
+    if most < 2 || boxes.len() == 1 {
+        joined.push([low, high]);
+        return;
+    }
+    let size = |axis: &usize| high[*axis] - low[*axis];
+    let axis = (0..D).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
+    let middle = |corners: &[Vector<D>; 2]| corners[0][axis] + corners[1][axis];
+    let half = boxes.len() / 2;
+    boxes.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)));
+    let (left, right) = boxes.split_at_mut(half);
+    join_boxes(left, most / 2, joined);
+    join_boxes(right, most - most / 2, joined);
+}
+
+/// Whether facets in one of these boxes may form a pair with a slave facet.
+pub fn may_face<const D: usize>(slave: &Facet<D>, boxes: &[[Vector<D>; 2]], reach: [f64; 2]) -> bool {
+    let prism = Prism::new(&Slave::new(slave), reach);
+    let mut boxes = boxes.iter().map(|corners| corners.map(|corner| in_space(&corner)));
+    boxes.any(|[low, high]| prism.meets(&AABB::from_corners(low, high)))
+}
+
 /// A slave facet in its plane.
 #[derive(Debug)]
 struct Slave<'a, const D: usize> {
@@ -165,8 +216,8 @@ type BoxOfFacet = GeomWithData<Rectangle<[f64; 3]>, usize>;
 
 /// Master facets in a tree of bounding boxes.
 struct Search<'a, const D: usize> {
+    masters: &'a [Facet<D>],
     /// Those with finite coordinates.
-    masters: Vec<&'a Facet<D>>,
     tree: RTree<BoxOfFacet>,
     /// The largest penetration and the largest gap of a pair in m.
     reach: [f64; 2],
@@ -174,9 +225,8 @@ struct Search<'a, const D: usize> {
 
 impl<'a, const D: usize> Search<'a, D> {
     fn new(masters: &'a [Facet<D>], reach: [f64; 2]) -> Self {
-        let finite = |master: &&Facet<D>| master.corners.as_flattened().iter().all(|x| x.is_finite());
-        let masters: Vec<_> = masters.iter().filter(finite).collect();
-        let boxes = masters.iter().enumerate().map(|(number, master)| {
+        let boxes = masters.iter().enumerate().filter(|(_, master)| master.is_finite());
+        let boxes = boxes.map(|(number, master)| {
             let [low, high] = master.bounds().map(|corner| in_space(&corner));
             GeomWithData::new(Rectangle::from_corners(low, high), number)
         });
@@ -196,7 +246,7 @@ impl<'a, const D: usize> Search<'a, D> {
     /// The parts of a slave facet that master facets cover.
     fn covered(&self, slave: &Slave<D>) -> Vec<Part<'a, D>> {
         let mut parts: Vec<_> =
-            self.near(slave).into_iter().filter_map(|i| self.part(slave, self.masters[i])).collect();
+            self.near(slave).into_iter().filter_map(|i| self.part(slave, &self.masters[i])).collect();
         parts.sort_by(|a, b| a.gap.0.abs().total_cmp(&b.gap.0.abs()));
         let mut taken: Vec<Part<D>> = Vec::with_capacity(parts.len());
         for part in parts {
@@ -213,8 +263,7 @@ impl<'a, const D: usize> Search<'a, D> {
 
     /// The part of a slave facet that a master facet covers; none if they do not form a pair.
     fn part(&self, slave: &Slave<D>, master: &'a Facet<D>) -> Option<Part<'a, D>> {
-        let facing = dot(&slave.plane.normal, &master.normal) < FACING;
-        if !facing || slave.facet.shares_node(master) {
+        if !slave.is_faced_by(master) {
             return None;
         }
         let projected = master.corners.map(|corner| slave.plane.project(&corner));
@@ -390,6 +439,11 @@ impl<'a, const D: usize> Slave<'a, D> {
             most.max(dot(&side, &side).sqrt())
         });
         Self { facet, plane, corners, measure, diameter }
+    }
+
+    /// Whether the normal of a master facet, which shares no node, is opposed.
+    fn is_faced_by(&self, master: &Facet<D>) -> bool {
+        dot(&self.plane.normal, &master.normal) < FACING && !self.facet.shares_node(master)
     }
 
     /// The places of the nodes.

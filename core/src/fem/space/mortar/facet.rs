@@ -54,6 +54,10 @@ impl<const D: usize> Facet<D> {
         }
     }
 
+    pub(super) fn is_finite(&self) -> bool {
+        self.corners.as_flattened().iter().all(|x| x.is_finite())
+    }
+
     /// Whether integrals are multiplied.
     pub(super) fn turns(&self) -> bool {
         self.turns != [1.0; D]

@@ -728,6 +728,34 @@ fn facets_of_one_surface_on_both_sides_of_its_gap() {
     close(result[0].weight + result[1].weight, length, 1e-13);
 }
 
+#[test]
+fn parts_of_a_surface_face_what_they_ask_other_parts_for_and_little_else() {
+    let mut random = Random(7);
+    let slave = square(&mut random, [13, 11], (1.0, 0, false));
+    let master = square(&mut random, [12, 14], (-1.0, FIRST_MASTER, false));
+    let oblique = random.rotation::<3>();
+    let [slave, mut master] = [slave, master].map(|surface| surface.moved(&oblique, &[0.0; 3]));
+    // What is not finite is in no box and faces nothing.
+    master.facets[5].corners[0] = [f64::NAN; 3];
+    let reach = [0.05, f64::INFINITY];
+    let parts = |surface: &Surface<3>, count: usize| -> Vec<Vec<Facet<3>>> {
+        surface.facets.chunks(surface.facets.len().div_ceil(count)).map(<[_]>::to_vec).collect()
+    };
+    let masters = parts(&master, 5);
+    for own in parts(&slave, 4) {
+        let mut asked = Vec::new();
+        for part in &masters {
+            let boxes = boxes_around(part, 8);
+            assert!((1..=8).contains(&boxes.len()));
+            let wanted = own.iter().filter(|facet| may_face(facet, &boxes, reach)).cloned();
+            let wanted: Vec<Facet<3>> = wanted.collect();
+            asked.extend(facing(&wanted, part, reach).into_iter().map(|at| part[at].clone()));
+        }
+        assert_eq!(contributions(&own, &asked, reach), contributions(&own, &master.facets, reach));
+        assert!(3 * asked.len() < 2 * master.facets.len(), "{} of {}", asked.len(), master.facets.len());
+    }
+}
+
 /// A polygon on the unit circle whose normals look out or in.
 fn circle(count: usize, (start, out, first, quadratic): (f64, f64, u32, bool)) -> Surface<2> {
     let points: Vec<_> = (0..count)
