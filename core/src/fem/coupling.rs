@@ -401,7 +401,7 @@ impl<const D: usize> Coupling<D> {
             let range = rows.offsets[row]..rows.offsets[row + 1];
             let has_slaves = rows.columns[range.clone()].iter().any(|column| blocks(*column).is_some());
             if has_slaves {
-                *sums = Some(times_basis(&rows, range, &blocks));
+                *sums = Some(times_basis(&rows, range, blocks));
             }
         }
         // A node that many slave nodes face: their rows are added before they are sent.

@@ -248,7 +248,11 @@ pub const PROBES: RunTable = RunTable {
             "m/s²",
             "acceleration in the equations of the step, at the time at which they hold; interpolated, as all quantities of nodes",
         )],
-        &[Column::plain("equivalent_viscoplastic_strain", "", "accumulated equivalent viscoplastic strain")],
+        &[Column::plain(
+            "equivalent_viscoplastic_strain",
+            "",
+            "accumulated equivalent viscoplastic strain: by work with hardening, otherwise of the strain rate (docs/conventions.md)",
+        )],
         &[Column::plain("damage", "", "damage")],
         &[Column::plain(
             "contact_pressure",

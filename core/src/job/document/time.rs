@@ -45,7 +45,8 @@ pub struct Adaptive {
     /// motions may deviate from linear functions of time within a step, relative to their largest values in the run. Errors of steps
     /// add up: what depends on all steps before, as the way of a body, wear, failing bonds or a rebound, is 2 to 4 % off under schemes of
     /// first order with the default, and a third of that for a tenth of it, in three times as many steps; under `bdf2` it is 0.5 % off, in
-    /// fewer steps.
+    /// fewer steps. Vibrations and stick-slip are 8 to 17 % off under `implicit_euler`, which damps them, and 0.7 % under `bdf2`; at
+    /// resonance, 40 % and 0.2 %.
     #[serde(default = "adaptive_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,

@@ -56,10 +56,10 @@ pub(super) trait Obstacle {
         false
     }
 
-    /// Angular velocity in rad/s at the end of a step.
+    /// Angular velocity in rad/s in a step.
     fn angular_velocity(&self, rate: &Rate) -> Vector<3> {
         let Prescribed { rotation, axis, .. } = self.prescribed();
-        let (rotation, axis) = (rotation_rate(rotation, rate.time), axis_of(axis.unwrap_or_default()));
+        let (rotation, axis) = (rotation_rate(rotation, rate), axis_of(axis.unwrap_or_default()));
         if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) }
     }
 
@@ -67,9 +67,13 @@ pub(super) trait Obstacle {
     fn remedy(&self) -> &'static str;
 }
 
-/// A rotation in rad/s at `time`.
-pub(super) fn rotation_rate(rotation: Option<&Scalar>, time: f64) -> f64 {
-    rotation.map_or(0.0, |rotation| rotation.evaluate(time, &[]))
+/// A rotation in rad/s in a step.
+pub(super) fn rotation_rate(rotation: Option<&Scalar>, rate: &Rate) -> f64 {
+    match rotation {
+        None => 0.0,
+        Some(Scalar::Number(rotation)) => *rotation,
+        Some(rotation) => rate.of_integral(|time| rotation.evaluate(time, &[])),
+    }
 }
 
 /// A vector of the job at `time`.

@@ -11,10 +11,11 @@
 //! The rotation of a plane about its normal does not move its surface, as that of a brake disc. A change of its normal tilts the
 //! plane, with the smallest rotation that has this effect. `x'` and `m'` are computed by the formula with which the scheme computes
 //! velocities from displacements: in a step of implicit Euler, `x' = (x_n - x_{n-1}) / k`, so that a sticking point moves exactly
-//! as far as the obstacle. All other quantities are those at the end of the step, as is the gap.
+//! as far as the obstacle. `rotation` is that by which, with the same formula, the angle `int rotation dt` grows, so that a wheel that rolls with
+//! an acceleration does not slip. All other quantities are those at the end of the step, as is the gap.
 
 use crate::{
-    laws::step::start_of,
+    laws::{quadrature::rule, step::start_of},
     linear_algebra::tensor::{Vector, add_scaled, cross, in_space},
 };
 
@@ -36,14 +37,25 @@ impl Rate {
 
     pub(super) fn of<const D: usize>(&self, value: impl Fn(f64) -> Vector<D>) -> Vector<D> {
         let now = value(self.time);
+        self.of_changes(|time| add_scaled(&now, -1.0, &value(time)))
+    }
+
+    /// The rate of a quantity, given its changes since earlier times.
+    pub(super) fn of_changes<const D: usize>(&self, change_since: impl Fn(f64) -> Vector<D>) -> Vector<D> {
         let (mut rate, mut unit) = ([0.0; D], 0.0);
         for [time, weight] in self.before.into_iter().filter(|[_, weight]| *weight != 0.0) {
-            let before = value(time);
-            (0..D).for_each(|i| rate[i] += weight * (now[i] - before[i]));
+            rate = add_scaled(&rate, weight, &change_since(time));
             unit += weight * (self.time - time);
         }
         // The rate of the time itself is 1, whatever the rounding of the earlier times.
         rate.map(|rate| rate / unit)
+    }
+
+    /// The rate of the integral of a function of time; no number where the function is none at the end of the step.
+    pub(super) fn of_integral(&self, function: impl Fn(f64) -> f64) -> f64 {
+        let integral = |from: f64| rule([from, self.time]).map(|[at, weight]| weight * function(at)).sum();
+        let [rate] = self.of_changes(|time| [integral(time)]);
+        if function(self.time).is_finite() { rate } else { f64::NAN }
     }
 }
 
@@ -116,6 +128,33 @@ mod tests {
     }
 
     #[test]
+    fn the_rate_of_an_integral_is_that_of_its_closed_form() {
+        let second = Rate { time: 0.5, before: [[0.25, 8.0], [0.0, -2.0]] };
+        for rate in [STEP, second, Rate::euler(10.0, 1e-3)] {
+            let [expected] = rate.of(|t| [3.0 * t * t]);
+            let found = rate.of_integral(|t| 6.0 * t);
+            assert!((found - expected).abs() < 1e-10 * expected, "{found} {expected}");
+        }
+        assert!(STEP.of_integral(|t| 1.0 / (t - 0.5)).is_nan());
+    }
+
+    #[test]
+    fn a_wheel_that_rolls_with_an_acceleration_rests_where_it_touches() {
+        let wheel = Gap::Sphere(Sphere {
+            centre: vec![expression("2*t^2"), Scalar::Number(0.5)],
+            radius: 0.5,
+            hollow: false,
+            rotation: Some(expression("-8*t")),
+            axis: None,
+        });
+        for rate in [STEP, Rate { time: 0.5, before: [[0.25, 8.0], [0.0, -2.0]] }] {
+            let motion = wheel.motion::<2>(rate).unwrap();
+            let [along, across] = motion.velocity_at(&[0.5, 0.0]);
+            assert!(along.abs() < 1e-14 && across.abs() < 1e-14, "{along} {across}");
+        }
+    }
+
+    #[test]
     fn a_belt_moves_along_itself_and_so_do_all_its_places() {
         let point = vec![expression("2*t"), Scalar::Number(-1.0)];
         let belt = Gap::Plane(Plane { point, normal: numbers(&[0.0, 3.0]), rotation: None });
@@ -151,8 +190,11 @@ mod tests {
         });
         let motion = disc.motion::<3>(STEP).unwrap();
         assert!(disc.surface_may_move() && !motion.is_translation());
-        assert_eq!(motion.velocity_at(&[1.5, 1.0, 0.0]), [0.0, 1.5, 0.0]);
-        assert_eq!(motion.velocity_at(&[1.0, 1.5, 0.0]), [-1.5, 0.0, 0.0]);
+        // By 3 (0.5^2 - 0.25^2) rad in 0.25 s.
+        let near =
+            |found: Vector<3>, expected: Vector<3>| (0..3).all(|i| (found[i] - expected[i]).abs() < 1e-14);
+        assert!(near(motion.velocity_at(&[1.5, 1.0, 0.0]), [0.0, 1.125, 0.0]));
+        assert!(near(motion.velocity_at(&[1.0, 1.5, 0.0]), [-1.125, 0.0, 0.0]));
     }
 
     #[test]

@@ -71,7 +71,7 @@ impl Obstacle for Plane {
             normal.map(|x| x / norm(&normal))
         };
         let facing = unit(rate.time);
-        add_scaled(&cross(&facing, &rate.of(unit)), rotation_rate(self.rotation.as_ref(), rate.time), &facing)
+        add_scaled(&cross(&facing, &rate.of(unit)), rotation_rate(self.rotation.as_ref(), rate), &facing)
     }
 
     fn remedy(&self) -> &'static str {
