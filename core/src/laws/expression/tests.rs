@@ -1,7 +1,7 @@
 use super::program::COUNT;
 use super::{
-    Enclosure, Expression, Formula, Interval, Names, OfCreep, OfMotion, REACH, Resolved, Scalar, Unproven,
-    Variable,
+    Enclosure, Expression, Formula, Interval, Names, OfCreep, OfMotion, REACH, Resolved, Scalar, Span,
+    Unproven, Variable,
 };
 
 fn value(text: &str) -> f64 {
