@@ -124,6 +124,13 @@ impl Case {
         self
     }
 
+    /// What `solver check` says of the job, with each message in one line. It must accept the job.
+    #[track_caller]
+    pub fn checked(&self, ranks: usize) -> String {
+        let file = self.written().display().to_string();
+        launch::unwrapped(&launch::run(ranks, &["check", &file]).expect(0).stdout)
+    }
+
     /// Writes the job file and returns its path.
     pub fn written(&self) -> PathBuf {
         let file = self.folder().join("job.toml");

@@ -220,8 +220,7 @@ fn a_traction_that_supports_alone_bear_is_warned_of() {
                     "traction",
                     &format!("[{{on = ['top'], value = [0, -1]}}, {{on = ['right'], {traction}}}]"),
                 );
-            let outcome = launch::run(ranks, &["check", case.written().to_str().expect("a path")]).expect(0);
-            let said = launch::unwrapped(&outcome.stdout);
+            let said = case.checked(ranks);
             assert_eq!(said.contains(&format!("traction.1: {words}")), is_borne, "{fix}, {traction}: {said}");
             assert!(!said.contains("traction.0: supports"), "{said}");
         }
@@ -245,8 +244,7 @@ fn a_traction_that_changes_within_facets_is_warned_of() {
             (Case::cube(10), "0, 0,"),
         ] {
             let case = case.set("traction", &format!("[{{on = ['top'], value = [{axes} '{value}']}}]"));
-            let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
-            let said = launch::unwrapped(&outcome.stdout);
+            let said = case.checked(2);
             assert_eq!(said.contains(words), is_wrong, "{value}: {said}");
         }
     }
@@ -264,11 +262,14 @@ fn what_changes_within_cells_is_warned_of() {
         ("initial.velocity", "['0.1*sin(pi*x)', 'x*y']", false),
         ("initial.stress", "{ xx = '1e3*(abs(x - 0.5) < 0.012)' }", true),
         ("initial.stress", "{ xx = '1e3*(1 - y)' }", false),
+        ("material.density", "'1e3 + 1e5*(abs(x - 0.5) < 0.012)'", true),
+        ("material.density", "'1e3*(1 + x*y) + 1e3*(y > 0.5)'", false),
+        ("material.elasticity.youngs_modulus", "'1e2*(1 + 5*sin(20*pi*x)^2)'", true),
+        ("material.elasticity.youngs_modulus", "'1e2*exp(-y)'", false),
     ] {
         for order in ["1", "2"] {
             let case = Case::square(10).set("mesh.order", order).set(key, value);
-            let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
-            let said = launch::unwrapped(&outcome.stdout);
+            let said = case.checked(2);
             assert_eq!(
                 said.contains("cells are too large for it"),
                 is_wrong,
@@ -281,13 +282,85 @@ fn what_changes_within_cells_is_warned_of() {
             .set("material.heat", "{ conductivity = 50, capacity = 500 }")
             .set("initial.temperature", "293")
             .set("heat", &format!("[{{ on = ['top'], flux = '{flux}' }}]"));
-        let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
-        let said = launch::unwrapped(&outcome.stdout);
+        let said = case.checked(2);
         assert_eq!(
             said.contains("heat.0: facets of the boundary top are too large for it"),
             is_wrong,
             "{flux}: {said}"
         );
+    }
+}
+
+#[test]
+fn an_initial_temperature_that_changes_between_nodes_is_warned_of() {
+    for (temperature, is_wrong) in
+        [("293 + 50*(abs(x - 0.5) < 0.012)", true), ("293 + 50*sin(pi*x)", false), ("293", false)]
+    {
+        for order in ["1", "2"] {
+            let case = Case::square(10)
+                .set("mesh.order", order)
+                .set("material.heat", "{ conductivity = 50, capacity = 500 }")
+                .set("initial.temperature", &format!("'{temperature}'"));
+            let said = case.checked(2);
+            let words = "initial.temperature: cells are too large for it";
+            assert_eq!(said.contains(words), is_wrong, "{temperature}, {order}: {said}");
+        }
+    }
+}
+
+#[test]
+fn what_changes_between_nodes_of_facets_is_warned_of() {
+    let contact = |normal: &str, friction: &str| {
+        format!(
+            "[{{ on = ['bottom'], normal.compliance = {{ stiffness = 1e4{normal} }}, friction.{friction} }}]"
+        )
+    };
+    let formula = |text: &str| contact("", &format!("expression.coefficient = '{text}'"));
+    let gap = |text: &str| contact(&format!(", gap = '{text}'"), "coulomb.coefficient = 0.3");
+    let moved = |key: &str, text: &str| {
+        format!("[{{ on = ['left'], fix = ['x'] }}, {{ on = ['top'], fix = ['y'], {key} = ['{text}'] }}]")
+    };
+    let [of_friction, of_gap] = ["friction.expression.coefficient", "normal.compliance.gap"]
+        .map(|key| format!("contact.0.{key}: facets of the boundary bottom"));
+    let [of_velocity, of_displacement] =
+        ["velocity", "displacement"].map(|key| format!("support.1.{key}: facets of the boundary top"));
+    for (key, value, words, is_wrong) in [
+        ("contact", formula("0.5*(abs(x - 0.5) < 0.012)"), &of_friction, true),
+        ("contact", formula("0.3 + 0.2*(x > 0.5)"), &of_friction, false),
+        ("contact", formula("0.3 + 0.2*exp(-v)"), &of_friction, false),
+        ("contact", gap("1e-3*sin(20*pi*x)^2"), &of_gap, true),
+        ("contact", gap("1e-3*x^2"), &of_gap, false),
+        ("support", moved("velocity", "0.1*(abs(x - 0.5) < 0.012)"), &of_velocity, true),
+        ("support", moved("velocity", "0.1*x"), &of_velocity, false),
+        ("support", moved("displacement", "1e-3*t*sin(20*pi*x)^2"), &of_displacement, true),
+        ("support", moved("displacement", "1e-3*t*sin(pi*x)"), &of_displacement, false),
+    ] {
+        for order in ["1", "2"] {
+            let said = Case::square(10).set("mesh.order", order).set(key, &value).checked(2);
+            assert_eq!(said.contains(&**words), is_wrong, "{value}, {order}: {said}");
+        }
+    }
+}
+
+#[test]
+fn a_support_whose_part_ends_within_facets_is_warned_of() {
+    for (condition, is_wrong) in [
+        ("x < 0.5", true),
+        ("x <= 0.501", false),
+        ("x < 0.39", true),
+        ("abs(x - 0.5) < 0.16", true),
+        ("abs(x - 0.5) < 0.01", false),
+        ("x > 0", false),
+        ("x > 1 - 1e-9", false),
+    ] {
+        let support = format!(
+            "[{{ on = ['left'], fix = 'all' }}, {{ on = ['top'], where = '{condition}', fix = ['y'] }}]"
+        );
+        for ranks in [1, 3] {
+            let said = Case::square(10).set("support", &support).checked(ranks);
+            let words = "support.1.where: the facets of top that it holds as a whole have";
+            assert_eq!(said.contains(words), is_wrong, "{condition}: {said}");
+        }
     }
 }
 
@@ -313,8 +386,7 @@ fn a_probe_where_bodies_touch_is_warned_of() {
                 .without("output")
                 .set("output.folder", "'out'")
                 .set("output.probe", &format!("[{{ name = 'p', point = {point} }}]"));
-            let outcome = launch::run(ranks, &["check", case.written().to_str().expect("a path")]).expect(0);
-            let said = launch::unwrapped(&outcome.stdout);
+            let said = case.checked(ranks);
             assert_eq!(said.contains("where \"p\" lies, bodies touch"), is_shared, "{point}: {said}");
         }
     }

@@ -1,6 +1,6 @@
 //! Regions with their own material.
 
-use crate::{case::Case, hdf5_file::NumberFile, launch, results::assert_same_answer};
+use crate::{case::Case, hdf5_file::NumberFile, results::assert_same_answer};
 
 const HISTORY: &str = "viscoplastic_history";
 
@@ -53,8 +53,7 @@ fn regions_without_mass_beside_others_with_mass_are_warned_of() {
         ),
     ] {
         let case = wheel().without(&format!("{place}.density"));
-        let outcome = launch::run(2, &["check", case.written().to_str().expect("a path")]).expect(0);
-        let said = launch::unwrapped(&outcome.stdout);
+        let said = case.checked(2);
         assert!(said.contains(words), "{said}");
     }
 }

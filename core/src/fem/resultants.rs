@@ -5,7 +5,7 @@ use super::{
     coupling::Coupling,
     effect::{ContactAreas, Form, Supports, SurfaceForce},
     pairs::{Pair, is_exchanged, pair_of},
-    space::INDEPENDENT,
+    space::{INDEPENDENT, axis},
     state::State,
 };
 use crate::{
@@ -271,9 +271,8 @@ fn holds<const D: usize, const S: usize>(
     let Body { mesh, held, .. } = body;
     let mut directions = Vec::new();
     // Forces on the axis of a body of revolution across it are balanced all around.
-    let radial: Vector<D> = std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 });
     let on_axis = (0..mesh.nodes.len()).filter(|node| mesh.is_on_axis(&mesh.nodes[*node]));
-    directions.extend(on_axis.map(|node| (node, None, radial)));
+    directions.extend(on_axis.map(|node| (node, None, axis(0))));
     for (at, support) in supports.iter().enumerate() {
         let alone = Supports::new(session, mesh, std::slice::from_ref(support), &state.velocity);
         let alone = session.agree(alone)?.held;

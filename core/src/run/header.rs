@@ -1,6 +1,6 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{sampled_loads, setup::Setup, side_words, steps};
+use super::{sampled_loads, setup::Setup, side_words, steps, table_spans};
 use crate::{
     error::Result,
     io::output::{
@@ -98,7 +98,8 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     let given = loaded.warnings.iter().chain(&ready.verdict.warnings).chain(&ready.warnings).cloned();
     let places = sample_points(session, &ready.body.mesh.nodes);
     let sampled = sampled_loads::warnings(&loaded.job, &steps::landings(&loaded.job), &places);
-    given.chain(steps::warnings(&loaded.job)).chain(sampled).collect()
+    let of_steps = steps::warnings(&loaded.job).into_iter().chain(table_spans::warnings(&loaded.job));
+    given.chain(of_steps).chain(sampled).collect()
 }
 
 /// A residual as a share of the forces from which rounding errors are warned of.
@@ -117,8 +118,8 @@ pub(super) fn warning_of_rounding(summary: &Summary, job: &Job) -> Option<String
     })
 }
 
-/// Share of the supplied energy that a time scheme may dissipate without a word.
-const WORTH_SAYING: f64 = 0.05;
+/// Share of the supplied energy that a time scheme may dissipate without a word, and by which it may err without one where nothing has inertia.
+const WORTH_SAYING: [f64; 2] = [0.05, 0.01];
 
 /// Logs status, totals and times of a finished run, and what kept its adaptive steps short.
 pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Option<String>) {
@@ -140,12 +141,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
         _ => format!("inclusion residual at most {:.1e}, ", summary.max_inclusion_residual),
     };
     let heat = summary.max_heat_imbalance.map_or(String::new(), |most| format!(", of heat {most:.1e}"));
-    let lost = -summary.energy_of_scheme;
-    let scheme = match lost >= WORTH_SAYING && job.materials().any(|(_, material)| material.density.is_some())
-    {
-        true => format!(", {:.0} % of the supplied energy dissipated by the time scheme", 100.0 * lost),
-        false => String::new(),
-    };
+    let scheme = words_of_scheme(-summary.energy_of_scheme, job);
     log.line(format!(
         "checks     {inclusion}energy imbalance at most {:.1e}{heat}{scheme}",
         summary.max_energy_imbalance
@@ -192,6 +188,23 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
     log.line(format!("files      {}", job.output_folder().display()));
 }
 
+/// What a time scheme has made of the supplied energy, given the share that it has dissipated, if that is worth saying.
+fn words_of_scheme(lost: f64, job: &Job) -> String {
+    let has_mass = job.materials().any(|(_, material)| material.density.is_some());
+    if has_mass && lost >= WORTH_SAYING[0] {
+        format!(", {:.0} % of the supplied energy dissipated by the time scheme", 100.0 * lost)
+    } else if !has_mass && lost.abs() >= WORTH_SAYING[1] {
+        let side = if lost > 0.0 { "exceeds" } else { "falls short of" };
+        format!(
+            ", {:.0} % of the supplied energy is numerical_dissipation: by this, external_work, which counts forces at one time of each step, {side} \
+             the other energies",
+            100.0 * lost
+        )
+    } else {
+        String::new()
+    }
+}
+
 /// Logs the estimated errors, and what half of them would take or how they are estimated.
 fn errors(log: &mut Log, job: &Job, summary: &Summary) {
     let Errors { error_of_mesh, doubt_of_mesh, error_of_steps, reference_of_steps, order_of_steps } =
@@ -227,5 +240,35 @@ fn errors(log: &mut Log, job: &Job, summary: &Summary) {
         log.line(
             "errors     by the steps not estimated: [output] error_estimate = true repeats the run for it",
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn the_share_of_the_scheme_is_said_of_quasistatic_runs_on_both_sides_of_one_percent() {
+        let job = |density: &str| {
+            let text = format!(
+                "mesh.rectangle = {{ size = [1, 1], cells = [1, 1] }}\ntime = {{ end = 1.0, step = 0.1 }}\n[material]\nhypothesis = \"plane_strain\"\n\
+                 {density}\n[material.elasticity]\nyoungs_modulus = 1.0\npoisson_ratio = 0.0\n"
+            );
+            Job::from_text(&text, "job.toml", Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}")).job
+        };
+        let words = |density: &str, lost: f64| words_of_scheme(lost, &job(density));
+        for (lost, side) in [(0.24, ", 24 %"), (-0.05, ", -5 %")] {
+            let said = words("", lost);
+            assert!(
+                said.starts_with(side)
+                    && said.contains(if lost > 0.0 { "exceeds" } else { "falls short of" }),
+                "{said}"
+            );
+        }
+        assert_eq!(words("", 0.009), "");
+        assert_eq!(words("density = 1.0", 0.02), "");
+        assert!(words("density = 1.0", 0.06).contains("dissipated by the time scheme"));
+        assert!(words("density = 1.0", f64::NAN).is_empty() && words("", f64::NAN).is_empty());
     }
 }

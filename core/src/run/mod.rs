@@ -32,6 +32,7 @@ mod simulation;
 mod start;
 mod step_line;
 mod steps;
+mod table_spans;
 mod time_loop;
 mod touching;
 mod trial;

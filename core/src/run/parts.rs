@@ -2,12 +2,15 @@
 
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, space::facets},
+    fem::{
+        body::Body,
+        space::{facets, spread_over_facet},
+    },
     job::{Job, Scalar},
     laws::digits::Digits,
     linear_algebra::{
         petsc::DistributedVector,
-        tensor::{Vector, add_scaled, norm},
+        tensor::{Vector, add_scaled, larger, norm},
     },
     mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, session::Session},
@@ -15,6 +18,9 @@ use crate::{
 
 /// Conditions are compared at this share of the way from the corners of a facet to its centre.
 const INSIDE: f64 = 1e-3;
+
+/// Share of the area of a part by which that of the facets that a support holds may differ from it.
+const WRONG: f64 = 0.1;
 
 /// Shares of a boundary up to this one are facets in its corners, whose nodes belong to other boundaries.
 const NEGLIGIBLE: f64 = 0.1;
@@ -42,18 +48,17 @@ pub(super) fn part_of<const D: usize>(
     Ok(facets)
 }
 
-/// Warnings of conditions on the place of loads, supports, heat and contacts that facets do not follow: these belong to a part as a whole.
-/// Collective, with the same warnings on all ranks.
+/// Warnings of conditions on the place of loads, supports, heat and contacts that facets do not follow: these belong to a part as a whole, or
+/// are held if all their nodes are. Collective, with the same warnings on all ranks.
 pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh<D>) -> Vec<String> {
     let tractions = job.traction.iter().enumerate().map(|(at, t)| (format!("traction.{at}"), &t.on, &t.part));
     let supports = job.support.iter().enumerate();
-    let on_areas = supports.filter(|(_, support)| support.gives_way());
-    let supports = on_areas.map(|(at, s)| (format!("support.{at}"), &s.on, &s.part));
-    let flows = job.heat.iter().enumerate().filter(|(_, heat)| heat.temperature.is_none());
-    let flows = flows.map(|(at, heat)| (format!("heat.{at}"), &heat.on, &heat.part));
+    let on_areas = supports.clone().filter(|(_, support)| support.gives_way());
+    let on_areas = on_areas.map(|(at, s)| (format!("support.{at}"), &s.on, &s.part));
+    let flows = job.heat.iter().enumerate().map(|(at, heat)| (format!("heat.{at}"), &heat.on, &heat.part));
     let contacts = job.contact.iter().enumerate().map(|(at, c)| (format!("contact.{at}"), &c.on, &c.part));
     let mut warnings = Vec::new();
-    for (table, on, part) in tractions.chain(supports).chain(flows).chain(contacts) {
+    for (table, on, part) in tractions.chain(on_areas).chain(flows).chain(contacts) {
         let Some(part) = part else { continue };
         let cut = facets(mesh, on).into_iter().filter(|facet| is_cut(mesh, *facet, part));
         let [count, area] = measured(session, mesh, cut);
@@ -66,7 +71,37 @@ pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh
             ));
         }
     }
+    for (at, support) in supports.filter(|(_, support)| support.fix.is_some()) {
+        let Some(part) = &support.part else { continue };
+        let [held, meant, whole] = session.sum(held_and_meant(mesh, &support.on, part));
+        // Points and edges have no facets; a condition on all of a boundary leaves nodes to other tables.
+        let is_area = held > 0.0 && meant < (1.0 - INSIDE) * whole;
+        if is_area && (held - meant).abs() > WRONG * larger(held, meant) {
+            let unit = unit(mesh);
+            warnings.push(format!(
+                "support.{at}.where: the facets of {} that it holds as a whole have {} {unit}, the part where the condition holds {} {unit}, because nodes \
+                 are held alone: let nodes lie where the condition changes and hold them, too (`x < 1 + 1e-6`), or refine the mesh there",
+                support.on.join(", "),
+                Digits(held),
+                Digits(meant)
+            ));
+        }
+    }
     warnings
+}
+
+/// The area on this rank of the facets of boundaries at all of whose nodes an expression holds, that of the part of them where it holds, and
+/// that of all.
+fn held_and_meant<const D: usize>(mesh: &Mesh<D>, on: &[String], part: &Scalar) -> [f64; 3] {
+    let mut sums = [0.0; 3];
+    for facet in facets(mesh, on) {
+        let is_held =
+            mesh.facet_nodes(facet).all(|node| part.evaluate(0.0, &mesh.nodes[node as usize]) != 0.0);
+        let holds = share_where(mesh, facet, part);
+        let parts = [f64::from(u8::from(is_held)), holds, 1.0];
+        sums.iter_mut().zip(parts).for_each(|(sum, share)| *sum += share * area_of(mesh, facet));
+    }
+    sums
 }
 
 /// Warnings of boundaries with heat at whose nodes other tables give the temperature. Collective, with the same warnings on all ranks.
@@ -119,19 +154,36 @@ fn measured<const D: usize>(
 
 /// A number of facets and their area in words.
 fn in_words<const D: usize>(mesh: &Mesh<D>, [count, area]: [f64; 2]) -> String {
-    let unit = if D == 2 && !mesh.is_revolved { "m" } else { "m^2" };
-    format!("{count} facet{} ({} {unit})", if count == 1.0 { "" } else { "s" }, Digits(area))
+    format!("{count} facet{} ({} {})", if count == 1.0 { "" } else { "s" }, Digits(area), unit(mesh))
 }
 
-/// Whether an expression holds at one corner of a facet and not at another one, just inside of the facet.
+/// The unit of the area of facets.
+fn unit<const D: usize>(mesh: &Mesh<D>) -> &'static str {
+    if D == 2 && !mesh.is_revolved { "m" } else { "m^2" }
+}
+
+/// Whether an expression holds at one corner of a facet and not at another one, just inside of the facet, or at one place in it and not at
+/// another one.
 fn is_cut<const D: usize>(mesh: &Mesh<D>, facet: u32, part: &Scalar) -> bool {
     let (corners, centre) = (mesh.facet_corners(facet), centre_of(mesh, facet));
     let holds = |corner: &Vector<D>| {
         let inward: Vector<D> = std::array::from_fn(|i| centre[i] - corner[i]);
         part.evaluate(0.0, &add_scaled(corner, INSIDE, &inward)) != 0.0
     };
-    let first = holds(&corners[0]);
-    corners.iter().any(|corner| holds(corner) != first)
+    let share = share_where(mesh, facet, part);
+    corners.iter().any(|corner| f64::from(u8::from(holds(corner))) != share)
+}
+
+/// The share of a facet in which an expression holds.
+fn share_where<const D: usize>(mesh: &Mesh<D>, facet: u32, part: &Scalar) -> f64 {
+    let corners = mesh.facet_corners(facet);
+    let places = spread_over_facet::<D>();
+    let place = |shares: &[f64; 4]| {
+        let terms = corners.iter().zip(shares);
+        terms.fold([0.0; D], |at, (corner, share)| add_scaled(&at, *share, corner))
+    };
+    let held = places.iter().filter(|shares| part.evaluate(0.0, &place(shares)) != 0.0);
+    held.count() as f64 / places.len() as f64
 }
 
 /// The area of a facet in m^(D-1), of a body of revolution in m^2.
@@ -161,6 +213,10 @@ mod tests {
             is_cut(&mesh, 0, &Scalar::Expression(part))
         };
         assert!(x != end && cuts(at(0.5)) && cuts(at(0.1)));
+        let strip = format!("abs(x - 0.5*({x} + {end})) < 0.2*abs({end} - {x})");
+        let strip = Scalar::Expression(Expression::parse(&strip).expect("an expression"));
+        assert!(is_cut(&mesh, 0, &strip), "between its ends");
+        assert!((share_where(&mesh, 0, &strip) - 0.4).abs() < 0.07);
         assert!(!cuts(at(0.0)) && !cuts(at(1.0)) && !cuts(at(2.0)), "at its ends or beside it");
     }
 }

@@ -3,7 +3,7 @@
 use super::{EnergyKind, Role};
 use crate::{
     error::{Error, Result},
-    fem::space::{CellShape, Geometry, cell_rule, evenly_spread, facet_points, fine_cell_rule},
+    fem::space::{CellShape, Geometry, cell_rule, facet_points, fine_cell_rule, spread_over_facet},
     job::{BodyForce, Scalar},
     laws::material::ByMaterial,
     linear_algebra::tensor::{Vector, add_scaled, norm},
@@ -18,9 +18,6 @@ pub const WORK: EnergyKind = EnergyKind::new(
     "work of loads, moving supports and obstacles whose motion is prescribed, on the body since time 0; with an \
      obstacle that a force moves, also that of the guide that keeps it on its direction",
 );
-
-/// Parts of each edge of a facet at whose places the mean of a traction is taken, of segments and of triangles.
-const PARTS: [usize; 2] = [16, 5];
 
 /// A force per area on facets of this rank.
 #[derive(Debug)]
@@ -70,15 +67,17 @@ impl Traction {
         Ok(add_scaled(&value, -pressure, normal))
     }
 
-    /// By how much the forces on the facets of this rank differ at `time` from the means of the traction over many parts of each facet, and the sum of
-    /// the magnitudes of the latter, in N.
-    pub fn error_of_rule<const D: usize>(&self, mesh: &Mesh<D>, time: f64) -> Result<[f64; 2]> {
-        let parts = evenly_spread(D, PARTS[D - 2]);
-        let mut sums = [0.0; 2];
+    /// By how much the forces on the facets of this rank differ at `time` from the means of the traction over many parts of each facet, and the sums of
+    /// the magnitudes of the traction at the points of facets, and of the means, in N.
+    pub fn error_of_rule<const D: usize>(&self, mesh: &Mesh<D>, time: f64) -> Result<[f64; 3]> {
+        let parts = spread_over_facet::<D>();
+        let mut sums = [0.0; 3];
         for &facet in &self.facets {
             let (mut force, mut area, mut normal) = ([0.0; D], 0.0, [0.0; D]);
             for point in facet_points(mesh, facet).1 {
-                force = add_scaled(&force, point.weight, &self.at(time, &point.place, &point.normal)?);
+                let value = self.at(time, &point.place, &point.normal)?;
+                force = add_scaled(&force, point.weight, &value);
+                sums[1] += point.weight * norm(&value);
                 normal = add_scaled(&normal, point.weight, &point.normal);
                 area += point.weight;
             }
@@ -95,7 +94,7 @@ impl Traction {
                 mean = add_scaled(&mean, 1.0 / parts.len() as f64, &self.at(time, &place, &normal)?);
             }
             sums[0] += norm(&add_scaled(&force, -area, &mean));
-            sums[1] += area * norm(&mean);
+            sums[2] += area * norm(&mean);
         }
         Ok(sums)
     }

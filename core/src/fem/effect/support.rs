@@ -3,7 +3,7 @@
 use super::load::finite;
 use crate::{
     error::{Error, Result},
-    fem::space::{Held, INDEPENDENT, SurfacePoint, facets, surface_points},
+    fem::space::{Held, INDEPENDENT, SurfacePoint, axis, facets, surface_points},
     job::{Fix, FixedDirections, Scalar, Support},
     laws::{quadrature::rule, step::Step},
     linear_algebra::{
@@ -87,10 +87,9 @@ impl<const D: usize> Supports<D> {
         layout: &DistributedVector,
     ) -> Result<Self> {
         let mut constraints = constraints(session, mesh, supports)?;
-        let radial: Vector<D> = std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 });
         let owned = mesh.nodes[..mesh.owned].iter().enumerate();
         let on_axis = owned.filter(|(_, place)| mesh.is_on_axis(place));
-        let nodes = on_axis.map(|(node, _)| (node as u32, vec![radial])).collect();
+        let nodes = on_axis.map(|(node, _)| (node as u32, vec![axis(0)])).collect();
         constraints.push(Constraints { support: None, nodes });
         Self::from(session, mesh, constraints, layout)
     }
@@ -153,7 +152,6 @@ fn constraints<'a, const D: usize>(
             names =
                 supports.iter().filter(|other| is_plain_normal(other)).flat_map(|other| &other.on).collect();
         }
-        let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
         let directions = |normals: &[SurfacePoint<D>]| match fix {
             Fix::Keyword(FixedDirections::All) => (0..D).map(axis).collect(),
             Fix::Axes(axes) => axes.iter().map(|a| axis(a.index())).collect(),

@@ -197,7 +197,8 @@ impl<const D: usize> Held<D> {
     }
 }
 
-pub(super) fn axis<const D: usize>(i: usize) -> Vector<D> {
+/// The unit vector along an axis.
+pub fn axis<const D: usize>(i: usize) -> Vector<D> {
     std::array::from_fn(|j| f64::from(u8::from(i == j)))
 }
 

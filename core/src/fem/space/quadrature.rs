@@ -139,6 +139,11 @@ pub fn evenly_spread(corners: usize, parts: usize) -> Vec<[f64; 4]> {
     found.into_iter().map(place).collect()
 }
 
+/// Places in a segment (`D = 2`) or a triangular facet (`D = 3`) that are spread evenly, enough of them for its mean values.
+pub fn spread_over_facet<const D: usize>() -> Vec<[f64; 4]> {
+    evenly_spread(D, if D == 2 { 16 } else { 5 })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

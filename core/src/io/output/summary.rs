@@ -89,7 +89,8 @@ pub struct Summary {
     #[schemars(title = "largest imbalance of heat")]
     pub max_heat_imbalance: Option<f64>,
     /// Energy that the time scheme has generated since time 0 over the energy that was supplied, negative if it has dissipated energy. Implicit
-    /// schemes warn above 5 %; the log states what they have dissipated of bodies with inertia, from 5 % on.
+    /// schemes warn above 5 %; the log states what they have dissipated of bodies with inertia, from 5 % on, and their share of the energy of others, from
+    /// 1 % on.
     pub energy_of_scheme: f64,
     /// Largest contact pressure, where friction weakens with slip and the normal law does not bound the pressure; to be compared with
     /// `certificates.slip_pressure_bound`.

@@ -20,7 +20,8 @@ pub struct Support {
     /// The part of these boundaries to which the support applies: with `fix` the nodes at which this expression in x, y, z is not
     /// 0, for example the nodes of an edge, or a single node; otherwise the facets at whose centre it is not 0. A product of
     /// conditions holds where all hold, their `max` where one holds. With fix = "normal" a node on an edge of the body is held along the
-    /// normals of those faces of which the part has whole facets. Absent: the whole boundaries.
+    /// normals of those faces of which the part has whole facets. What is held ends at the last node: where the facets that a support with `fix`
+    /// holds as a whole have an area that differs by more than 10 % from that of the part, it is warned of. Absent: the whole boundaries.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
     #[schemars(extend("variables" = "x, y, z"), example = "x < 1", example = "hypot(x - 1, y) < 1e-6", example = "(x > 1)*(x < 2)")]
     pub part: Option<Scalar>,

@@ -12,6 +12,18 @@ pub struct Breakpoints {
     pub switches: Vec<f64>,
     /// The kinks of tables.
     pub kinks: Vec<f64>,
+    /// From where to where tables reach.
+    pub spans: Vec<Span>,
+}
+
+/// The times between which a table has points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// That of its first point, and that of its last one.
+    pub ends: [f64; 2],
+    /// Whether it goes to and fro and stops on its way: its last two values differ, and the last one is not zero. A ramp only rises or only
+    /// falls.
+    pub is_cut_off: bool,
 }
 
 impl Breakpoints {
@@ -79,7 +91,9 @@ impl Machine for Lines {
 
     fn interpolate(&mut self, table: &Table, argument: Option<Line>) -> Option<Line> {
         if let Some([at_start, slope]) = argument.filter(|line| line[1] != 0.0) {
-            self.0.kinks.extend(kinks(table).map(|at| (at - at_start) / slope));
+            let time = |at: f64| (at - at_start) / slope;
+            self.0.kinks.extend(kinks(table).map(time));
+            self.0.spans.extend(span(table, slope).map(|span| Span { ends: span.ends.map(time), ..span }));
         }
         None
     }
@@ -89,6 +103,18 @@ impl Machine for Lines {
 fn crossing(left: Option<Line>, right: Option<Line>) -> Option<f64> {
     let ([a, p], [b, q]) = left.zip(right)?;
     (p != q).then(|| (b - a) / (p - q)).filter(|time| time.is_finite())
+}
+
+/// The span of a table in its own coordinate, which is passed in the direction of this slope.
+fn span(table: &Table, slope: f64) -> Option<Span> {
+    let (first, last) = (*table.first()?, *table.last()?);
+    let [first, last, beside] = match slope > 0.0 {
+        true => [first, last, table[table.len().saturating_sub(2)]],
+        false => [last, first, *table.get(1)?],
+    };
+    let is_ramp = table.is_sorted_by(|a, b| a[1] <= b[1]) || table.is_sorted_by(|a, b| a[1] >= b[1]);
+    let is_cut_off = !is_ramp && last[1] != 0.0 && last[1] != beside[1];
+    Some(Span { ends: [first[0], last[0]], is_cut_off })
 }
 
 /// The first coordinates of the points of a table at which its slope changes.

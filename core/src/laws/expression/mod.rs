@@ -23,7 +23,7 @@ use serde::de::{self, Deserializer, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
 pub use analysis::{Border, Place, REACH, Supremum, Unproven};
-pub use breakpoints::Breakpoints;
+pub use breakpoints::{Breakpoints, Span};
 pub use compile::Fault;
 pub use enclosure::Enclosure;
 use evaluate::Arguments;
@@ -97,7 +97,7 @@ impl Scalar {
         }
     }
 
-    /// Times at which it switches or a table has a kink, found from arguments that are linear functions of time.
+    /// Times at which it switches or a table has a kink or ends, found from arguments that are linear functions of time.
     pub fn breakpoints(&self) -> Breakpoints {
         match self {
             Self::Number(_) => Breakpoints::default(),

@@ -1,7 +1,7 @@
 use super::program::COUNT;
 use super::{
-    Enclosure, Expression, Formula, Interval, Names, OfCreep, OfMotion, REACH, Resolved, Scalar, Unproven,
-    Variable,
+    Enclosure, Expression, Formula, Interval, Names, OfCreep, OfMotion, REACH, Resolved, Scalar, Span,
+    Unproven, Variable,
 };
 
 fn value(text: &str) -> f64 {
@@ -189,6 +189,23 @@ fn breakpoints_follow_from_arguments_that_are_linear_in_time() {
         };
         assert!(near(&found.switches, switches) && near(&found.kinks, kinks), "{text}: {found:?}");
     }
+}
+
+#[test]
+fn tables_over_time_know_where_they_reach() {
+    let spans = |text: &str| Scalar::Expression(Expression::parse(text).expect(text)).breakpoints().spans;
+    for (text, ends, is_cut_off) in [
+        ("2*interpolate(t, 1, 0, 2, -1, 4, 3)", [1.0, 4.0], true),
+        ("2*interpolate(t, 1, 0, 2, 1, 4, 3)", [1.0, 4.0], false),
+        ("interpolate(3 - t, 1, 2, 2, 1, 4, 3)", [-1.0, 2.0], true),
+        ("interpolate(3 - t, 1, 1, 2, 1, 3, 0, 4, 3)", [-1.0, 2.0], false),
+        ("interpolate(t, 1, 0, 2, 1, 4, 1)", [1.0, 4.0], false),
+        ("interpolate(t, 1, 0, 2, 1, 4, 0)", [1.0, 4.0], false),
+        ("interpolate(2*t, 1, 0, 2, 1)", [0.5, 1.0], false),
+    ] {
+        assert_eq!(spans(text), [Span { ends, is_cut_off }], "{text}");
+    }
+    assert!(spans("interpolate(x, 0, 0, 1, 1) + interpolate(sin(t), 0, 0, 1, 1)").is_empty());
 }
 
 fn formula(text: &str) -> Formula<OfMotion> {

@@ -255,6 +255,11 @@ impl<const D: usize> Point<D> {
         self.edge.as_ref().and_then(|edge| edge.undeformed)
     }
 
+    /// The place in m of a point in the undeformed body, which messages name.
+    pub(super) fn initial_place(&self) -> Vector<D> {
+        self.undeformed().unwrap_or(self.place)
+    }
+
     /// Turns a point that follows the obstacle to the direction in which this place sees it at `time`, and takes its gap from where
     /// it is at this displacement in m.
     pub(super) fn slide(&mut self, gap: &Gap, (seen, time): (Vector<D>, f64), displacement: &Vector<D>) {
@@ -641,6 +646,21 @@ pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, held: &He
 mod tests {
     use super::*;
     use crate::laws::contact::NormalLaw;
+
+    #[test]
+    fn messages_name_the_place_of_a_point_before_it_slid() {
+        let held = Held::<2>::from(vec![false; 2]);
+        let normal = [0.0, -1.0];
+        let mut point = Point::nodal(SurfacePoint { node: 0, normal, weight: 1.0 }, &held);
+        point.place = [2.0, 0.5];
+        assert_eq!(point.initial_place(), [2.0, 0.5], "it does not follow the obstacle");
+        let mut edge = Edge::new(vec![(normal, 1.0)], vec![normal], held.frame(0)).expect("free");
+        edge.undeformed = Some(point.place);
+        point.edge = Some(Rc::new(edge));
+        let floor: Gap = toml::from_str("plane = { point = [0, 0], normal = [0, 1] }").expect("a plane");
+        point.slide(&floor, ([2.0, 0.5], 0.0), &[0.3, 0.1]);
+        assert_eq!((point.place, point.initial_place()), ([2.3, 0.5], [2.0, 0.5]));
+    }
 
     #[test]
     fn a_held_point_that_moves_along_a_slanted_boundary_rests_along_its_normal() {

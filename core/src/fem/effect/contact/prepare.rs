@@ -147,7 +147,9 @@ impl<const D: usize> Contact<D> {
             if point.context.penetration >= 0.0 && drag <= -point.free_length {
                 return Err(Error::Failed(format!(
                     "friction at {:?} m: a support guides the node along {:?}, and friction on the obstacle, which moves past it at t = {} s and is inclined to this direction, holds the node fast there; free the component that the support holds, or take less friction or inclination",
-                    point.place, point.direction, rate.time
+                    point.initial_place(),
+                    point.direction,
+                    rate.time
                 )));
             }
         }
@@ -163,7 +165,8 @@ impl<const D: usize> Contact<D> {
             if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
                 return Err(Error::Refused(format!(
                     "friction at {:?} m: a support holds a direction that is neither along the boundary nor across it, and the obstacle moves there (at {along} m/s at t = {} s); hold all components there, or exclude the facets around by the `where` of the contact",
-                    point.place, rate.time
+                    point.initial_place(),
+                    rate.time
                 )));
             }
         }

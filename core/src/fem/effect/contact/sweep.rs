@@ -140,7 +140,9 @@ impl<const D: usize> Contact<D> {
                      beyond the boundary at {:?} m, where a support holds the normal, and nowhere along its direction it is outside of \
                      all such points; let the contact end before the support (key `where`), free the normal component there, or take a \
                      law with a finite pressure, as normal.compliance",
-                    step.time, step.length, point.place
+                    step.time,
+                    step.length,
+                    point.initial_place()
                 )));
             }
             let [worn, worn_before] = point.worn;
@@ -159,14 +161,18 @@ impl<const D: usize> Contact<D> {
                             "the step to t = {:.6e} s (length {:.3e} s) failed: supports let the boundary at {:?} m touch the other body and \
                              part from it within the step; take a smaller [time] step, which resolves the motion of the supports, or correct \
                              their motion",
-                            step.time, step.length, point.place
+                            step.time,
+                            step.length,
+                            point.initial_place()
                         )));
                     }
                 } else if given.comes_and_goes(gap) {
                     return Err(Error::Failed(format!(
                         "the step to t = {:.6e} s (length {:.3e} s) failed: its gap at {:?} m closes and opens within the step; take a \
                          smaller [time] step, which resolves the formula of the gap, or correct the formula",
-                        step.time, step.length, point.place
+                        step.time,
+                        step.length,
+                        point.initial_place()
                     )));
                 }
             }
@@ -193,7 +199,9 @@ impl<const D: usize> Contact<D> {
                      which it is at the start of the step and behind which at the end, or comes and goes within the step; take a \
                      smaller [time] step, in which obstacle and body approach each other by less than the size of the obstacle and \
                      which resolves the motion, or correct {speed}",
-                    step.time, step.length, point.place
+                    step.time,
+                    step.length,
+                    point.initial_place()
                 )));
             }
         }
