@@ -340,6 +340,27 @@ fn what_changes_between_nodes_of_facets_is_warned_of() {
             assert_eq!(said.contains(&**words), is_wrong, "{value}, {order}: {said}");
         }
     }
+    // Between bodies the law acts on the side whose mesh is finer, or where the job wants it.
+    for (side, is_wrong) in [("auto", false), ("on", true)] {
+        let said = Case::of("pressed_blocks")
+            .set(
+                "mesh.rectangle",
+                "[{ name = 'lower', size = [1, 0.5], cells = [5, 3] }, \
+                  { name = 'upper', corner = [0, 0.5], size = [1, 0.5], cells = [64, 4] }]",
+            )
+            .set(
+                "contact",
+                &format!(
+                    "[{{ on = ['lower.top'], against = ['upper.bottom'], side = '{side}', normal.unilateral = {{}}, \
+                        friction.expression.coefficient = '0.3 + 0.2*sin(40*x)' }}]"
+                ),
+            )
+            .checked(2);
+        let words =
+            "contact.0.friction.expression.coefficient: facets of the boundary lower.top are too large";
+        assert_eq!(said.contains(words), is_wrong, "{side}: {said}");
+        assert!(!said.contains("facets of the boundary upper.bottom"), "{side}: {said}");
+    }
 }
 
 #[test]

@@ -466,7 +466,9 @@ impl<const D: usize> Coupling<D> {
         mesh: &Mesh<D>,
         nodes: &[u32],
     ) -> Result<Blocks<D>, Agreed> {
-        let others = nodes.iter().copied().filter(|node| mesh.owner(*node) != session.rank());
+        let mut others: Vec<u32> = nodes.iter().copied().filter(|node| !mesh.owns(*node)).collect();
+        others.sort_unstable();
+        others.dedup();
         let answer = |node: u32| {
             let of_node = self.blocks.get(&node).into_iter().flatten();
             of_node
@@ -528,7 +530,8 @@ fn product<const D: usize>(a: &Block<D>, b: &Block<D>) -> Block<D> {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..D).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// The same for any pairs of these nodes of two surfaces, of which this rank owns the given ones: those that carry the law and the others.
+/// The same for any pairs of these nodes of two surfaces: those that carry the law, of which each rank gives those that it owns, and the
+/// others, of which it gives those of its facets.
 /// Collective.
 pub fn ghosts_of_surfaces<const D: usize>(
     session: &Session,
@@ -541,8 +544,7 @@ pub fn ghosts_of_surfaces<const D: usize>(
     all.extend(mesh.among(session, mesh.ghosts.iter().copied(), &slaves)?);
     let has_slave = |cell: &usize| nodes(*cell).any(|node| all.contains(&node));
     let around: BTreeSet<u32> = (0..mesh.cell_count()).filter(has_slave).flat_map(nodes).collect();
-    let own = mesh.first_node as u32..(mesh.first_node + mesh.owned) as u32;
-    let takes_part = !around.is_empty() || masters.iter().any(|node| own.contains(node));
+    let takes_part = !around.is_empty() || masters.iter().any(|node| mesh.owns(*node));
     let around = gather(session.world(), &around.into_iter().collect::<Vec<_>>())?;
     Ok(if takes_part { around.into_iter().chain(masters).collect() } else { Vec::new() })
 }

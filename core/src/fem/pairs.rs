@@ -4,7 +4,7 @@
 use super::coupling::{Inclined, MasterShare};
 use crate::{
     fem::space::{
-        Held, SurfacePoint, longest_side,
+        Held, SurfacePoint, axis, longest_side,
         mortar::{Contribution, Facet, Normals, contributions, direction, shorter, smooth_direction},
         surface_points,
     },
@@ -142,6 +142,8 @@ pub struct Sharing {
     pub on: Vec<u32>,
     /// The other side.
     pub against: Vec<u32>,
+    /// The nodes of the other side owned here, by global numbers.
+    pub others: BTreeSet<u32>,
     /// The nodes of the other side that nodes owned here face, by global numbers.
     pub faced: BTreeSet<u32>,
 }
@@ -223,21 +225,19 @@ impl<const D: usize> Pair<D> {
         &self,
         session: &Session,
         mesh: &Mesh<D>,
-        places: &[Vector<D>],
+        (places, slaves): (&[Vector<D>], &[Facet<D>]),
     ) -> Result<Vec<Contribution<D>>, Agreed> {
         let reach = [DEEPEST * longest_side(session, places), f64::INFINITY];
-        let of_facets =
-            |on: &[u32], masters: &[Facet<D>]| contributions(&facets_of(mesh, places, on), masters, reach);
-        let facing = |on: &[u32], against: &[u32]| {
-            let [on, against] = [on, against].map(|facets| facets_of(mesh, places, facets));
-            facing_facets((session, mesh), &on, against, reach)
+        let of_facets = |facets: &[u32]| facets_of(mesh, places, facets);
+        let facing = |slaves: &[Facet<D>], against: &[u32]| {
+            facing_facets((session, mesh), slaves, of_facets(against), reach)
         };
         if self.sharing.is_empty() {
-            return Ok(of_facets(&self.on, &facing(&self.on, &self.against)?));
+            return Ok(contributions(slaves, &facing(slaves, &self.against)?, reach));
         }
         let mut masters = Vec::new();
         for sharing in &self.sharing {
-            masters.push(facing(&sharing.on, &sharing.against)?);
+            masters.push(facing(&of_facets(&sharing.on), &sharing.against)?);
         }
         // Facets by which of the contacts have them.
         let mut kinds: BTreeMap<Vec<bool>, Vec<u32>> = BTreeMap::new();
@@ -250,7 +250,7 @@ impl<const D: usize> Pair<D> {
             let mut masters: Vec<Facet<D>> = masters.flat_map(|(masters, _)| masters).cloned().collect();
             let mut known = BTreeSet::new();
             masters.retain(|facet| known.insert(facet.nodes.clone()));
-            of_facets(&on, &masters)
+            contributions(&of_facets(&on), &masters, reach)
         };
         Ok(kinds.into_iter().flat_map(of_kind).collect())
     }
@@ -323,8 +323,7 @@ impl<const D: usize> Pair<D> {
         mesh: &Mesh<D>,
         lawless: impl IntoIterator<Item = u32>,
     ) -> Result<(), Agreed> {
-        let own = mesh.first_node as u32..(mesh.first_node + mesh.owned) as u32;
-        let mut all: BTreeSet<u32> = self.lawless.iter().copied().filter(|node| own.contains(node)).collect();
+        let mut all: BTreeSet<u32> = self.lawless.iter().copied().filter(|node| mesh.owns(*node)).collect();
         all.extend(lawless);
         self.lawless = mesh.among(session, mesh.nodes_of_facets(&self.on), &all)?;
         self.lawless.extend(all);
@@ -336,9 +335,8 @@ impl<const D: usize> Pair<D> {
         let is_own = |node: u32| !self.of_others.contains(&mesh.global_node(node));
         let (mut found, is_bare) = self.paired_nodes(session, mesh, places)?;
         for at in 0..self.sharing.len() {
-            let faced = mesh.named(session, mesh.nodes_of_facets(&self.sharing[at].against))?;
             let masters = found.iter().flat_map(|node| &node.masters).map(|(master, _)| *master);
-            self.sharing[at].faced = mesh.among(session, masters, &faced)?;
+            self.sharing[at].faced = mesh.among(session, masters, &self.sharing[at].others)?;
         }
         found.retain(|node| is_own(node.node));
         if self.is_closed {
@@ -417,14 +415,15 @@ impl<const D: usize> Pair<D> {
         places: &[Vector<D>],
     ) -> Result<(Vec<PairedNode<D>>, bool), Agreed> {
         let mut normals = FaceNormals::of(session, mesh, [&self.on, &self.against])?;
-        let mut all = self.contributions(session, mesh, places)?;
+        let slaves = facets_of(mesh, places, &self.on);
+        let mut all = self.contributions(session, mesh, (places, &slaves))?;
         if mesh.order() == 2 {
             let nodes =
                 all.iter().flat_map(|one| one.masters.iter().map(|(master, _)| *master).chain([one.node]));
             let at = places_of(session, mesh, places, nodes)?;
             all.iter_mut().for_each(|one| one.gap = gap_between_nodes(one, &at));
         }
-        let curvatures = curvatures(session, mesh, &facets_of(mesh, places, &self.on))?;
+        let curvatures = curvatures(session, mesh, &slaves)?;
         let own: BTreeSet<u32> = mesh.nodes_of_facets(&self.on).collect();
         let leaves = session.total(self.lawless.len()) > 0;
         let mut lawless = self.lawless.clone();
@@ -547,7 +546,7 @@ const DEEPEST: f64 = 0.05;
 
 /// Axes of space.
 fn axes_of_space<const D: usize>() -> [Vector<D>; D] {
-    std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))))
+    std::array::from_fn(axis)
 }
 
 /// Axes along the first of these facets of all ranks by the numbers of its nodes in the whole mesh, with the local nodes at `places` in m.

@@ -151,6 +151,11 @@ impl<const D: usize> Mesh<D> {
         own.or_else(|| Some(self.owned + self.ghosts.binary_search(&global).ok()?))
     }
 
+    /// Whether this rank owns a node, given its global number.
+    pub fn owns(&self, global: u32) -> bool {
+        (global as usize).checked_sub(self.first_node).is_some_and(|node| node < self.owned)
+    }
+
     /// The rank that owns a node, given its global number.
     pub fn owner(&self, global: u32) -> usize {
         self.node_starts.partition_point(|&start| start <= global as usize) - 1

@@ -11,8 +11,7 @@ impl<const D: usize> Mesh<D> {
     /// Adds ghosts: nodes of other ranks, by their global numbers, that no cell of this rank has. Local numbers of ghosts change.
     /// Collective.
     pub fn add_ghosts(&mut self, session: &Session, mut wanted: Vec<u32>) -> Result<(), Agreed> {
-        wanted
-            .retain(|&node| self.owner(node) != session.rank() && self.ghosts.binary_search(&node).is_err());
+        wanted.retain(|&node| !self.owns(node) && self.ghosts.binary_search(&node).is_err());
         let new = self.ask_owners(session, wanted, |node| {
             let node = self.owned_node(node);
             std::iter::once(f64::from(self.node_ids[node])).chain(self.nodes[node]).collect()

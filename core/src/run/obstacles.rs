@@ -12,7 +12,7 @@ use crate::{
         body::Body,
         effect::{Closeness, Contact, EJECTED, Ejection, Friction, Gaps, OVERRUN, tangents},
         pairs::pair_of,
-        space::{longest_side, surface_means},
+        space::{axis, longest_side, surface_means},
         state::State,
     },
     job::{self, Job, Sliding},
@@ -65,7 +65,6 @@ fn warning_of_moved_nodes<const D: usize, const S: usize>(
     if !contact.follows_surface || matches!(contact.obstacle.gap, Gap::Plane(_)) {
         return None;
     }
-    let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
     let is_moved = |node: &usize| {
         let motion = body.support_motion.as_ref();
         let moves = motion.is_some_and(|motion| (0..D).any(|i| motion.moves(*node, &axis(i))));

@@ -13,7 +13,7 @@ use crate::{
         coupling::{Coupling, ghosts_of_surfaces, needed_ghosts},
         effect::{Carried, HeldNode},
         pairs::{Pair, PairedNode, inclined, is_exchanged, pair_of, shares},
-        space::{Held, facets},
+        space::{Held, axis, facets},
     },
     job::{self, Job, Side, Sliding},
     linear_algebra::tensor::{Vector, norm},
@@ -298,7 +298,6 @@ pub(super) fn warnings_of_held_faults<const D: usize, const S: usize>(
     body: &Body<D, S>,
 ) -> Result<Vec<String>, Agreed> {
     let mesh = &body.mesh;
-    let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
     let moves = |node: usize| {
         body.support_motion.as_ref().is_some_and(|motion| (0..D).any(|i| motion.moves(node, &axis(i))))
     };

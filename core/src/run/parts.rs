@@ -22,6 +22,9 @@ const INSIDE: f64 = 1e-3;
 /// Share of the area of a part by which that of the facets that a support holds may differ from it.
 const WRONG: f64 = 0.1;
 
+/// Share of the area of a boundary from which on a part is all of it.
+const WHOLE: f64 = 0.999;
+
 /// Shares of a boundary up to this one are facets in its corners, whose nodes belong to other boundaries.
 const NEGLIGIBLE: f64 = 0.1;
 
@@ -75,7 +78,7 @@ pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh
         let Some(part) = &support.part else { continue };
         let [held, meant, whole] = session.sum(held_and_meant(mesh, &support.on, part));
         // Points and edges have no facets; a condition on all of a boundary leaves nodes to other tables.
-        let is_area = held > 0.0 && meant < (1.0 - INSIDE) * whole;
+        let is_area = held > 0.0 && meant < WHOLE * whole;
         if is_area && (held - meant).abs() > WRONG * larger(held, meant) {
             let unit = unit(mesh);
             warnings.push(format!(

@@ -87,7 +87,8 @@ impl<const D: usize> Sides<'_, D> {
         let (mut sharing, mut carrying) = (Vec::new(), Vec::new());
         for &at in group {
             let Pair { contact, on, against, .. } = pairs[at].clone();
-            sharing.push(Sharing { contact, on, against, faced: BTreeSet::new() });
+            let others = mesh.named(session, mesh.nodes_of_facets(&against))?;
+            sharing.push(Sharing { contact, on, against, others, faced: BTreeSet::new() });
             let of_pair = most.iter().filter(|(_, (of, _))| *of == at);
             carrying.push(of_pair.map(|(node, _)| *node).collect::<BTreeSet<u32>>());
         }
@@ -182,14 +183,17 @@ impl<const D: usize> Sides<'_, D> {
                 continue;
             }
             let inclined = self.inclined(pair)?;
-            let around = || mesh.nodes_of_facets(&pair.on);
-            let carrying = mesh.among(session, around(), &pair.carrying(mesh))?;
-            let others_are = mesh.among(session, around(), &inclined)?;
+            let carrying = pair.carrying(mesh);
+            let answer = |node: u32| {
+                let is_inclined = f64::from(u8::from(inclined.contains(&node)));
+                if carrying.contains(&node) { vec![is_inclined] } else { Vec::new() }
+            };
+            let answers = mesh.ask_owners(session, mesh.nodes_of_facets(&pair.on), answer)?;
             let mut kept = Vec::new();
             for facet in &pair.on {
                 let nodes: Vec<u32> =
-                    mesh.nodes_of_facets([facet]).filter(|node| carrying.contains(node)).collect();
-                if nodes.iter().all(|node| others_are.contains(node)) {
+                    mesh.nodes_of_facets([facet]).filter(|node| !answers[node].is_empty()).collect();
+                if nodes.iter().all(|node| answers[node] == [1.0]) {
                     kept.extend(nodes);
                 }
             }

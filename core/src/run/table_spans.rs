@@ -1,7 +1,13 @@
 //! Tables over time against the time of a run: before its first and after its last point a table is constant.
 
 use super::steps::time_dependent;
-use crate::{job::Job, laws::digits::Digits};
+use crate::{
+    job::{Job, Scalar},
+    laws::digits::Digits,
+};
+
+/// How far behind the end of a table it is looked at, as a share of the rest of the run.
+const BEHIND: f64 = 1e-3;
 
 /// Warnings about tables that do not overlap the run, or that stop on their way within it.
 pub(super) fn warnings(job: &Job) -> Vec<String> {
@@ -16,7 +22,7 @@ pub(super) fn warnings(job: &Job) -> Vec<String> {
                     "its table reaches from t = {from} s to {to} s, the run from 0 s to {end} s: the value is that of one end of the table throughout; \
                      correct the times of the table, which are in s from the start of the run, or [time] end"
                 ))
-            } else if span.is_cut_off && last < run_end {
+            } else if span.is_cut_off && last < run_end && acts_behind(&load.value, last, run_end) {
                 Some(format!(
                     "its table ends at t = {to} s on its way, and keeps its last value to the end of the run at t = {end} s: continue the table, or end the \
                      run there; if the value shall stay, repeat it at a later time in the table"
@@ -25,10 +31,19 @@ pub(super) fn warnings(job: &Job) -> Vec<String> {
                 None
             }
         });
-        found.extend(words.map(|words| format!("{}: {words}", load.key)));
+        for words in words.map(|words| format!("{}: {words}", load.key)) {
+            if !found.contains(&words) {
+                found.push(words);
+            }
+        }
     }
-    found.dedup();
     found
+}
+
+/// Whether a value may differ from 0 just behind the end of a table in it.
+fn acts_behind(value: &Scalar, end_of_table: f64, run_end: f64) -> bool {
+    value.depends_on_position()
+        || value.evaluate(end_of_table + BEHIND * (run_end - end_of_table), &[]) != 0.0
 }
 
 #[cfg(test)]
@@ -68,6 +83,8 @@ mod tests {
             "interpolate(t, 0, 0, 0.5, 1, 1, 0)",
             "interpolate(t, 0, 0, 0.5, 1, 1, 2, 1.5, 2)",
             "interpolate(x, 3, 0, 4, 1, 5, 2)*t",
+            "interpolate(t, -1, 5)",
+            "if(t < 1, interpolate(t, 0, 0, 0.5, 1, 1, 0.7), 0)",
             "7",
         ] {
             assert_eq!(warned(value), [""; 0], "{value}");

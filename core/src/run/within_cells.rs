@@ -5,6 +5,7 @@ use crate::{
     fem::{
         body::Body,
         effect::Traction,
+        pairs::{Pair, is_exchanged},
         space::{cell_rule, evenly_spread, facets, fine_cell_rule, spread_over_facet},
     },
     job::{Job, Material, Scalar},
@@ -78,7 +79,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
     }
     let places = means(spread_over_facet::<D>());
     let facets_of = |on: &[String]| format!("facets of the boundary {}", on.join(", "));
-    for seen in at_nodes_of_facets(session, job, mesh)? {
+    for seen in at_nodes_of_facets(session, job, (mesh, &body.pairs))? {
         let On::Facets(_, on) = seen.on else { continue };
         let words = [&*facets_of(on), "the boundary where it changes"];
         warn(&seen.name, words, error_of(job, body, &seen, &places));
@@ -165,7 +166,7 @@ fn in_cells<'a, const D: usize>(session: &Session, job: &'a Job, mesh: &Mesh<D>)
 fn at_nodes_of_facets<'a, const D: usize>(
     session: &Session,
     job: &'a Job,
-    mesh: &Mesh<D>,
+    (mesh, pairs): (&Mesh<D>, &[Pair<D>]),
 ) -> Result<Vec<Seen<'a>>, Agreed> {
     let mut all = Vec::new();
     let seen = |name: String, values: Vec<Scalar>, on: &'a [String]| {
@@ -181,8 +182,13 @@ fn at_nodes_of_facets<'a, const D: usize>(
         for (key, value) in std::iter::once(gap).chain(friction) {
             let name = format!("contact.{number}.{key}");
             if let Some(mut seen) = seen(name, value.into_iter().collect(), &contact.on) {
-                let part = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
-                seen.on = On::Facets(part, &contact.on);
+                seen.on = match is_exchanged(pairs, number) {
+                    true => On::Facets(facets(mesh, &contact.against), &contact.against),
+                    false => {
+                        let part = part_of(session, mesh, ("contact", &contact.on), contact.part.as_ref())?;
+                        On::Facets(part, &contact.on)
+                    }
+                };
                 all.push(seen);
             }
         }

@@ -5,7 +5,7 @@ use super::{
     VISCOUS, quantity,
 };
 use crate::{
-    fem::space::{Held, Nodal, SurfacePoint},
+    fem::space::{Held, Nodal, SurfacePoint, axis},
     linear_algebra::{
         petsc::BlockRows,
         tensor::{Vector, add_scaled, dot, larger, norm},
@@ -233,7 +233,7 @@ impl<const D: usize> ElasticSupport<D> {
                     all.push((node, at.point.normal));
                 }
                 if kind.tangential > 0.0 {
-                    let axes = (0..D).map(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+                    let axes = (0..D).map(axis);
                     for axis in axes {
                         let tangent: Vector<D> =
                             add_scaled(&axis, -dot(&axis, &at.point.normal), &at.point.normal);

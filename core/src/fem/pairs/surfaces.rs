@@ -111,23 +111,26 @@ pub(super) fn facing_facets<const D: usize>(
     let gathering = Gathering::new(world, boxes.len())?;
     let mut of_all = vec![0.0; gathering.total()];
     gathering.gather(world, boxes, &mut of_all);
-    let wanted_of = |rank: usize| {
-        let boxes = of_all[gathering.range(rank)].as_chunks::<D>().0.as_chunks().0;
-        let is_near = |slave: &&Facet<D>| rank != session.rank() && may_face(slave, boxes, reach);
-        packed(slaves.iter().filter(is_near))
+    let of_others = |rank: usize| -> &[[Vector<D>; 2]] {
+        let boxes = if rank == session.rank() { 0..0 } else { gathering.range(rank) };
+        of_all[boxes].as_chunks::<D>().0.as_chunks().0
     };
-    let wanted: Vec<Vec<f64>> = (0..session.ranks()).map(wanted_of).collect();
+    let boxes: Vec<_> = (0..session.ranks()).map(of_others).collect();
+    let wanted = may_face(slaves, &boxes, reach).into_iter();
+    let wanted: Vec<Vec<f64>> = wanted.map(|near| packed(near.iter().map(|at| &slaves[*at]))).collect();
     let counts: Vec<usize> = wanted.iter().map(Vec::len).collect();
     let (asked, counts) = exchange(world, &wanted.concat(), &counts)?;
-    let answer = |(first, count): (usize, usize)| {
-        let slaves: Vec<Facet<D>> = unpacked(&asked[first..first + count], nodes);
-        packed(facing(&slaves, &masters, reach).into_iter().map(|at| &masters[at]))
-    };
-    let answers: Vec<Vec<f64>> = offsets(&counts).into_iter().zip(counts).map(answer).collect();
+    let asked = offsets(&counts).into_iter().zip(&counts).map(|(first, count)| &asked[first..first + count]);
+    let asked: Vec<Vec<Facet<D>>> = asked.map(|asked| unpacked(asked, nodes)).collect();
+    let answers = facing(&asked, &masters, reach).into_iter();
+    let answers: Vec<Vec<f64>> = answers.map(|near| packed(near.iter().map(|at| &masters[*at]))).collect();
     let counts: Vec<usize> = answers.iter().map(Vec::len).collect();
     let (found, counts) = exchange(world, &answers.concat(), &counts)?;
     let (before, after) = found.split_at(counts[..session.rank()].iter().sum());
-    Ok([unpacked(before, nodes), masters, unpacked(after, nodes)].concat())
+    let mut all = unpacked(before, nodes);
+    all.extend(masters);
+    all.extend(unpacked(after, nodes));
+    Ok(all)
 }
 
 /// For each of these places of this rank in m the node of these facets of all ranks that is there, by its global number. Collective.
@@ -241,4 +244,22 @@ pub(super) fn turns_from<const D: usize>(
         }
     }
     largest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn facets_are_the_same_behind_their_numbers() {
+        let corners = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 3.0, 1.5]];
+        let undeformed = [0.6, 0.0, 0.8];
+        let quadratic = Facet { undeformed, ..Facet::new(vec![7, 1, 4_000_000_000, 2, 9, 5], corners) };
+        let other =
+            Facet { undeformed, ..Facet::new(vec![1, 2, 3, 4, 5, 6], corners.map(|x| x.map(|x| -x))) };
+        let both = [quadratic, other];
+        assert_eq!(unpacked(&packed(both.iter()), 6), both);
+        let segment = Facet::new(vec![3, 8], [[0.5, 0.25], [1.0, -0.25]]);
+        assert_eq!(unpacked(&packed(std::iter::once(&segment)), 2), [segment]);
+    }
 }

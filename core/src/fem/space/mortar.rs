@@ -134,19 +134,25 @@ pub fn contributions<const D: usize>(
     result
 }
 
-/// The numbers of the master facets, ascending, that may form a pair with one of these slave facets, as [`contributions`] has them.
-pub fn facing<const D: usize>(slaves: &[Facet<D>], masters: &[Facet<D>], reach: [f64; 2]) -> Vec<usize> {
+/// For each list of slave facets the numbers of the master facets, ascending, that may form a pair with one of them, as [`contributions`]
+/// has them.
+pub fn facing<const D: usize>(
+    slaves: &[Vec<Facet<D>>],
+    masters: &[Facet<D>],
+    reach: [f64; 2],
+) -> Vec<Vec<usize>> {
     let search = Search::new(masters, reach);
-    let near = |facet| {
-        let slave = Slave::new(facet);
-        let mut near = search.near(&slave);
-        near.retain(|at| slave.is_faced_by(&masters[*at]));
-        near
+    let of_list = |slaves: &Vec<Facet<D>>| {
+        let mut all = Vec::new();
+        for slave in slaves.iter().map(Slave::new) {
+            let near = search.near(&slave).into_iter();
+            all.extend(near.filter(|at| slave.is_faced_by(&masters[*at])));
+        }
+        all.sort_unstable();
+        all.dedup();
+        all
     };
-    let mut all: Vec<usize> = slaves.iter().flat_map(near).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
+    slaves.iter().map(of_list).collect()
 }
 
 /// At most this many boxes, low and high corners in m, around all of these facets that are finite.
@@ -178,11 +184,29 @@ fn join_boxes<const D: usize>(boxes: &mut [[Vector<D>; 2]], most: usize, joined:
     join_boxes(right, most - most / 2, joined);
 }
 
-/// Whether facets in one of these boxes may form a pair with a slave facet.
-pub fn may_face<const D: usize>(slave: &Facet<D>, boxes: &[[Vector<D>; 2]], reach: [f64; 2]) -> bool {
-    let prism = Prism::new(&Slave::new(slave), reach);
-    let mut boxes = boxes.iter().map(|corners| corners.map(|corner| in_space(&corner)));
-    boxes.any(|[low, high]| prism.meets(&AABB::from_corners(low, high)))
+/// For each list of boxes the numbers of the slave facets, ascending, that may form a pair with facets in one of them.
+pub fn may_face<const D: usize>(
+    slaves: &[Facet<D>],
+    boxes: &[&[[Vector<D>; 2]]],
+    reach: [f64; 2],
+) -> Vec<Vec<usize>> {
+    let numbered = boxes.iter().enumerate().flat_map(|(list, boxes)| {
+        boxes.iter().map(move |corners| {
+            let [low, high] = corners.map(|corner| in_space(&corner));
+            GeomWithData::new(Rectangle::from_corners(low, high), list)
+        })
+    });
+    let tree: RTree<NumberedBox> = RTree::bulk_load(numbered.collect());
+    let mut found: Vec<Vec<usize>> = vec![Vec::new(); boxes.len()];
+    for (number, slave) in slaves.iter().enumerate() {
+        let prism = Prism::new(&Slave::new(slave), reach);
+        for met in tree.locate_with_selection_function(&prism) {
+            if found[met.data].last() != Some(&number) {
+                found[met.data].push(number);
+            }
+        }
+    }
+    found
 }
 
 /// A slave facet in its plane.
@@ -211,14 +235,14 @@ struct Part<'a, const D: usize> {
     gap: (f64, Point),
 }
 
-/// The bounding box of a facet with the number of the facet.
-type BoxOfFacet = GeomWithData<Rectangle<[f64; 3]>, usize>;
+/// A box with a number.
+type NumberedBox = GeomWithData<Rectangle<[f64; 3]>, usize>;
 
 /// Master facets in a tree of bounding boxes.
 struct Search<'a, const D: usize> {
     masters: &'a [Facet<D>],
-    /// Those with finite coordinates.
-    tree: RTree<BoxOfFacet>,
+    /// The bounding boxes of those with finite coordinates.
+    tree: RTree<NumberedBox>,
     /// The largest penetration and the largest gap of a pair in m.
     reach: [f64; 2],
 }
@@ -323,12 +347,12 @@ impl Prism {
     }
 }
 
-impl SelectionFunction<BoxOfFacet> for &Prism {
+impl SelectionFunction<NumberedBox> for &Prism {
     fn should_unpack_parent(&self, bounds: &AABB<[f64; 3]>) -> bool {
         self.meets(bounds)
     }
 
-    fn should_unpack_leaf(&self, facet: &BoxOfFacet) -> bool {
+    fn should_unpack_leaf(&self, facet: &NumberedBox) -> bool {
         self.meets(&facet.envelope())
     }
 }

@@ -51,10 +51,14 @@ impl Rate {
         rate.map(|rate| rate / unit)
     }
 
-    /// The rate of the integral of a function of time; no number where the function is none at the end of the step.
+    /// The rate of the integral of a function of time, which may jump at the earlier times; NaN where the function is not finite at the end of
+    /// the step, also if its integral is.
     pub(super) fn of_integral(&self, function: impl Fn(f64) -> f64) -> f64 {
-        let integral = |from: f64| rule([from, self.time]).map(|[at, weight]| weight * function(at)).sum();
-        let [rate] = self.of_changes(|time| [integral(time)]);
+        let [[recent, _], _] = self.before;
+        let over = |part: [f64; 2]| rule(part).map(|[at, weight]| weight * function(at)).sum::<f64>();
+        let since =
+            |from: f64| if from < recent { over([from, recent]) } else { 0.0 } + over([recent, self.time]);
+        let [rate] = self.of_changes(|time| [since(time)]);
         if function(self.time).is_finite() { rate } else { f64::NAN }
     }
 }
@@ -136,6 +140,11 @@ mod tests {
             assert!((found - expected).abs() < 1e-10 * expected, "{found} {expected}");
         }
         assert!(STEP.of_integral(|t| 1.0 / (t - 0.5)).is_nan());
+        // Steps of 0.2 s and 0.1 s with a jump between them, to 1 rad/s: the weights of bdf2 for such steps times 0.1 rad.
+        let uneven = Rate { time: 0.3, before: [[0.2, 15.0], [0.0, -5.0 / 3.0]] };
+        let [expected] = uneven.of(|t| [(t - 0.2).max(0.0)]);
+        let found = uneven.of_integral(|t| f64::from(u8::from(t > 0.2)));
+        assert!((found - expected).abs() < 1e-13, "{found} {expected}");
     }
 
     #[test]

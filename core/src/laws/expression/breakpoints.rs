@@ -107,11 +107,11 @@ fn crossing(left: Option<Line>, right: Option<Line>) -> Option<f64> {
 
 /// The span of a table in its own coordinate, which is passed in the direction of this slope.
 fn span(table: &Table, slope: f64) -> Option<Span> {
-    let (first, last) = (*table.first()?, *table.last()?);
-    let [first, last, beside] = match slope > 0.0 {
-        true => [first, last, table[table.len().saturating_sub(2)]],
-        false => [last, first, *table.get(1)?],
-    };
+    // A table of one point is a constant.
+    let before_last = table.len().checked_sub(2)?;
+    let (low, high) = (table[0], table[before_last + 1]);
+    let [first, last, beside] =
+        if slope > 0.0 { [low, high, table[before_last]] } else { [high, low, table[1]] };
     let is_ramp = table.is_sorted_by(|a, b| a[1] <= b[1]) || table.is_sorted_by(|a, b| a[1] >= b[1]);
     let is_cut_off = !is_ramp && last[1] != 0.0 && last[1] != beside[1];
     Some(Span { ends: [first[0], last[0]], is_cut_off })

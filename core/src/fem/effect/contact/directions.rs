@@ -5,7 +5,10 @@ use super::{
     point::{Unknown, Vectors::Body},
     tangential_point::span_without,
 };
-use crate::{fem::space::Held, linear_algebra::tensor::Vector};
+use crate::{
+    fem::space::{Held, axis},
+    linear_algebra::tensor::Vector,
+};
 use std::collections::BTreeMap;
 
 /// A node of contact boundaries with the directions in which their laws act.
@@ -42,7 +45,6 @@ pub fn contact_nodes<const D: usize>(
             .for_each(|point| nodes.entry(point.node()).or_default().push(None));
     }
     others.for_each(|node| nodes.entry(node as usize).or_default().push(None));
-    let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
     let axes: Vec<Vector<D>> = (0..D).map(axis).collect();
     let frame = |(node, active): (usize, Vec<Option<Vector<D>>>)| match active[..] {
         [Some(direction)] if direction == [0.0; D] => {

@@ -5,7 +5,7 @@ use super::point::{
     Vectors::{self, Body, Newton},
 };
 use crate::{
-    fem::space::Held,
+    fem::space::{Held, axis},
     laws::contact::{FrictionLaw, SlidingContext, Slip, Tresca},
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
 };
@@ -312,7 +312,7 @@ fn part<const D: usize>(vectors: &[Vector<D>], vector: &Vector<D>) -> Vector<D> 
 
 /// Orthonormal directions along a surface with this unit normal.
 pub fn tangents<const D: usize>(normal: &Vector<D>) -> impl Iterator<Item = Vector<D>> {
-    let axes: [Vector<D>; D] = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+    let axes: [Vector<D>; D] = std::array::from_fn(axis);
     let (basis, count) = span_without(&axes, &[*normal]);
     basis.into_iter().take(count)
 }

@@ -747,9 +747,12 @@ fn parts_of_a_surface_face_what_they_ask_other_parts_for_and_little_else() {
         for part in &masters {
             let boxes = boxes_around(part, 8);
             assert!((1..=8).contains(&boxes.len()));
-            let wanted = own.iter().filter(|facet| may_face(facet, &boxes, reach)).cloned();
-            let wanted: Vec<Facet<3>> = wanted.collect();
-            asked.extend(facing(&wanted, part, reach).into_iter().map(|at| part[at].clone()));
+            let [near, none] = &may_face(&own, &[&boxes, &[]], reach)[..] else { panic!("two lists") };
+            assert!(none.is_empty());
+            let wanted: Vec<Facet<3>> = near.iter().map(|at| own[*at].clone()).collect();
+            let [found, none] = &facing(&[wanted, Vec::new()], part, reach)[..] else { panic!("two lists") };
+            assert!(none.is_empty());
+            asked.extend(found.iter().map(|at| part[*at].clone()));
         }
         assert_eq!(contributions(&own, &asked, reach), contributions(&own, &master.facets, reach));
         assert!(3 * asked.len() < 2 * master.facets.len(), "{} of {}", asked.len(), master.facets.len());
