@@ -15,8 +15,10 @@ timed() {
     cargo --config "target.'cfg(all())'.runner = ['env', 'RUSTC_BOOTSTRAP=1']" "$@" -- -Zunstable-options --report-time
 }
 
+# With OMP_NUM_THREADS, which the Makefile sets, nproc would print that number.
+cores=$(env -u OMP_NUM_THREADS nproc)
 # More tests than cores at a time: tests wait for launchers of ranks, too, and runs take turns on the cores (tests/cores.rs).
-export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((2 * $(nproc)))}
+export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((2 * cores))}
 
 failed=()
 {
@@ -39,7 +41,7 @@ slowest
 
 if [[ ${1:-} == --write ]]; then
     page=docs/tests.md
-    machine="$(nproc) cores of $(sed -n '/^model name/{s/.*: //p;q}' /proc/cpuinfo)"
+    machine="$cores cores of $(sed -n '/^model name/{s/.*: //p;q}' /proc/cpuinfo)"
     {
         sed '/^<!-- table slowest -->$/q' $page
         printf '`make test ARGS=--write` on %s, %s:\n\n| test | s |\n|---|---|\n' "$machine" "$(date --utc +%F)"
