@@ -343,6 +343,7 @@ fn what_changes_between_nodes_of_facets_is_warned_of() {
     // Between bodies the law acts on the side whose mesh is finer, or where the job wants it.
     for (side, is_wrong) in [("auto", false), ("on", true)] {
         let said = Case::of("pressed_blocks")
+            .set("support", "[{ on = ['lower.bottom'], fix = 'all' }, { on = ['upper.top'], fix = ['x'] }]")
             .set(
                 "mesh.rectangle",
                 "[{ name = 'lower', size = [1, 0.5], cells = [5, 3] }, \
