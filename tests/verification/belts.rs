@@ -265,7 +265,8 @@ fn braked(session: &Session) {
         assert!(run.totals.energy_imbalance <= 1e-10, "{:e}\n{job}", run.totals.energy_imbalance);
         last = [outcome.energy[CONTACT], outcome.energy[WORK]];
     }
-    let spin = 20.0 * run.state.time;
+    // The mean over the last step.
+    let spin = 20.0 * (run.state.time - 0.025);
     let surface = |place: &[f64; 3]| [-spin * (place[1] - 0.05), spin * (place[0] + 0.3), 0.0];
     let [torque, touching] = hold_against(session, &run, [-0.3, 0.05, 0.0], surface);
     // Friction under the thin pad may lift a corner.
