@@ -466,9 +466,7 @@ impl<const D: usize> Coupling<D> {
         mesh: &Mesh<D>,
         nodes: &[u32],
     ) -> Result<Blocks<D>, Agreed> {
-        let mut others: Vec<u32> = nodes.iter().copied().filter(|node| !mesh.owns(*node)).collect();
-        others.sort_unstable();
-        others.dedup();
+        let others = nodes.iter().copied().filter(|node| !mesh.owns(*node));
         let answer = |node: u32| {
             let of_node = self.blocks.get(&node).into_iter().flatten();
             of_node

@@ -46,8 +46,9 @@ impl<const D: usize> Mesh<D> {
         answer: impl Fn(u32) -> Vec<f64>,
     ) -> Result<BTreeMap<u32, Vec<f64>>, Agreed> {
         // In the order of their owners.
-        let nodes: BTreeSet<u32> = nodes.into_iter().collect();
-        let nodes: Vec<u32> = nodes.into_iter().collect();
+        let mut nodes: Vec<u32> = nodes.into_iter().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
         let mut counts = vec![0; session.ranks()];
         nodes.iter().for_each(|node| counts[self.owner(*node)] += 1);
         let (asked, askers) = exchange(session.world(), &nodes, &counts)?;

@@ -118,8 +118,10 @@ pub(super) fn warning_of_rounding(summary: &Summary, job: &Job) -> Option<String
     })
 }
 
-/// Share of the supplied energy that a time scheme may dissipate without a word, and by which it may err without one where nothing has inertia.
-const WORTH_SAYING: [f64; 2] = [0.05, 0.01];
+/// Share of the supplied energy that a time scheme may dissipate without a word.
+const WORTH_SAYING: f64 = 0.05;
+/// The same by which it may err where nothing has inertia.
+const WORTH_SAYING_AT_REST: f64 = 0.01;
 
 /// Logs status, totals and times of a finished run, and what kept its adaptive steps short.
 pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Option<String>) {
@@ -191,9 +193,9 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
 /// What a time scheme has made of the supplied energy, given the share that it has dissipated, if that is worth saying.
 fn words_of_scheme(lost: f64, job: &Job) -> String {
     let has_mass = job.materials().any(|(_, material)| material.density.is_some());
-    if has_mass && lost >= WORTH_SAYING[0] {
+    if has_mass && lost >= WORTH_SAYING {
         format!(", {:.0} % of the supplied energy dissipated by the time scheme", 100.0 * lost)
-    } else if !has_mass && lost.abs() >= WORTH_SAYING[1] {
+    } else if !has_mass && lost.abs() >= WORTH_SAYING_AT_REST {
         let side = if lost > 0.0 { "exceeds" } else { "falls short of" };
         format!(
             ", {:.0} % of the supplied energy is numerical_dissipation: by this, external_work, which counts forces at one time of each step, {side} \

@@ -93,15 +93,18 @@ pub(super) fn warnings<const D: usize>(session: &Session, job: &Job, mesh: &Mesh
     warnings
 }
 
+/// Whether an expression holds at all nodes of a facet.
+pub(super) fn holds_at_nodes<const D: usize>(mesh: &Mesh<D>, facet: u32, part: &Scalar) -> bool {
+    mesh.facet_nodes(facet).all(|node| part.evaluate(0.0, &mesh.nodes[node as usize]) != 0.0)
+}
+
 /// The area on this rank of the facets of boundaries at all of whose nodes an expression holds, that of the part of them where it holds, and
 /// that of all.
 fn held_and_meant<const D: usize>(mesh: &Mesh<D>, on: &[String], part: &Scalar) -> [f64; 3] {
     let mut sums = [0.0; 3];
     for facet in facets(mesh, on) {
-        let is_held =
-            mesh.facet_nodes(facet).all(|node| part.evaluate(0.0, &mesh.nodes[node as usize]) != 0.0);
-        let holds = share_where(mesh, facet, part);
-        let parts = [f64::from(u8::from(is_held)), holds, 1.0];
+        let is_held = f64::from(u8::from(holds_at_nodes(mesh, facet, part)));
+        let parts = [is_held, share_where(mesh, facet, part), 1.0];
         sums.iter_mut().zip(parts).for_each(|(sum, share)| *sum += share * area_of(mesh, facet));
     }
     sums

@@ -1,6 +1,6 @@
 //! Formulas of the place that change within cells and facets, where they are evaluated at points alone.
 
-use super::parts::{area_of, part_of};
+use super::parts::{area_of, holds_at_nodes, part_of};
 use crate::{
     fem::{
         body::Body,
@@ -196,13 +196,11 @@ fn at_nodes_of_facets<'a, const D: usize>(
     for (number, support) in job.support.iter().enumerate() {
         for (key, values) in [("displacement", &support.displacement), ("velocity", &support.velocity)] {
             let name = format!("support.{number}.{key}");
-            let is_moved = |node: u32| {
-                let part = support.part.as_ref();
-                part.is_none_or(|part| part.evaluate(0.0, &mesh.nodes[node as usize]) != 0.0)
-            };
+            let is_moved =
+                |facet: &u32| support.part.as_ref().is_none_or(|part| holds_at_nodes(mesh, *facet, part));
             if let Some(mut seen) = seen(name, values.iter().flatten().cloned().collect(), &support.on) {
                 let mut moved = facets(mesh, &support.on);
-                moved.retain(|facet| mesh.facet_nodes(*facet).all(is_moved));
+                moved.retain(is_moved);
                 seen.on = On::Facets(moved, &support.on);
                 all.push(seen);
             }
