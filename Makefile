@@ -18,9 +18,6 @@ completions := bash-completion/completions zsh/site-functions fish/vendor_comple
 # One thread a rank: threaded BLAS and OpenMP slow the solvers down when every core has a rank.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
-# On one machine ranks talk through shared memory: Open MPI need not look for cluster networks, which takes longer
-# than many a run. Set OMPI_MCA_pml to something else for runs over a network.
-export OMPI_MCA_pml ?= ob1
 # More ranks than cores is slow, but no reason to refuse.
 export OMPI_MCA_rmaps_base_oversubscribe ?= 1
 

@@ -8,7 +8,7 @@ use crate::{
     },
     job::{self, Job, Loaded},
     laws::{lines::wrapped, nearest::nearest},
-    linear_algebra::petsc::{launched_rank, start_without_daemon},
+    linear_algebra::petsc::{launched_rank, start_fast},
     mesh::file::{self, Placement},
     parallel::{
         agreement::Agreed,
@@ -207,7 +207,7 @@ struct RunArguments {
 
 /// Executes the command line of a program whose source has this id, and returns the exit code.
 pub fn main(source: &str) -> ExitCode {
-    start_without_daemon();
+    start_fast();
     run::state_source(source);
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let result = match Cli::try_parse_from(&arguments) {

@@ -37,6 +37,8 @@ pub fn share(launcher: &mut Command) -> tempfile::TempDir {
     let own = tempfile::tempdir().expect("folder");
     launcher
         .env("OMPI_MCA_orte_tmpdir_base", own.path())
+        // Ranks of one machine need no search for networks; the solver says so itself.
+        .env("OMPI_MCA_pml", "ob1")
         // Waiting ranks yield.
         .env("OMPI_MCA_mpi_yield_when_idle", "1")
         .env("OMP_NUM_THREADS", "1")

@@ -54,6 +54,8 @@ fn start_as(ranks: usize, scenario: &str, folder: &Path, change: impl Fn(&mut Co
     let mut launcher = Command::new(if ranks == 1 { "timeout" } else { "mpirun" });
     if ranks == 1 {
         launcher.args(["--signal=KILL", LIMIT]);
+        // As the solver does: no daemon, and no file in memory shared with others.
+        launcher.env("OMPI_MCA_ess_singleton_isolated", "1").env("OMPI_MCA_sharedfp", "^sm");
     } else {
         launcher.args(["--oversubscribe", "--bind-to", "none", "--timeout", LIMIT, "-n", &ranks.to_string()]);
     }

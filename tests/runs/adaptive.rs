@@ -120,6 +120,29 @@ fn a_step_that_cant_be_solved_at_the_smallest_length_ends_the_run() {
     assert_eq!(case.results().summary()["status"], "failed");
 }
 
+/// A belt with straight quadratic edges, which a turning drum pushes away at the start: the error of this jump makes the steps the shortest,
+/// some of which have no solution that Newton's method finds. Longer ones have.
+#[test]
+fn steps_that_have_no_solution_at_the_smallest_length_are_longer_where_errors_have_shortened_them() {
+    for (ranks, scheme) in [(1, "implicit_euler"), (2, "bdf2")] {
+        let case = Case::of("verification/capstan")
+            .without("check")
+            .set("mesh.file", &format!("'{}/meshes/belt_coarse.msh'", env!("CARGO_MANIFEST_DIR")))
+            .set("mesh.order", "2")
+            .set("support", "[{ on = ['low end'], stiffness = { normal = 1e9, tangential = 1e3 } }]")
+            .set("traction", "[{ on = ['high end'], value = ['-1e5*min(2*t, 1)', 0] }]")
+            .set("time.scheme", &format!("'{scheme}'"))
+            .set("time.adaptive", "{ smallest_step = 1e-6, largest_step = 0.2 }");
+        let results = case.run(ranks);
+        let lengths = lengths(&results);
+        let shortest = lengths.iter().copied().fold(f64::MAX, f64::min);
+        assert!(shortest < 2e-6, "{scheme}: {lengths:?}");
+        let longer = lengths.windows(2).filter(|pair| pair[0] < 2e-6 && pair[1] > 2.1 * pair[0]).count();
+        assert!(longer > 0 || lengths[0] > 2e-6, "{scheme}: {lengths:?}");
+        assert_eq!(results.number("time"), 1.0, "{scheme}");
+    }
+}
+
 #[test]
 fn a_stress_that_relaxes_to_a_small_share_keeps_its_accuracy_at_the_default_tolerance() {
     // A stretched bar that creeps with 1e-3/s (stress / 10 Pa)^4: s' = -E rate (s / 10 Pa)^4.

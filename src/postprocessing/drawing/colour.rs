@@ -40,13 +40,13 @@ impl Shades {
     /// The shade at a share from 0 to 1 of the range.
     pub fn at(&self, share: f64) -> Colour {
         let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
-        let along = (share * LEVELS).round() / LEVELS * 16.0;
-        let below = (along.floor() as usize).min(15);
+        let along = f64::from(nearest(share * LEVELS)) / LEVELS * 16.0;
+        let below = (along as usize).min(15);
         let part = along - below as f64;
         let channel = |anchor: u32, shift: u32| f64::from((anchor >> shift) & 0xff);
         [16, 8, 0].map(|shift| {
             let (low, high) = (channel(self.0[below], shift), channel(self.0[below + 1], shift));
-            (low + part * (high - low)).round() as u8
+            nearest(low + part * (high - low))
         })
     }
 }
@@ -58,12 +58,18 @@ pub fn hex([red, green, blue]: Colour) -> String {
 
 /// A light version of a colour, for backgrounds.
 pub fn lightened(colour: Colour) -> Colour {
-    colour.map(|channel| 0xff - (f64::from(0xff - channel) * 0.17).round() as u8)
+    colour.map(|channel| 0xff - nearest(f64::from(0xff - channel) * 0.17))
 }
 
 /// A darker colour.
 pub(super) fn dimmed(colour: Colour, light: f64) -> Colour {
-    colour.map(|channel| (f64::from(channel) * light).round() as u8)
+    if light == 1.0 { colour } else { colour.map(|channel| nearest(f64::from(channel) * light)) }
+}
+
+/// The integer nearest to a number from 0 to 255. Where the processor's instruction may not be used, `round` is a function that takes longer
+/// than the rest of a sample.
+fn nearest(number: f64) -> u8 {
+    (number + 0.5) as u8
 }
 
 #[cfg(test)]

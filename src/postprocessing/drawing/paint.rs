@@ -108,6 +108,7 @@ impl Canvas {
             (low, high.min(self.size[axis] as f64 - 1.0))
         };
         let (columns, rows) = (bounds(0), bounds(1));
+        let lines = Lines { twice_area, lengths, steepness, opacity };
         let mut is_empty = true;
         let mut y = rows.0;
         while y <= rows.1 {
@@ -116,7 +117,6 @@ impl Canvas {
                 let weights = edges.map(|(from, to)| side(from, to, x, y) / twice_area);
                 if weights.iter().all(|weight| *weight >= 0.0) {
                     is_empty = false;
-                    let lines = Lines { twice_area, lengths, steepness, opacity };
                     self.set([x, y], triangle, style, weights, Some(&lines));
                 }
                 x += 1.0;

@@ -50,7 +50,8 @@ pub struct Adaptive {
     #[serde(default = "adaptive_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
-    /// Shortest step. A step of this length is accepted with any error; if the step cannot be solved, the run fails.
+    /// Shortest step. A step of this length is accepted with any error. If it cannot be solved, steps up to 64 times as long are tried,
+    /// except those that have failed before, and the first that can be solved is accepted with any error; if none can, the run fails.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1e-5)]
     pub smallest_step: f64,
     /// Longest step. The steps are `step` times powers of two, except those shortened to end at a given time.

@@ -46,19 +46,26 @@ const RANKS: [&str; 4] = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLUR
 /// The options of Open MPI for a process that no launcher has started: it needs no daemon, and shares no file in memory with others,
 /// which have its name, too.
 const ALONE: [[&str; 2]; 2] = [["OMPI_MCA_ess_singleton_isolated", "1"], ["OMPI_MCA_sharedfp", "^sm"]];
+/// The option of Open MPI for processes of one machine, which talk through shared memory: to look for cluster networks takes longer than
+/// many a run.
+const ONE_MACHINE: [&str; 2] = ["OMPI_MCA_pml", "ob1"];
+/// The variables with which Open MPI's launcher tells how many processes it has started, on all machines and on this one.
+const PROCESSES: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_SIZE"];
 
 /// The rank of this process before MPI has started, if a launcher provides it.
 pub fn launched_rank() -> Option<u64> {
     RANKS.iter().find_map(|name| std::env::var(name).ok()?.parse().ok())
 }
 
-/// Lets MPI start without a daemon where no launcher has started this process: Open MPI would start one for processes that this one
-/// starts, and wait for it longer than many a run takes. To be called at the start of a program, before it has threads.
-pub fn start_without_daemon() {
-    if launched_rank().is_some() {
-        return;
-    }
-    for [name, value] in ALONE {
+/// Lets MPI start fast, unless the environment says otherwise: without a daemon where no launcher has started this process, since Open
+/// MPI would start one for processes that this one starts, and without a search for networks where all processes are on one machine.
+/// To be called at the start of a program, before it has threads.
+pub fn start_fast() {
+    let is_alone = launched_rank().is_none();
+    let [all, here] = PROCESSES.map(|name| std::env::var(name).ok());
+    let is_one_machine = is_alone || all.is_some() && all == here;
+    let options = ALONE.into_iter().filter(|_| is_alone);
+    for [name, value] in options.chain(is_one_machine.then_some(ONE_MACHINE)) {
         if std::env::var_os(name).is_none() {
             // SAFETY: the program has started no thread, and those that the BLAS starts as it is loaded only wait for work: no other
             // thread reads or writes the environment meanwhile.

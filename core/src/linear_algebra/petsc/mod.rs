@@ -36,7 +36,7 @@ pub use dense::LocalFactor;
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{
     Entered, Petsc, Stage, clear_option, has_option, launched_rank, set_default_option, set_option,
-    start_without_daemon, within,
+    start_fast, within,
 };
 pub use matrix::Matrix;
 pub use own_preconditioner::OwnPreconditioner;

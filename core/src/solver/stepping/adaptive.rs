@@ -44,6 +44,8 @@ const LEAST_SHARE: f64 = 0.05;
 const NEGLIGIBLE_WARMTH: f64 = 1e-6;
 /// Safety factor: share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
+/// How often a step that has no solution at the shortest length is tried with twice the length.
+const LENGTHENED: i32 = 6;
 
 /// The level of the step length and the values that determine its changes; saved in checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -69,6 +71,10 @@ pub struct StepLevel {
     /// The lowest and the highest temperature in K so far, of bodies with heat.
     #[serde(default)]
     pub temperatures: Option<[f64; 2]>,
+    /// Whether the step taken last was one over a jump: the state changes by as much in a step of any length, and the next step follows none,
+    /// either.
+    #[serde(default)]
+    pub jumped: bool,
     /// Number of rejected steps.
     pub rejected: u64,
 }
@@ -85,6 +91,8 @@ pub struct Adaptive<const D: usize> {
     time_dependent_data: Option<TimeDependentData<D>>,
     lowest: i32,
     highest: i32,
+    /// The level whose steps are accepted with any error: the lowest, or a higher one while steps of the lowest have no solution.
+    least: i32,
     /// The current level.
     pub step_level: StepLevel,
     /// What has kept steps from being longer.
@@ -129,6 +137,7 @@ impl<const D: usize> Adaptive<D> {
             time_dependent_data: None,
             lowest,
             highest,
+            least: lowest,
             step_level: StepLevel::default(),
             limits: StepLimits::default(),
         }
@@ -151,7 +160,8 @@ impl<const D: usize> Adaptive<D> {
     }
 
     /// Takes a step that ends at `target` at the latest, and commits it. Steps whose error is too large and steps without a
-    /// solution are rejected and repeated with a shorter length. Collective.
+    /// solution are rejected and repeated with a shorter length. Where errors have made the length the shortest and the step has no
+    /// solution, the next longer one that has is accepted with any error. Collective.
     pub fn advance<const S: usize>(
         &mut self,
         session: &Session,
@@ -167,6 +177,8 @@ impl<const D: usize> Adaptive<D> {
         if self.is_at_rest() {
             self.estimate_reference_norms(session, stepper, body, state, target)?;
         }
+        // The length of the shortest step that has failed and is not of the shortest length; the longest that is, and the first failure.
+        let (mut failed, mut unsolved) = (f64::INFINITY, None);
         loop {
             let (step, landing) = self.choose_step(session, state, target);
             match self.attempt(session, stepper, body, state, step) {
@@ -177,7 +189,9 @@ impl<const D: usize> Adaptive<D> {
                     self.step_level.keep_largest(&found);
                     self.step_level.way += found.way.size;
                     let is_limited = self.adjust_level(step, error);
+                    self.note_jump(step, error);
                     self.limits.count(of_quantities, [is_limited, error > self.settings.tolerance]);
+                    self.least = self.lowest;
                     return Ok(outcome);
                 }
                 Ok((_, error, found)) => {
@@ -188,18 +202,52 @@ impl<const D: usize> Adaptive<D> {
                     self.reject(step, self.level_within_tolerance(step, error));
                 }
                 Err(error) if error.is_failure() && !self.is_shortest(step) => {
+                    failed = step.length;
                     self.reject(step, self.level_of(step) - 1)
                 }
                 Err(error) => {
-                    stepper.contract(body);
-                    return Err(error);
+                    let is_longer = unsolved.as_ref().is_none_or(|(last, _)| step.length > *last);
+                    let may_go_on = error.is_failure() && is_longer && self.lengthen(failed);
+                    let first = match unsolved {
+                        Some((_, first)) if error.is_failure() => first,
+                        _ => error,
+                    };
+                    if !may_go_on {
+                        stepper.contract(body);
+                        return Err(first);
+                    }
+                    unsolved = Some((step.length, first));
                 }
             }
         }
     }
 
+    /// Notes whether a step has passed a jump, as that of the stress of a body without inertia where a load is there
+    /// from the start: a step that follows none, whose error is too large even at the shortest length. The next one may be long again.
+    fn note_jump(&mut self, step: Step, error: f64) {
+        let StepLevel { jumped, .. } = self.step_level;
+        let is_first = step.previous_length == 0.0 && !jumped;
+        let is_jump = is_first && self.level_of(step) <= self.lowest && error > self.settings.tolerance;
+        self.step_level.jumped = is_jump;
+        if is_jump {
+            (self.step_level.level, self.step_level.taken) = (0, 0);
+        }
+    }
+
     fn is_shortest(&self, step: Step) -> bool {
-        self.level_of(step) <= self.lowest
+        self.level_of(step) <= self.least
+    }
+
+    /// Lets steps of twice the length be accepted with any error, and makes the next one of them; returns whether one may be, given the
+    /// length of a step that has failed.
+    fn lengthen(&mut self, failed: f64) -> bool {
+        let next = self.least + 1;
+        let may_be_longer = next <= self.highest.min(self.lowest + LENGTHENED)
+            && self.length(next) < (1.0 - TIME_TOLERANCE) * failed;
+        if may_be_longer {
+            (self.least, self.step_level.level, self.step_level.taken) = (next, next, 0);
+        }
+        may_be_longer
     }
 
     /// Whether a step with this relative error may be committed.
@@ -217,10 +265,11 @@ impl<const D: usize> Adaptive<D> {
     /// linear functions of time by at most the tolerance. Collective.
     fn choose_step(&mut self, session: &Session, state: &State, target: Landing) -> (Step, Landing) {
         loop {
-            let length = self.next_length(target.time - state.time, state.step_length);
+            let last = self.length_before(state);
+            let length = self.next_length(target.time - state.time, last);
             let landing = self.landing(session, state, target, length);
-            let length = self.next_length(landing.time - state.time, state.step_length);
-            let step = next_step(times_before(state, target), length, landing.time);
+            let length = self.next_length(landing.time - state.time, last);
+            let step = next_step(self.times_before(state, target), length, landing.time);
             let deviation =
                 self.time_dependent_data.as_ref().map_or(0.0, |data| data.deviation(session, step));
             if self.is_acceptable(step, deviation) {
@@ -253,7 +302,8 @@ impl<const D: usize> Adaptive<D> {
         step: Step,
     ) -> Result<(StepOutcome, f64, StepError), Agreed> {
         let outcome = session.agree(stepper.attempt(session, body, state, step))?;
-        if !self.is_shortest(step) && session.agree(stepper.generates_failure(session, body, state, step))? {
+        let is_shortest = self.level_of(step) <= self.lowest;
+        if !is_shortest && session.agree(stepper.generates_failure(session, body, state, step))? {
             let time = step.time;
             let words =
                 format!("at t = {time:.6e} s the energy of failing bonds or damage comes from nowhere");
@@ -288,7 +338,7 @@ impl<const D: usize> Adaptive<D> {
         target: Landing,
     ) -> Result<(), Agreed> {
         let landing = self.landing(session, state, target, self.longest());
-        let step = next_step(times_before(state, target), self.longest(), landing.time);
+        let step = next_step(self.times_before(state, target), self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
             Ok((_, error, found)) => {
                 self.step_level.keep_tried(&found);
@@ -300,6 +350,17 @@ impl<const D: usize> Adaptive<D> {
             Err(error) if error.is_failure() => Ok(()),
             Err(error) => Err(error),
         }
+    }
+
+    /// The length of the step before in s, 0 before the first one, after a jump, and for one that is longer because shorter ones have no
+    /// solution.
+    fn length_before(&self, state: &State) -> f64 {
+        if self.least > self.lowest || self.step_level.jumped { 0.0 } else { state.step_length }
+    }
+
+    /// The start of a step to this time and the length of the step before it in s, which may be forgotten.
+    fn times_before(&self, state: &State, target: Landing) -> [f64; 2] {
+        [state.time, if target.starts_anew { 0.0 } else { self.length_before(state) }]
     }
 
     /// The length of the next step, with the time `left` to the target, after a step of the length `last` (0 before the first): at
@@ -396,11 +457,6 @@ impl<const D: usize> Adaptive<D> {
         }
         !may_grow
     }
-}
-
-/// The start of a step to this time and the length of the step before it in s, which may be forgotten.
-fn times_before(state: &State, target: Landing) -> [f64; 2] {
-    [state.time, if target.starts_anew { 0.0 } else { state.step_length }]
 }
 
 #[cfg(test)]
@@ -586,6 +642,33 @@ mod tests {
         let first = Step { previous_length: 0.0, ..step(0.08) };
         assert_eq!(adaptive.level_within_tolerance(first, 0.1), -1, "0.9 * 0.08 / 10 = 0.0072");
         assert_eq!(adaptive.level_within_tolerance(first, 0.01), 2, "always a shorter one");
+    }
+
+    #[test]
+    fn steps_are_lengthened_up_to_those_that_have_failed() {
+        let mut free = adaptive();
+        assert!(free.is_shortest(step(0.00125)) && !free.is_shortest(step(0.0025)));
+        assert_eq!((0..7).filter(|_| free.lengthen(f64::INFINITY)).count(), 6, "from 0.00125 s to 0.08 s");
+        assert_eq!((free.least, free.step_level.level), (3, 3));
+        assert!(free.is_shortest(step(0.08)), "accepted with any error");
+        let mut after_failures = adaptive();
+        assert!(after_failures.lengthen(0.005), "0.0025 s");
+        assert!(!after_failures.lengthen(0.005), "0.005 s has failed");
+    }
+
+    #[test]
+    fn a_step_over_a_jump_is_followed_by_a_long_one() {
+        let mut adaptive = adaptive();
+        let mut jumps = |previous_length: f64, length: f64, error: f64| {
+            adaptive.step_level.level = -3;
+            adaptive.note_jump(Step { previous_length, ..step(length) }, error);
+            (adaptive.step_level.jumped, adaptive.step_level.level)
+        };
+        assert_eq!(jumps(0.0, 0.00125, 0.5), (true, 0));
+        assert_eq!(jumps(0.0, 0.00125, 0.5), (false, -3), "a second one would not be one over a jump alone");
+        assert_eq!(jumps(0.0, 0.00125, 1e-3), (false, -3), "a small error");
+        assert_eq!(jumps(0.0, 0.0025, 0.5), (false, -3), "a longer step");
+        assert_eq!(jumps(0.00125, 0.00125, 0.5), (false, -3), "a step that follows another");
     }
 
     #[test]

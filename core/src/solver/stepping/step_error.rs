@@ -122,15 +122,22 @@ impl ErrorWorkspace {
             forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
         };
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
+        let is_massless = form != Some(Form::Mass);
         let strains = blend.length * blend.length * square(elastic, strained);
         let drifts = (order == 1).then_some(form).flatten().filter(|form| *form == Form::Mass);
         let of_way = square(drifts, strained);
-        let stresses = [strains + histories.error, histories.size];
+        // Without inertia velocities jump with the forces: where a step follows none, that at its start may be the one of a jump.
+        let increment = if is_massless && step.previous_length == 0.0 {
+            write(strained, trial.iter().map(|v| 0.5 * v));
+            blend.length * blend.length * square(elastic, strained)
+        } else {
+            strains
+        };
         let [velocity, all_velocity] = [square(form, curved), square(form, &trial)];
         let [error, size] = [surface.error, surface.size];
         // Norms of displacements whose sign differs from node to node. Velocities follow from displacements, and have their rounding
         // errors over the step, also at rest far from where the body was at the start.
-        let [of_velocity, of_stress] = if form == Some(Form::Mass) {
+        let [of_velocity, of_stress] = if !is_massless {
             [0.0; 2]
         } else {
             let sizes = end.iter().zip(trial.iter()).map(|(u, v)| u.abs() + (blend.length * v).abs());
@@ -139,27 +146,31 @@ impl ErrorWorkspace {
         };
         let mut squares = session.sum([
             velocity,
-            stresses[0],
+            histories.error,
             all_velocity,
-            stresses[1],
+            histories.size,
             error,
             size,
             of_velocity,
             of_stress,
             of_way,
+            strains,
+            increment,
         ]);
+        let [.., strains, increment] = squares;
+        squares[1] += if increment < strains { increment } else { strains };
         // Obstacles that forces move, alike on all ranks.
         for motion in body.obstacle_motions() {
-            let unit = if form == Some(Form::Mass) { 1.0 } else { step.length };
+            let unit = if is_massless { step.length } else { 1.0 };
             let [error, size] = motion.velocity_error(curvature);
             squares[0] += error / unit;
             squares[2] += size / unit;
         }
-        let [velocity, stress, all_velocity, all_stress, error, size, of_velocity, of_stress, of_way] =
+        let [velocity, stress, all_velocity, all_stress, error, size, of_velocity, of_stress, of_way, ..] =
             squares.map(|square| if square > 0.0 { square.sqrt() } else { square });
         // With mass both norms are roots of energies: a free body has a stress of rounding errors, a fixed one a velocity of
         // rounding errors. Without mass the square of a velocity norm is a power.
-        let unit = if form == Some(Form::Mass) { 1.0 } else { step.length.sqrt() };
+        let unit = if is_massless { step.length.sqrt() } else { 1.0 };
         Ok(StepError {
             error: Norms { velocity, stress },
             size: Norms { velocity: all_velocity, stress: all_stress },
