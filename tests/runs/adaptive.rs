@@ -120,6 +120,35 @@ fn a_step_that_cant_be_solved_at_the_smallest_length_ends_the_run() {
     assert_eq!(case.results().summary()["status"], "failed");
 }
 
+/// A bar of E = 1 GPa creeps with 1e-6/s under a stress of 1 MPa that is there from the start: 1e-3 + 1e-6 t.
+#[test]
+fn creep_under_a_constant_load_takes_one_short_step_and_goes_on_from_there_after_a_restart() {
+    let job = "
+        mesh.rectangle = { size = [1.0, 0.2], cells = [10, 2] }
+        material.hypothesis = 'plane_stress'
+        material.elasticity = { youngs_modulus = 1e9, poisson_ratio = 0.3 }
+        material.viscoplasticity.norton = { rate = 1e-6, reference_stress = 1e6, exponent = 4 }
+        support = [{ on = ['left'], fix = ['x'] }, { on = ['bottom'], fix = ['y'] }]
+        traction = [{ on = ['right'], value = [1e6, 0] }]
+        time = { end = 1000, step = 10, adaptive = { smallest_step = 1e-6, largest_step = 100 } }
+        checkpoint = { every = 1, keep = 100 }
+        output.probe = [{ name = 'end', point = [1, 0] }]";
+    for (ranks, scheme) in [(1, "implicit_euler"), (2, "bdf2")] {
+        let case = Case::written_as(job).set("time.scheme", &format!("'{scheme}'"));
+        let straight = case.run(ranks);
+        let lengths = lengths(&straight);
+        assert!(lengths[0] < 2e-6 && lengths[1] > 0.1 && lengths.len() < 35, "{scheme}: {lengths:?}");
+        let probes = straight.table("probes.csv");
+        let end = *probes.numbers("displacement_x").last().expect("a step");
+        assert!((end - 2e-3).abs() < 2e-6, "{scheme}: {end}");
+        let before = ["probes.csv", "history.csv"].map(|name| straight.text(name));
+        let file = straight.path("checkpoint-1.h5").display().to_string();
+        case.run_with(ranks, &["--restart", &file]).expect(0).says("(step 1");
+        let results = case.results();
+        assert_eq!(before, ["probes.csv", "history.csv"].map(|name| results.text(name)), "{scheme}");
+    }
+}
+
 /// A belt with straight quadratic edges, which a turning drum pushes away at the start: the error of this jump makes the steps the shortest,
 /// some of which have no solution that Newton's method finds. Longer ones have.
 #[test]

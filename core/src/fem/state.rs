@@ -117,6 +117,12 @@ impl State {
         Ok(())
     }
 
+    /// Lets the velocity before the last step be that after it, where the one before was that of a jump. Collective.
+    pub fn forget_change_of_velocity(&mut self) -> Result<()> {
+        self.previous_velocity.copy_from(&self.velocity)?;
+        self.previous_velocity.update_ghosts()
+    }
+
     /// Extrapolates velocity and displacement, committed where the equations of a step hold, to its end. The velocity of local nodes
     /// without mass remains.
     pub fn extrapolate<const D: usize>(

@@ -28,7 +28,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{CONTACT_QUANTITIES, Step},
+        effect::{CONTACT_QUANTITIES, Form, Step},
         state::State,
     },
     job,
@@ -189,7 +189,10 @@ impl<const D: usize> Adaptive<D> {
                     self.step_level.keep_largest(&found);
                     self.step_level.way += found.way.size;
                     let is_limited = self.adjust_level(step, error);
-                    self.note_jump(step, error);
+                    if self.step_level.jumped {
+                        session.agree(state.forget_change_of_velocity())?;
+                    }
+                    self.step_level.jumped = !body.has_form(Form::Mass) && self.jumps(step, error);
                     self.limits.count(of_quantities, [is_limited, error > self.settings.tolerance]);
                     self.least = self.lowest;
                     return Ok(outcome);
@@ -222,16 +225,15 @@ impl<const D: usize> Adaptive<D> {
         }
     }
 
-    /// Notes whether a step has passed a jump, as that of the stress of a body without inertia where a load is there
-    /// from the start: a step that follows none, whose error is too large even at the shortest length. The next one may be long again.
-    fn note_jump(&mut self, step: Step, error: f64) {
-        let StepLevel { jumped, .. } = self.step_level;
-        let is_first = step.previous_length == 0.0 && !jumped;
+    /// Whether a step of a body without inertia has passed a jump, as that of the stress where a load is there from the start: a step that
+    /// follows none, whose error is too large even at the shortest length. The next one may then be long again.
+    fn jumps(&mut self, step: Step, error: f64) -> bool {
+        let is_first = step.previous_length == 0.0 && !self.step_level.jumped;
         let is_jump = is_first && self.level_of(step) <= self.lowest && error > self.settings.tolerance;
-        self.step_level.jumped = is_jump;
         if is_jump {
             (self.step_level.level, self.step_level.taken) = (0, 0);
         }
+        is_jump
     }
 
     fn is_shortest(&self, step: Step) -> bool {
@@ -661,8 +663,9 @@ mod tests {
         let mut adaptive = adaptive();
         let mut jumps = |previous_length: f64, length: f64, error: f64| {
             adaptive.step_level.level = -3;
-            adaptive.note_jump(Step { previous_length, ..step(length) }, error);
-            (adaptive.step_level.jumped, adaptive.step_level.level)
+            let is_jump = adaptive.jumps(Step { previous_length, ..step(length) }, error);
+            adaptive.step_level.jumped = is_jump;
+            (is_jump, adaptive.step_level.level)
         };
         assert_eq!(jumps(0.0, 0.00125, 0.5), (true, 0));
         assert_eq!(jumps(0.0, 0.00125, 0.5), (false, -3), "a second one would not be one over a jump alone");
