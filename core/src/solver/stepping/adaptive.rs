@@ -192,7 +192,8 @@ impl<const D: usize> Adaptive<D> {
                     if self.step_level.jumped {
                         session.agree(state.forget_change_of_velocity())?;
                     }
-                    self.step_level.jumped = !body.has_form(Form::Mass) && self.jumps(step, error);
+                    let resists = [Form::Mass, Form::Viscosity].into_iter().any(|form| body.has_form(form));
+                    self.step_level.jumped = !resists && self.jumps(step, error);
                     self.limits.count(of_quantities, [is_limited, error > self.settings.tolerance]);
                     self.least = self.lowest;
                     return Ok(outcome);
@@ -225,8 +226,8 @@ impl<const D: usize> Adaptive<D> {
         }
     }
 
-    /// Whether a step of a body without inertia has passed a jump, as that of the stress where a load is there from the start: a step that
-    /// follows none, whose error is too large even at the shortest length. The next one may then be long again.
+    /// Whether a step of a body without inertia and viscosity has passed a jump, as that of the stress where a load is there from the start: a
+    /// step that follows none, whose error is too large even at the shortest length. The next one may then be long again.
     fn jumps(&mut self, step: Step, error: f64) -> bool {
         let is_first = step.previous_length == 0.0 && !self.step_level.jumped;
         let is_jump = is_first && self.level_of(step) <= self.lowest && error > self.settings.tolerance;

@@ -126,8 +126,8 @@ impl ErrorWorkspace {
         let strains = blend.length * blend.length * square(elastic, strained);
         let drifts = (order == 1).then_some(form).flatten().filter(|form| *form == Form::Mass);
         let of_way = square(drifts, strained);
-        // Without inertia velocities jump with the forces: where a step follows none, that at its start may be the one of a jump.
-        let increment = if is_massless && step.previous_length == 0.0 {
+        // Where nothing resists velocities, they jump with the forces: where a step follows none, that at its start may be the one of a jump.
+        let increment = if form.is_none() && step.previous_length == 0.0 {
             write(strained, trial.iter().map(|v| 0.5 * v));
             blend.length * blend.length * square(elastic, strained)
         } else {
