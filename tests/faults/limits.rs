@@ -50,7 +50,8 @@ fn with_end(case: &Case, end: &str, knows: usize) -> Outcome {
 fn a_run_saves_its_state_before_its_slurm_job_ends_whichever_rank_knows() {
     for knows in [0, 2] {
         let case = endless();
-        let end = now() + 5;
+        // Long enough for the start of three ranks beside other tests.
+        let end = now() + 10;
         let outcome = with_end(&case, &end.to_string(), knows).expect(3);
         outcome
             .says("the Slurm job ends in")

@@ -149,6 +149,23 @@ fn creep_under_a_constant_load_takes_one_short_step_and_goes_on_from_there_after
     }
 }
 
+/// The first step has a velocity a hundred thousand times that of the second, of which no rounding errors may remain.
+#[test]
+fn a_load_that_is_there_from_the_start_takes_two_steps_and_gives_the_numbers_of_one() {
+    for (ranks, name) in [(1, "nearly_incompressible_bar"), (2, "two_bars")] {
+        let case = |name| Case::of(name).without("check").set("time.step", "1.0").set("time.end", "1.0");
+        let fixed = case(name).run(ranks);
+        let adaptive =
+            case(name).set("time.adaptive", "{ smallest_step = 1e-5, largest_step = 1.0 }").run(ranks);
+        assert_eq!([&fixed, &adaptive].map(|run| run.number("steps")), [1.0, 2.0], "{name}");
+        let [one, two] = [&fixed, &adaptive].map(|run| {
+            let energies = run.table("history.csv").numbers("elastic_energy");
+            *energies.last().expect("a step")
+        });
+        assert!((two - one).abs() < 1e-12 * one, "{name}: {two} for {one}");
+    }
+}
+
 /// A belt with straight quadratic edges, which a turning drum pushes away at the start: the error of this jump makes the steps the shortest,
 /// some of which have no solution that Newton's method finds. Longer ones have.
 #[test]

@@ -589,6 +589,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         on_the_surface || self.elastic_support.has(form) || self.terms().any(|term| term.form() == Some(form))
     }
 
+    /// Whether inertia or viscosity resists velocities; where neither does, they jump with the forces.
+    pub fn resists_velocities(&self) -> bool {
+        self.has_form(Form::Mass) || self.has_form(Form::Viscosity)
+    }
+
     /// Whether an effect has this form in every cell of the body.
     pub fn has_form_everywhere(&self, form: Form) -> bool {
         (form != Form::Mass || self.redistributed_mass.is_none())

@@ -28,7 +28,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{CONTACT_QUANTITIES, Form, Step},
+        effect::{CONTACT_QUANTITIES, Step},
         state::State,
     },
     job,
@@ -192,8 +192,7 @@ impl<const D: usize> Adaptive<D> {
                     if self.step_level.jumped {
                         session.agree(state.forget_change_of_velocity())?;
                     }
-                    let resists = [Form::Mass, Form::Viscosity].into_iter().any(|form| body.has_form(form));
-                    self.step_level.jumped = !resists && self.jumps(step, error);
+                    self.step_level.jumped = !body.resists_velocities() && self.jumps(step, error);
                     self.limits.count(of_quantities, [is_limited, error > self.settings.tolerance]);
                     self.least = self.lowest;
                     return Ok(outcome);

@@ -36,6 +36,9 @@ use std::time::Instant;
 /// Residuals of the start of a step beyond this multiple of its forces are those of supports that have moved ahead of the body.
 const FAR: f64 = 1e3;
 
+/// A step that is longer than the last one by more than this factor does not start from its velocity where nothing resists velocities.
+const MUCH_LONGER: f64 = 10.0;
+
 /// Share of what damage and bonds dissipate up to which a step may generate the energy for it.
 const LARGEST_SHARE_GENERATED: f64 = 0.2;
 /// Share of the energy turned over below which what they dissipate does not matter.
@@ -717,7 +720,7 @@ impl Stepper {
         state: &State,
         step: Step,
     ) -> Result<()> {
-        self.extrapolate(state, step)?;
+        self.extrapolate(body, state, step)?;
         if let Some(supports) = &self.moving_supports {
             supports.set(body, &mut self.trial)?;
             supports.show_contacts(body)?;
@@ -753,8 +756,18 @@ impl Stepper {
         self.traffic.history += self.passes.explicit + (1 + load + start) * vector_bytes(body);
     }
 
-    fn extrapolate(&mut self, state: &State, step: Step) -> Result<()> {
+    fn extrapolate<const D: usize, const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
         self.trial.copy_from(&state.velocity)?;
+        // The velocity of a jump in a short step is larger than that of a long one by as much, and so are its rounding errors.
+        let is_much_longer = state.step_length > 0.0 && step.length > MUCH_LONGER * state.step_length;
+        if step.previous_length == 0.0 && is_much_longer && !body.resists_velocities() {
+            self.trial.scale(0.0)?;
+        }
         if extrapolates(state, step) {
             let ratio = step.length / step.previous_length;
             self.trial.add_scaled(ratio, &state.velocity)?;
