@@ -196,11 +196,11 @@ fn words_of_scheme(lost: f64, job: &Job) -> String {
     if has_mass && lost >= WORTH_SAYING {
         format!(", {:.0} % of the supplied energy dissipated by the time scheme", 100.0 * lost)
     } else if !has_mass && lost.abs() >= WORTH_SAYING_AT_REST {
-        let side = if lost > 0.0 { "exceeds" } else { "falls short of" };
+        let side = if lost > 0.0 { "large" } else { "small" };
         format!(
-            ", {:.0} % of the supplied energy is numerical_dissipation: by this, external_work, which counts forces at one time of each step, {side} \
-             the other energies",
-            100.0 * lost
+            ", external_work, which counts forces at one time of each step, is too {side} by {:.0} % of the supplied energy (numerical_dissipation): \
+             stresses and motions are not affected",
+            100.0 * lost.abs()
         )
     } else {
         String::new()
