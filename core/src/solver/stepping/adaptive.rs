@@ -274,7 +274,8 @@ impl<const D: usize> Adaptive<D> {
             let step = next_step(self.times_before(state, target), length, landing.time);
             let deviation =
                 self.time_dependent_data.as_ref().map_or(0.0, |data| data.deviation(session, step));
-            if self.is_acceptable(step, deviation) {
+            // A longer step in place of the shortest may not miss a load, either.
+            if self.level_of(step) <= self.lowest || deviation <= self.settings.tolerance {
                 return (step, landing);
             }
             let share = (self.settings.tolerance / deviation).sqrt();
