@@ -14,7 +14,7 @@ use crate::{
         agreement::Agreed,
         session::{Mpi, Session},
     },
-    postprocessing::{check::differences, outputs, remesh, report, study},
+    postprocessing::{check, outputs, remesh, report, study},
     run::{self, Clock, Start},
 };
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -191,7 +191,7 @@ struct RunArguments {
     /// results are complete are skipped.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
     restart: Option<Option<PathBuf>>,
-    /// Print errors only; run.log has the rest.
+    /// Print only errors and numbers that differ from `[check]`; run.log has the rest.
     #[arg(short, long, conflicts_with = "verbose")]
     quiet: bool,
     /// Print and log every step, also of long runs.
@@ -528,26 +528,27 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
         let stages = session.agree(stages)?;
         let jobs: Vec<Job> = stages.iter().map(|stage| stage.job.clone()).collect();
         let exit = run::run_stages(session, stages, &from, clock)?;
-        if exit == Exit::Done && session.is_first() && !arguments.quiet {
-            jobs.iter().for_each(compare);
+        if exit == Exit::Done && session.is_first() {
+            jobs.iter().for_each(|job| compare(job, arguments.quiet));
         }
         Ok(exit)
     })
 }
 
-/// Says whether the run of a job has left the numbers that it expects.
-fn compare(job: &Job) {
-    if job.check.is_empty() {
-        return;
-    }
-    let differences = differences(job, job.output_folder());
-    let all = job.check.len();
-    let mut words = format!("check      {} of {all} numbers are as expected\n", all - differences.len());
-    for difference in differences {
+/// Says in the log, and on the terminal unless it is quiet and all are, whether the run of a job has left the numbers that it expects.
+fn compare(job: &Job, is_quiet: bool) {
+    let Some(found) = check::compare(job, job.output_folder()) else { return };
+    let mut words = format!("check      {}\n", found.outcome);
+    for difference in &found.differences {
         words += &wrapped(&format!("check      {difference}"), WORDS);
         words.push('\n');
     }
-    print(&words);
+    let log = std::fs::OpenOptions::new().append(true).open(job.output_folder().join("run.log"));
+    // A log that has vanished since the run is no fault of the run.
+    let _ = log.and_then(|mut log| log.write_all(words.as_bytes()));
+    if !is_quiet || !found.differences.is_empty() {
+        print(&words);
+    }
 }
 
 /// Refuses stages that would overwrite each other's results, or whose options of PETSc would apply to later ones.

@@ -32,6 +32,7 @@ impl NumberFile {
     pub fn field(&self, name: &str, step: usize) -> Vec<f64> {
         let at_nodes = [
             "displacement",
+            "displacement_origin",
             "velocity",
             "contact_traction",
             "bonding",

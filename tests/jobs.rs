@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::{checked::run, documents::recipes};
-use clarke::{job::Job, postprocessing::check::differences};
+use clarke::{job::Job, postprocessing::check::compare};
 
 /// All jobs of the repository, without studies, and all cases.
 pub fn jobs() -> Vec<PathBuf> {
@@ -41,7 +41,8 @@ fn faults(files: &[PathBuf], ranks: usize) -> Vec<String> {
             faults.push(format!("{name}: {words}"));
             continue;
         }
-        faults.extend(differences(&job, output.path()).into_iter().map(|words| format!("{name}: {words}")));
+        let found = compare(&job, output.path()).expect("a table [check]");
+        faults.extend(found.differences.into_iter().map(|words| format!("{name}: {words}")));
     }
     faults
 }

@@ -7,12 +7,23 @@ use crate::{
 };
 use std::path::Path;
 
-/// What differs from the `[check]` table of a job in the output folder of its run by more than the job accepts, a sentence for each number.
-pub fn differences(job: &Job, folder: &Path) -> Vec<String> {
+/// The numbers of a run beside those that its job expects.
+pub struct Comparison {
+    /// How many are as expected, in words.
+    pub outcome: String,
+    /// What differs by more than the job accepts, a sentence for each number.
+    pub differences: Vec<String>,
+}
+
+/// Compares the output folder of a run with the `[check]` table of its job; `None` if it has none.
+pub fn compare(job: &Job, folder: &Path) -> Option<Comparison> {
     let of = |(name, expected): (&String, &Expected)| {
         difference(quantity(folder, name), expected).map(|words| format!("{name}: {words}"))
     };
-    job.check.iter().filter_map(of).collect()
+    let differences: Vec<String> = job.check.iter().filter_map(of).collect();
+    let all = job.check.len();
+    let outcome = format!("{} of {all} numbers are as expected", all - differences.len());
+    (all > 0).then_some(Comparison { outcome, differences })
 }
 
 /// How a number differs from the expected one by more than is accepted; numbers that are not finite do.
@@ -22,10 +33,9 @@ fn difference(found: Option<f64>, expected: &Expected) -> Option<String> {
     let relative = expected.relative.is_none_or(|bound| off <= bound * expected.value.abs());
     let absolute = expected.absolute.is_none_or(|bound| off <= bound);
     (!(relative && absolute)).then(|| {
-        let accepted: Vec<String> = [(expected.relative, " of it"), (expected.absolute, "")]
-            .into_iter()
-            .filter_map(|(bound, of)| Some(format!("{:e}{of}", bound?)))
-            .collect();
+        let relative = expected.relative.map(|bound| format!("{} %", Digits(100.0 * bound)));
+        let absolute = expected.absolute.map(|bound| Digits(bound).to_string());
+        let accepted: Vec<String> = relative.into_iter().chain(absolute).collect();
         format!(
             "{} instead of {}, off by {}, accepted are {}",
             Digits(found),
@@ -54,7 +64,7 @@ mod tests {
         }
         assert_eq!(
             difference(Some(-197.0), &expected(Some(0.01), None)).as_deref(),
-            Some("-197 instead of -200, off by 3, accepted are 1e-2 of it")
+            Some("-197 instead of -200, off by 3, accepted are 1 %")
         );
         assert!(difference(Some(-198.5), &expected(Some(0.01), Some(1.0))).is_some(), "both have to hold");
     }

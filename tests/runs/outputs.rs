@@ -518,13 +518,17 @@ fn a_run_says_which_of_its_results_are_not_as_expected() {
     for ranks in [1, 2] {
         let wrong = case("2.5").run_with(ranks, &[]).expect(0);
         let wrong = wrong.says("check      0 of 1 numbers are as expected");
-        assert!(
-            wrong.says("instead of 2.5, off by 2.5, accepted are 1e-3").stdout.matches("off by").count() == 1
-        );
+        let words = "instead of 2.5, off by 2.5, accepted are 0.001";
+        assert!(wrong.says(words).stdout.matches("off by").count() == 1);
         case("0.0").run_with(ranks, &[]).expect(0).says("check      1 of 1 numbers are as expected");
     }
-    let quiet = case("2.5").run_with(1, &["--quiet"]).expect(0);
-    assert!(!quiet.stdout.contains("check"), "{}", quiet.stdout);
+    let quiet = |value: &str| case(value).run_with(1, &["--quiet"]).expect(0).stdout;
+    assert!(quiet("0.0").is_empty() && quiet("2.5").starts_with("check      0 of 1"));
+    let wrong = case("2.5").run_and_keep(1);
+    let results = wrong.results();
+    assert!(results.text("run.log").ends_with("accepted are 0.001\n"), "{}", results.text("run.log"));
+    let page = std::fs::read_to_string(report(&results.path(""))).expect("a page");
+    assert!(page.contains("0 of 1 numbers are as expected") && page.contains("<li>max_energy_imbalance: "));
 }
 
 #[test]

@@ -785,6 +785,12 @@ fn a_stage_that_resets_the_displacement_is_the_straight_run_from_there_on() {
             }
         };
         compare(&second, "stage");
+        let fields = [&straight, &second].map(|case| NumberFile::open(&case.results().path("fields.vtkhdf")));
+        let [whole, counted] =
+            fields.each_ref().map(|file| file.field("displacement", file.times().len() - 1));
+        let origin = fields[1].field("displacement_origin", 0);
+        let off = |at: usize| (whole[at] - counted[at] - origin[at]).abs();
+        assert!(whole.len() == origin.len() && (0..whole.len()).all(|at| off(at) < 1e-12), "{ranks:?}");
         // At its first step the second stage has hardly moved.
         let moved = second.results().table("probes.csv").numbers("displacement_x")[0];
         assert!(moved.abs() < 0.02 * 0.06, "{moved}");

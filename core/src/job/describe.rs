@@ -46,6 +46,18 @@ pub struct Named {
     pub also: &'static str,
 }
 
+impl Named {
+    /// Whether this word is one of its other words.
+    fn is_called(&self, word: &str) -> bool {
+        self.also.split(", ").any(|also| plain(also) == plain(word))
+    }
+}
+
+/// A name or word in the spelling in which they are compared.
+fn plain(text: &str) -> String {
+    text.to_lowercase().replace(['-', '_'], " ")
+}
+
 /// As [`describe`], of any kind of document; words are also searched among `others`.
 pub fn describe_kind(kind: Kind, table: Option<&str>, others: &[Named]) -> Result<String> {
     let all = tables(kind);
@@ -163,7 +175,6 @@ const SHORT: usize = 5;
 /// The tables, keys and other names that are a word or, if it has three letters, contain it or have it among their other words or in their
 /// meanings, those with the name first; `None` if there are none.
 fn occurrences(kind: Kind, word: &str, others: &[Named]) -> Option<String> {
-    let plain = |text: &str| text.to_lowercase().replace(['-', '_'], " ");
     let wanted = plain(word);
     // A few letters occur within many words.
     let mentions = |text: &str| match wanted.len() < SHORT {
@@ -175,8 +186,9 @@ fn occurrences(kind: Kind, word: &str, others: &[Named]) -> Option<String> {
     for one in own.iter().chain(others) {
         let rank = match plain(&one.name) {
             name if name == wanted => 0,
+            _ if one.is_called(word) => 1,
             _ if wanted.len() < 3 => continue,
-            name if mentions(&name) || one.also.split(", ").any(|also| plain(also) == wanted) => 1,
+            name if mentions(&name) => 1,
             _ if mentions(&plain(&one.meaning)) => 2,
             _ => continue,
         };
@@ -198,8 +210,31 @@ fn unknown_table(kind: Kind, wanted: &str, all: &[DescribedTable]) -> Error {
     ))
 }
 
+/// The most names to which a word of other programs leads.
+const MOST_NAMES: usize = 3;
+
+/// What a word means that is no key in its place: where a key or table of this name belongs, or what is called so by other programs.
+pub(super) fn meaning_of_key(kind: Kind, word: &str) -> Option<String> {
+    let place = place_of(kind, word).map(|place| format!("`{word}` is {place}"));
+    place.or_else(|| meaning_of_value(kind, word))
+}
+
+/// What other programs call by a word that is no value in its place.
+pub(super) fn meaning_of_value(kind: Kind, word: &str) -> Option<String> {
+    let all = named(kind);
+    let called = all.iter().filter(|one| one.is_called(word)).take(MOST_NAMES);
+    let names: Vec<String> = called.map(|one| format!("`{}`", one.shown)).collect();
+    (!names.is_empty()).then(|| format!("for `{word}` see {}", names.join(", ")))
+}
+
+/// The command that describes the table at a path of a document.
+pub(super) fn command(kind: Kind, path: &str) -> String {
+    let names: Vec<&str> = path.split('.').filter(|part| part.parse::<usize>().is_err()).collect();
+    format!("solver describe {}{}", kind.prefix.replace('.', " "), names.join("."))
+}
+
 /// What a key or a table of this name is where it belongs, as text.
-pub(super) fn place_of(kind: Kind, name: &str) -> Option<String> {
+fn place_of(kind: Kind, name: &str) -> Option<String> {
     let all = tables(kind);
     let is_inner = |inner: &DescribedTable, outer: &DescribedTable| {
         inner.path.rsplit_once('.') == Some((outer.path.as_str(), name))

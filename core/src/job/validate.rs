@@ -237,8 +237,8 @@ impl Walk<'_> {
         if let Some(near) = near {
             fault = fault.help(format!("did you mean `{near}`?"));
         }
-        if let Some(place) = describe::place_of(self.kind, key) {
-            fault = fault.help(format!("`{key}` is {place}"));
+        if let Some(meaning) = describe::meaning_of_key(self.kind, key) {
+            fault = fault.help(meaning);
         }
         self.checked.faults.push(fault.help(format!("allowed: {}", list(known))));
         near
@@ -444,6 +444,9 @@ impl Walk<'_> {
         if let Some(near) = nearest(word, words.iter().copied()) {
             fault = fault.help(format!("did you mean \"{near}\"?"));
         }
+        if let Some(meaning) = describe::meaning_of_value(self.kind, word) {
+            fault = fault.help(meaning);
+        }
         let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
         self.checked.faults.push(fault.help(format!("allowed: {}", quoted.join(", "))));
     }
@@ -460,7 +463,10 @@ impl Walk<'_> {
                     header(&join(path, "0"))
                 ));
             }
-            Value::Array(_) if schema.accepts("object") => {
+            Value::Array(items)
+                if schema.accepts("object")
+                    && items.iter().all(|item| matches!(item.value, Value::Table(_))) =>
+            {
                 fault = fault.help(format!("only one is possible: write {} with one bracket", header(path)));
             }
             Value::Text(text)
@@ -472,6 +478,15 @@ impl Walk<'_> {
                 let instead = if self.parameters.is_available() { " except of [parameters]" } else { "" };
                 let help = format!("write numbers without quotes; this key accepts no expression{instead}");
                 fault = fault.help(help);
+            }
+            value if schema.accepts("object") => {
+                if let Value::Text(word) = value
+                    && let Some(meaning) = describe::meaning_of_value(self.kind, word)
+                {
+                    fault = fault.help(meaning);
+                }
+                let command = describe::command(self.kind, path);
+                fault = fault.help(format!("`{command}` shows an example"));
             }
             Value::Float(number) if schema.accepts("integer") && number.fract() == 0.0 => {
                 fault = fault.help(format!("write {number:.0}, without a decimal point"));

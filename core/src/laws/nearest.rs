@@ -3,12 +3,12 @@
 /// The name in `known` that is closest to `name`, if it is close enough.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let lower = name.to_lowercase().replace(['-', ' '], "_");
-    let shortest = lower.chars().count();
+    let letters = lower.chars().count();
     known
         .into_iter()
         .map(|candidate| (distance(&lower, candidate), candidate))
-        .filter(|&(distance, candidate)| distance <= shortest.max(candidate.len()).div_ceil(3))
-        .filter(|&(distance, candidate)| distance < candidate.len())
+        .filter(|&(distance, candidate)| distance <= letters.max(candidate.len()).div_ceil(3))
+        .filter(|&(distance, candidate)| distance < letters.min(candidate.len()))
         .min()
         .map(|(_, candidate)| candidate)
 }
@@ -39,6 +39,7 @@ mod tests {
     fn names_unlike_any_other_find_nothing() {
         assert_eq!(nearest("temperature", ["density", "x"]), None);
         assert_eq!(nearest("a", ["x", "y"]), None);
+        assert_eq!(nearest("f", ["if", "t"]), None);
         assert_eq!(nearest("", ["x"]), None);
     }
 }

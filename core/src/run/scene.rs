@@ -219,6 +219,7 @@ fn from_file(
     if order == 2 {
         notes.iter_mut().for_each(|note| note.truncate(note.trim_end_matches(file::LINEAR_CELLS).len()));
     }
+    notes.retain(|note| !(job.is_revolved() && note.ends_with(file::REVOLVED)));
     Ok((scene, is_second_order == 1, [notes, faults]))
 }
 

@@ -352,7 +352,9 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     }
 
     fn report(&mut self, outcome: &StepOutcome, last: u64) {
-        let Simulation { state, totals, .. } = &self.simulation;
+        let Simulation { state, totals, adaptive, .. } = &mut self.simulation;
+        let stuck = adaptive.as_mut().and_then(|adaptive| adaptive.limits.warning(last - state.step));
+        stuck.into_iter().for_each(|words| self.log.warning(words));
         let (step, time, imbalance) = (state.step, state.time, totals.energy_imbalance);
         if self.log.has_bar() {
             self.log.progress(step, &format!("t = {} s", Short(time)));

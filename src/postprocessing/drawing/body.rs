@@ -788,7 +788,7 @@ mod tests {
         values[399] = 1e6;
         snapshot.fields.insert("von_mises", values);
         let picture = picture(&DrawnBody::new(&snapshot), &VON_MISES);
-        let words = "from 0 to 1 × 10⁶ Pa in the cells, drawn as means at the nodes; colours from 0.010025 to 0.98997 Pa, the 1st to \
+        let words = "(0 to 1) × 10⁶ Pa in the cells, drawn as means at the nodes; colours from 0.010025 to 0.98997 Pa, the 1st to \
                      the 99th percentile.";
         assert!(picture.caption.contains(words), "{}", picture.caption);
     }

@@ -18,10 +18,15 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// A linear scale for these values; its ends are round numbers if `round`, otherwise the extreme values.
+    /// A linear scale for these values; its ends are round numbers if `round`, otherwise the extreme values, further apart if numbers show these
+    /// as the same.
     pub(super) fn linear(values: impl Iterator<Item = f64>, round: bool) -> Self {
         let (mut low, mut high) = extent(values).unwrap_or((0.0, 1.0));
-        if high - low <= 1e-12 * low.abs().max(high.abs()) {
+        let largest = low.abs().max(high.abs());
+        let is_one = |shown: f64| {
+            if round { high - low <= 1e-12 * largest } else { number(low * shown) == number(high * shown) }
+        };
+        if is_one(10f64.powi(-thousands(largest))) {
             let room = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
             (low, high) = (low - room, high + room);
         }
@@ -61,6 +66,7 @@ impl Scale {
     pub(super) fn range(&self, ends: [f64; 2], unit: &str) -> String {
         let [low, high] = ends.map(|end| end * self.factor);
         let words = match &self.power {
+            None if number(low) == number(high) => format!("{} {unit}", number(low)),
             None => format!("from {} to {} {unit}", number(low), number(high)),
             Some(power) => {
                 let largest = low.abs().max(high.abs()).max(1e-300);
@@ -73,7 +79,11 @@ impl Scale {
                     let digits = format!("{end:.decimals$}");
                     with_minus_sign(without_trailing_zeros(&digits).to_owned())
                 });
-                format!("from {low} to {high} × {power} {unit}")
+                if low == high {
+                    format!("{low} × {power} {unit}")
+                } else {
+                    format!("({low} to {high}) × {power} {unit}")
+                }
             }
         };
         words.trim_end().to_owned()
@@ -179,9 +189,11 @@ mod tests {
         let range = |low: f64, high: f64, unit: &str| {
             Scale::linear([low, high].into_iter(), false).range([low, high], unit)
         };
-        assert_eq!(range(4554.7, 5.5678e7, "Pa"), "from 0.005 to 55.68 × 10⁶ Pa");
+        assert_eq!(range(4554.7, 5.5678e7, "Pa"), "(0.005 to 55.68) × 10⁶ Pa");
         assert_eq!(range(-0.25, 0.5, "m"), "from −0.25 to 0.5 m");
-        assert_eq!(range(-3e-6, 1.25e-6, ""), "from −3 to 1.25 × 10⁻⁶");
+        assert_eq!(range(-3e-6, 1.25e-6, ""), "(−3 to 1.25) × 10⁻⁶");
+        assert_eq!(range(2.0732e-3, 2.07321e-3, "m/s"), "2.073 × 10⁻³ m/s");
+        assert_eq!([range(293.0, 293.001, "K"), range(0.0, 0.0, "Pa")], ["293 K", "0 Pa"]);
     }
 
     fn words(scale: &Scale) -> Vec<&str> {

@@ -124,7 +124,7 @@ impl RunFiles {
         let mut rounding: BTreeMap<String, f64> =
             largest.iter().map(|(name, most)| (name.clone(), ROUNDING * most)).collect();
         let most = |name: &str| largest.get(name).copied().unwrap_or(0.0);
-        let nodes: &[[f64; 3]] = self.snapshot.as_ref().map_or(&[], |snapshot| &snapshot.nodes);
+        let nodes: &[[f64; 3]] = self.snapshot.as_ref().map_or(&[], Snapshot::mesh_nodes);
         let extent =
             |i: usize| extent(nodes.iter().map(|node| node[i])).map_or(0.0, |(low, high)| high - low);
         let size = (0..3).map(extent).fold(0.0, f64::max);
@@ -183,10 +183,11 @@ impl RunFiles {
     }
 }
 
-/// Clears rounding errors, up to which size they are, and adds the contact pressure where the file has tractions alone: their part along the
+/// Clears rounding errors, up to which size they are, places the body where displacements count from, and adds the contact pressure where the file has tractions alone: their part along the
 /// normal, and all of the traction of a node that touches alone. Those of bonds and of contact memory are not pressures.
 fn complete(snapshot: &mut Snapshot, rounding: &BTreeMap<String, f64>, job: Option<&Job>) {
     snapshot.clear_below(rounding);
+    snapshot.start_from_origin();
     let Some(tractions) = snapshot.vectors(&CONTACT_TRACTION) else { return };
     let is_pressed = |contact: &Contact| contact.adhesion.is_none() && contact.memory.is_none();
     let is_known = job.is_some_and(|job| job.contact.iter().all(is_pressed));

@@ -166,7 +166,7 @@ impl<'a> Boundary<'a> {
     fn nodes_of(&self, snapshot: &Snapshot) -> Option<Vec<usize>> {
         let bits = |p: &[f64; 3]| p.map(f64::to_bits);
         let nodes: HashMap<[u64; 3], usize> =
-            snapshot.nodes.iter().enumerate().map(|(n, p)| (bits(p), n)).collect();
+            snapshot.mesh_nodes().iter().enumerate().map(|(n, p)| (bits(p), n)).collect();
         self.points.iter().map(|p| nodes.get(&bits(p)).copied()).collect()
     }
 
@@ -312,7 +312,7 @@ impl<'a> Boundary<'a> {
         let bits = |p: &[f64; 3]| p.map(f64::to_bits);
         let places: HashMap<[u64; 3], u32> = (0..).zip(&self.points).map(|(n, p)| (bits(p), n)).collect();
         let place = |p| places.get(&bits(p)).copied().filter(|n| values[*n as usize].is_finite());
-        let here: Vec<Option<u32>> = snapshot.nodes.iter().map(place).collect();
+        let here: Vec<Option<u32>> = snapshot.mesh_nodes().iter().map(place).collect();
         let mut cells = Vec::new();
         for face in super::view::faces(snapshot) {
             if let [Some(a), Some(b), Some(c)] = face.nodes.map(|node| here[node as usize]) {

@@ -10,11 +10,12 @@ use super::{
 };
 use crate::{
     io::output::summary::{MEMBERS, Member},
-    job::Accept,
+    job::{Accept, Job},
+    postprocessing::check,
     solver::certificate::Certificates,
 };
 use serde_json::Value;
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
 /// A table of the contents of `summary.json`.
 pub(super) fn summary(summary: &Value) -> String {
@@ -79,12 +80,26 @@ pub(super) fn reason(summary: &Value) -> String {
 /// The warnings of the run, if there are any.
 pub(super) fn warnings(summary: &Value) -> String {
     let warnings = summary.get("warnings").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-    let items: String =
-        warnings.iter().map(|warning| format!("<li>{}</li>\n", escape(&plain(warning)))).collect();
+    listed("Warnings", &warnings.iter().map(plain).collect::<Vec<_>>())
+}
+
+/// Whether the numbers of a completed run are those that its job expects, if it expects some.
+pub(super) fn expected(summary: &Value, job: &Job, folder: &Path) -> String {
+    let is_complete = summary.get("status").and_then(Value::as_str) == Some("completed");
+    let found = is_complete.then(|| check::compare(job, folder)).flatten();
+    found.map_or_else(String::new, |found| {
+        paragraph(&format!("{} ([check]).", found.outcome))
+            + &listed("Numbers that differ from [check]", &found.differences)
+    })
+}
+
+/// Lines under a heading; nothing where there are none.
+fn listed(heading: &str, lines: &[String]) -> String {
+    let items: String = lines.iter().map(|line| format!("<li>{}</li>\n", escape(line))).collect();
     if items.is_empty() {
         return items;
     }
-    format!("<div class=\"missing\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</div>\n")
+    format!("<div class=\"missing\">\n<h2>{heading}</h2>\n<ul>\n{items}</ul>\n</div>\n")
 }
 
 /// What the certificates say of the run in a few words, and the certificates with their meaning.

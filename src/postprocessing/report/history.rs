@@ -6,6 +6,7 @@ use super::{
     page::Pictures,
     picture::Picture,
     scale::{extent, number},
+    support_motion::SupportMotion,
     table::Table,
 };
 use crate::{
@@ -71,10 +72,14 @@ struct ChartColumns<'a> {
     over: &'a str,
 }
 
-/// The components of the force of each source; of each contact the moment, the area by state, the pressure, and the motion of its obstacle
-/// with the force and the moment over it.
+/// The components of the force of each source, over the displacement of those of the supports that move as a whole; of each contact the moment,
+/// the area by state, the pressure, and the motion of its obstacle with the force and the moment over it.
 /// Components are those of the first of these dimensions, units those of the second.
-pub(super) fn resultants(table: &Table, [dimension, of_units]: [usize; 2]) -> Result<Pictures> {
+pub(super) fn resultants(
+    table: &Table,
+    supports: &[SupportMotion<'_>],
+    [dimension, of_units]: [usize; 2],
+) -> Result<Pictures> {
     let axes = ["x", "y", "z"];
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
     let forces: Vec<&str> = forces.iter().map(String::as_str).collect();
@@ -97,6 +102,21 @@ pub(super) fn resultants(table: &Table, [dimension, of_units]: [usize; 2]) -> Re
         let drawn =
             ChartColumns { name: &name, what, source: what, quantity, unit, columns: &felt, over: "time" };
         draw(&rows, &drawn, &mut out)?;
+        for motion in supports.iter().filter(|motion| motion.source == *source) {
+            let moved = rows.with_column(motion.column, motion.at(&rows.column("time").unwrap_or_default()));
+            let name = format!("force_over_{}_{number}", motion.column);
+            let what = format!("{source}, force");
+            let drawn = ChartColumns {
+                name: &name,
+                what: &what,
+                source,
+                quantity,
+                unit,
+                columns: &felt,
+                over: motion.column,
+            };
+            draw(&moved, &drawn, &mut out)?;
+        }
         if source.starts_with("contact") {
             let [displacement, rotation] = ["obstacle_displacement", "obstacle_rotation"];
             for (name, quantity, columns, over) in [
@@ -197,7 +217,8 @@ fn draw(table: &Table, columns: &ChartColumns<'_>, out: &mut Pictures) -> Result
         (Axis::time(), "time".into())
     } else {
         let words = over.replace('_', " ");
-        (Axis::new(words.clone(), RESULTANTS.unit(over, 3)), words)
+        let unit = if over.starts_with("support") { "m" } else { RESULTANTS.unit(over, 3) };
+        (Axis::new(words.clone(), unit), words)
     };
     let chart = Chart::new(x, Axis::new(quantity, unit), series);
     let alt = format!("Chart of {what} over {over}; at the end {ends}");
@@ -298,7 +319,7 @@ mod tests {
         let path = folder.path().join("resultants.csv");
         std::fs::write(&path, text).expect("written");
         let table = Table::read(&path, "source").expect("table").without_rounding();
-        let Pictures { pictures, constant } = resultants(&table, [2, 2]).expect("drawn");
+        let Pictures { pictures, constant } = resultants(&table, &[], [2, 2]).expect("drawn");
         let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
         assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0", "force_over_displacement_0"]);
         assert!(pictures[3].caption.contains("force over obstacle displacement"), "{}", pictures[3].caption);

@@ -12,6 +12,7 @@ mod motion;
 mod page;
 mod run;
 mod study;
+mod support_motion;
 mod table;
 mod viewer;
 

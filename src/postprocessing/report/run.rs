@@ -10,6 +10,7 @@ use super::{
     motion,
     page::{Page, Pictures},
     picture::Picture,
+    support_motion::support_motions,
     view::{facets, mean_direction, unit},
     viewer,
 };
@@ -134,6 +135,8 @@ fn head(found: &RunFiles) -> String {
         head += &facts::unstable(summary);
         head += &facts::reason(summary);
         head += &facts::warnings(summary);
+        head +=
+            &found.job.as_ref().map_or_else(String::new, |job| facts::expected(summary, job, &found.folder));
     }
     if !found.gaps.is_empty() {
         head.push_str("<div class=\"missing\">\n<h2>Missing</h2>\n<ul>\n");
@@ -312,7 +315,9 @@ fn time_sections(sections: &mut Sections, found: &RunFiles) -> Result<()> {
         } else {
             "Forces on the body. In every step they add up to the rate of change of momentum."
         };
-        add("Resultants", paragraph(words), history::resultants(resultants, [dimension, of_units])?);
+        let supports = found.job.as_ref().map_or(Vec::new(), |job| support_motions(job, dimension));
+        let drawn = history::resultants(resultants, &supports, [dimension, of_units])?;
+        add("Resultants", paragraph(words), drawn);
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {

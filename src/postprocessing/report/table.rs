@@ -160,6 +160,14 @@ impl Table {
         self.filtered(|at| values.get(at) == Some(&number))
     }
 
+    /// The same with another column of numbers, one for each row.
+    pub(super) fn with_column(&self, name: &str, values: Vec<f64>) -> Self {
+        let mut table = self.clone();
+        table.header.push(name.to_owned());
+        table.rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
+        table
+    }
+
     fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
         self.select_rows(&(0..self.rows.len()).filter(|at| keep(*at)).collect::<Vec<_>>())
     }

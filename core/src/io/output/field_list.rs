@@ -92,6 +92,19 @@ fields! {
             Some(traction) => traction,
             None => return Ok(None),
         };
+    /// Displacement that the start state of a stage had, from which that of the stage counts.
+    DISPLACEMENT_ORIGIN = OutputField::plain(
+            "displacement_origin",
+            Place::Node,
+            Shape::Vector,
+            "m",
+            "displacement at the start of the stage, from which `displacement` counts: the body is at its mesh plus both",
+        )
+        .written("after `[initial] reset` of the displacement"),
+        |at| match &at.state.displacement_origin {
+            Some(origin) => Computed::of(origin.owned()?),
+            None => return Ok(None),
+        };
     /// See [`FurtherField`](crate::job::FurtherField), as all fields below.
     REGION = further::REGION, |at| further::region(at);
     /// Strain.

@@ -2,7 +2,7 @@
 
 use super::{
     field::{Place, Shape, place_word, shape_word},
-    field_list::FIELDS,
+    field_list::{DISPLACEMENT_ORIGIN, FIELDS},
     output_field::OutputField,
     parallel_file::LONGEST_TEXT,
 };
@@ -16,8 +16,10 @@ pub struct Snapshot {
     pub time: f64,
     /// Times in the file, in s.
     pub times: Vec<f64>,
-    /// Coordinates of the nodes in m.
+    /// Coordinates in m of the nodes of the mesh, or after [`Self::start_from_origin`] of the body at the start of the stage.
     pub nodes: Vec<[f64; 3]>,
+    /// Coordinates of the nodes of the mesh in m, where `nodes` are others.
+    pub of_mesh: Option<Vec<[f64; 3]>>,
     /// Nodes of all cells, one cell after the other.
     pub cells: Vec<u32>,
     /// Nodes of a cell: 3 for triangles, 4 for tetrahedra. Quadratic cells are divided into 4 triangles or 8 tetrahedra.
@@ -90,6 +92,19 @@ impl Snapshot {
             let least = least.get(name).copied().unwrap_or(0.0);
             values.iter_mut().filter(|value| value.abs() <= least).for_each(|value| *value = 0.0);
         }
+    }
+
+    /// Moves the nodes to where they were at the start of a stage that counts displacements from there.
+    pub fn start_from_origin(&mut self) {
+        let Some(origin) = self.vectors(&DISPLACEMENT_ORIGIN) else { return };
+        let moved =
+            self.nodes.iter().zip(origin).map(|(x, u)| std::array::from_fn(|i| x[i] + u[i])).collect();
+        self.of_mesh = Some(std::mem::replace(&mut self.nodes, moved));
+    }
+
+    /// Coordinates of the nodes of the mesh in m.
+    pub fn mesh_nodes(&self) -> &[[f64; 3]] {
+        self.of_mesh.as_ref().unwrap_or(&self.nodes)
     }
 
     /// 2 or 3.
@@ -256,6 +271,22 @@ mod tests {
         assert_eq!(snapshot.fields["displacement"], [0.0, -3e-9, 1.0]);
         let wear = &snapshot.histories[0].values;
         assert!(wear[..2] == [3e-9, -2e-9] && wear[2].is_nan(), "{wear:?}");
+    }
+
+    #[test]
+    fn nodes_of_a_stage_start_where_its_displacements_count_from() {
+        let mut snapshot = Snapshot { nodes: vec![[1.0, 2.0, 3.0]], ..Snapshot::default() };
+        snapshot.start_from_origin();
+        assert_eq!(
+            (&snapshot.nodes, snapshot.mesh_nodes()),
+            (&vec![[1.0, 2.0, 3.0]], &[[1.0, 2.0, 3.0]][..])
+        );
+        snapshot.fields.insert(DISPLACEMENT_ORIGIN.name, vec![0.5, 0.0, -1.0]);
+        snapshot.start_from_origin();
+        assert_eq!(
+            (&snapshot.nodes, snapshot.mesh_nodes()),
+            (&vec![[1.5, 2.0, 2.0]], &[[1.0, 2.0, 3.0]][..])
+        );
     }
 
     #[test]

@@ -2,10 +2,11 @@
 
 use super::{
     columns::{PROBES, RunTable, TABLES},
-    resultants::source_names,
     summary::{MEMBERS, MemberKind},
 };
 use crate::{job::Job, laws::nearest::nearest};
+
+pub use super::resultants::source_names;
 
 /// What is formed of the values of a run.
 const OVER_TIME: [&str; 6] = ["max", "min", "mean", "amplitude", "period", "arrival"];
@@ -68,13 +69,31 @@ impl RunOf<'_> {
     /// a column of its table that the job has.
     pub fn faults_of_name(&self, name: &str) -> Vec<[String; 2]> {
         let Some(quantity) = TableQuantity::parse(name) else {
-            return self.fault_of_number(name).into_iter().collect();
+            let with_columns = |[message, help]: [String; 2]| [message, self.columns_called(name) + &help];
+            return self.fault_of_number(name).map(with_columns).into_iter().collect();
         };
         if !quantity.has_form() {
             return vec![no_quantity(name)];
         }
         let of = quantity.of.and_then(|of| self.fault_of_place(quantity.table.word, of));
         of.into_iter().chain(self.fault_of_column(quantity.table, quantity.column, name)).collect()
+    }
+
+    /// How to name the columns of tables that are called like the last part of this name, as advice.
+    fn columns_called(&self, name: &str) -> String {
+        let column = name.rsplit('.').next().unwrap_or(name);
+        let has = |table: &&&RunTable| table.columns(self.dimension).any(|(known, _)| known == column);
+        let forms: Vec<String> = TABLES
+            .iter()
+            .filter(has)
+            .map(|table| match table.word {
+                "profile" => format!("`profile.BOUNDARY.max.{column}`"),
+                "resultant" => format!("`resultant.SOURCE.{column}`"),
+                word if table.keys.is_empty() => format!("`{word}.{column}`"),
+                word => format!("`{word}.NAME.{column}`"),
+            })
+            .collect();
+        if forms.is_empty() { String::new() } else { format!("`{column}` is {}; ", forms.join(" or ")) }
     }
 
     /// What is wrong with a column of a table in the name of a quantity.
@@ -251,6 +270,9 @@ on = 'bottom'
     fn names_that_no_run_has_are_refused_with_the_nearest_ones() {
         for (name, message, help) in [
             ("max_vonmises", "there is no quantity `max_vonmises`", "did you mean `max_von_mises`?"),
+            ("kinetic_energy", "there is no quantity", "`kinetic_energy` is `history.kinetic_energy`; "),
+            ("energy.external_work", "there is no quantity", "`external_work` is `history.external_work`; "),
+            ("velocity_x", "there is no quantity", "`velocity_x` is `probe.NAME.velocity_x`; "),
             ("certificates.thta", "there is no quantity `certificates.thta`", "did you mean `theta`?"),
             ("certificate.theta", "there is no quantity", "did you mean `certificates`?"),
             ("probes.middle.velocity_y", "there is no quantity", "did you mean `probe`?"),

@@ -135,7 +135,7 @@ pub(super) fn groups(job: &Job) -> [bool; 5] {
 }
 
 /// The names of all sources that a run of the job may have.
-pub(crate) fn source_names(job: &Job) -> Vec<String> {
+pub fn source_names(job: &Job) -> Vec<String> {
     let supports = (0..job.support.len()).map(Source::Support);
     let contacts = (0..job.contact.len()).map(Source::Contact);
     // A boundary without obstacle may be a fault inside the body.

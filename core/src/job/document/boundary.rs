@@ -13,9 +13,10 @@ use crate::laws::material::Hypothesis;
 /// `fix`, or one or more of `stiffness`, `damping` and `absorbing`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("also" = "boundary, boundary condition, constraint, clamp, Dirichlet"))]
 pub struct Support {
     /// The names of the boundaries; with `fix` also of points and, in 3D, curves that have a name in the mesh file.
-    #[schemars(length(min = 1), example = ["left"])]
+    #[schemars(length(min = 1), extend("also" = "boundary, surface, sideset"), example = ["left"])]
     pub on: Vec<String>,
     /// The part of these boundaries to which the support applies: with `fix` the nodes at which this expression in x, y, z is not
     /// 0, for example the nodes of an edge, or a single node; otherwise the facets at whose centre it is not 0. A product of
@@ -131,7 +132,7 @@ pub struct Traction {
     /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
     /// x, y, z, integrated by their values at points within the facets.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(extend("also" = "load, distributed load, surface load, ramp, blast, explosion", "unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
+    #[schemars(extend("also" = "load, distributed load, surface load, Neumann, ramp, blast, explosion", "unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
     pub value: Vec<Scalar>,
     /// A pressure on the undeformed boundary, against its outward normal, in place of `value`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

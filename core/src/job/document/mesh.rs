@@ -125,7 +125,7 @@ pub struct Rectangle {
     #[schemars(transform = positive_items, extend("unit" = "m"), example = [1.0, 1.0])]
     pub size: [f64; 2],
     /// Number of small rectangles along x and y. Each is divided into 2 triangles, or 4 with diagonal = "crossed".
-    #[schemars(inner(range(min = 1)), example = [32, 32])]
+    #[schemars(inner(range(min = 1)), extend("also" = "elements, divisions"), example = [32, 32])]
     pub cells: [u32; 2],
     /// The diagonals that divide the small rectangles into triangles.
     #[serde(default)]
@@ -213,7 +213,7 @@ pub struct Cuboid {
     #[schemars(transform = positive_items, extend("unit" = "m"), example = [1.0, 1.0, 1.0])]
     pub size: [f64; 3],
     /// Number of small boxes along x, y and z. Each is divided into 6 Kuhn tetrahedra.
-    #[schemars(inner(range(min = 1)), example = [8, 8, 8])]
+    #[schemars(inner(range(min = 1)), extend("also" = "elements, divisions"), example = [8, 8, 8])]
     pub cells: [u32; 3],
     /// Grading: smaller cells near chosen sides. Along an axis of length L with n cells and the exponent p > 1, grid plane i has
     /// the distance L (i/n)^p from the chosen side or, if both sides are chosen, L/2 (2i/n)^p from the nearer one. The lengths of

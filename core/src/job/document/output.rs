@@ -19,6 +19,7 @@ pub struct Output {
     /// When the fields (displacement, velocity, stress and others) are written to fields.vtkhdf. Absent: only at the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(
+        extend("also" = "vtk, vtu, ParaView"),
         example = serde_json::json!({ "every": 8 }),
         example = serde_json::json!({ "interval": 0.1 }),
         example = serde_json::json!({ "at": [0.0, 0.25] })

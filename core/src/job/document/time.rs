@@ -12,11 +12,11 @@ use crate::{job::findings::Table, laws::schemes::Scheme};
 #[serde(deny_unknown_fields)]
 pub struct Time {
     /// The time at which the run ends. Every run starts at time 0.
-    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1.0)]
+    #[schemars(extend("also" = "duration, end time, total time, final time", "unit" = "s", "exclusiveMinimum" = 0), example = 1.0)]
     pub end: f64,
     /// Length of a step. With [time.adaptive]: the longest first step; the first step is shorter if a trial step shows that its error
     /// would be too large.
-    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.015625)]
+    #[schemars(extend("also" = "dt, time step, increment, time increment", "unit" = "s", "exclusiveMinimum" = 0), example = 0.015625)]
     pub step: f64,
     /// The time scheme.
     #[serde(default)]

@@ -46,10 +46,10 @@ impl Hypothesis {
 pub struct Elasticity<N = f64> {
     /// Young's modulus. An expression in x, y, z is evaluated at the centre of each cell: `if(y > 0.9, 2e11, 7e10)` is a coat that sticks to
     /// its body, where facets of cells lie in y = 0.9.
-    #[schemars(extend("variables" = "x, y, z", "unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
+    #[schemars(extend("also" = "E, young, elastic modulus", "variables" = "x, y, z", "unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
     pub youngs_modulus: N,
     /// Poisson's ratio.
-    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]
+    #[schemars(extend("also" = "nu, poisson", "exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]
     pub poisson_ratio: f64,
     /// A formula of the strain by which the shear modulus is multiplied; the bulk modulus stays. Without viscoplasticity, damage, damping by
     /// the stiffness, initial stress and thermal strain. Absent: elasticity is linear.

@@ -53,7 +53,7 @@ pub struct Material<N = Scalar> {
     /// Mass density. An expression in x, y, z is evaluated at the centre of each cell. Absent: no inertia, the problem is
     /// quasistatic.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("variables" = "x, y, z", "unit" = "kg/m^d", "exclusiveMinimum" = 0), example = 1.0)]
+    #[schemars(extend("also" = "rho, inertia, dynamic, static, quasistatic", "variables" = "x, y, z", "unit" = "kg/m^d", "exclusiveMinimum" = 0), example = 1.0)]
     pub density: Option<N>,
     /// Isotropic elasticity. Absent: no elastic stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]

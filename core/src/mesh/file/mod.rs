@@ -13,6 +13,7 @@ mod vtu;
 
 use super::{FoundFault, GlobalMesh};
 use crate::error::{Error, Result, regular_file};
+pub use abaqus::REVOLVED;
 use document::Document;
 pub use inspect::inspect;
 pub use placement::{Placement, Rotation};

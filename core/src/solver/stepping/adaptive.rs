@@ -181,6 +181,13 @@ impl<const D: usize> Adaptive<D> {
         let (mut failed, mut unsolved) = (f64::INFINITY, None);
         loop {
             let (step, landing) = self.choose_step(session, state, target);
+            // A longer step in place of the shortest may not miss a load, either.
+            let is_none =
+                |last: f64| step.length <= last || self.deviation(session, step) > self.settings.tolerance;
+            if let Some((_, first)) = unsolved.take_if(|(last, _)| is_none(*last)) {
+                stepper.contract(body);
+                return Err(first);
+            }
             match self.attempt(session, stepper, body, state, step) {
                 Ok((mut outcome, error, found)) if self.is_acceptable(step, error) => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
@@ -209,8 +216,7 @@ impl<const D: usize> Adaptive<D> {
                     self.reject(step, self.level_of(step) - 1)
                 }
                 Err(error) => {
-                    let is_longer = unsolved.as_ref().is_none_or(|(last, _)| step.length > *last);
-                    let may_go_on = error.is_failure() && is_longer && self.lengthen(failed);
+                    let may_go_on = error.is_failure() && self.lengthen(failed);
                     let first = match unsolved {
                         Some((_, first)) if error.is_failure() => first,
                         _ => error,
@@ -272,15 +278,18 @@ impl<const D: usize> Adaptive<D> {
             let landing = self.landing(session, state, target, length);
             let length = self.next_length(landing.time - state.time, last);
             let step = next_step(self.times_before(state, target), length, landing.time);
-            let deviation =
-                self.time_dependent_data.as_ref().map_or(0.0, |data| data.deviation(session, step));
-            // A longer step in place of the shortest may not miss a load, either.
+            let deviation = self.deviation(session, step);
             if self.level_of(step) <= self.lowest || deviation <= self.settings.tolerance {
                 return (step, landing);
             }
             let share = (self.settings.tolerance / deviation).sqrt();
             self.shorten(step, self.level_of_share(step, share));
         }
+    }
+
+    /// The largest deviation of loads and obstacles within a step from linear functions of time. Collective.
+    fn deviation(&self, session: &Session, step: Step) -> f64 {
+        self.time_dependent_data.as_ref().map_or(0.0, |data| data.deviation(session, step))
     }
 
     /// The target, or the end of a smooth piece of a load or an obstacle within two steps of this length, if that is earlier.

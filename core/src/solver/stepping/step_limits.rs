@@ -22,6 +22,11 @@ const NAMES: [&str; QUANTITIES] = [
 /// Share of the steps below which what limits them is not named.
 const LEAST_SHARE: f64 = 0.01;
 
+/// Steps of the shortest length in a row, with larger errors than the tolerance, after which steps are not expected to grow.
+const SHORTEST_IN_A_ROW: u64 = 1000;
+/// Steps that are left in a run for which this matters.
+const MANY: u64 = 10_000;
+
 /// Counts of steps since the run was started or continued. No step depends on them.
 #[derive(Debug, Default)]
 pub struct StepLimits {
@@ -30,6 +35,10 @@ pub struct StepLimits {
     limited: [u64; QUANTITIES],
     /// Steps of the shortest length whose error exceeds the tolerance.
     beyond: u64,
+    /// Those in a row up to the last step.
+    in_a_row: u64,
+    /// Whether it was said that steps stay the shortest.
+    is_said: bool,
 }
 
 impl StepLimits {
@@ -37,10 +46,25 @@ impl StepLimits {
     pub(super) fn count(&mut self, errors: [f64; QUANTITIES], [is_limited, is_beyond]: [bool; 2]) {
         self.steps += 1;
         self.beyond += u64::from(is_beyond);
+        self.in_a_row = if is_beyond { self.in_a_row + 1 } else { 0 };
         if is_limited && let Some(largest) = (0..QUANTITIES).max_by(|a, b| errors[*a].total_cmp(&errors[*b]))
         {
             self.limited[largest] += 1;
         }
+    }
+
+    /// That steps stay the shortest, in words, the first time that they do in a run with this number of steps left.
+    pub fn warning(&mut self, left: u64) -> Option<String> {
+        let is_stuck = !self.is_said && self.in_a_row >= SHORTEST_IN_A_ROW && left > MANY;
+        self.is_said |= is_stuck;
+        is_stuck.then(|| {
+            let what = self.words().map_or(String::new(), |words| format!(" ({words})"));
+            format!(
+                "{SHORTEST_IN_A_ROW} adaptive steps in a row have the shortest length and larger errors than the tolerance{what}; {left} such steps are \
+                 left. Where these are vibrations that nothing damps, [material.viscosity] of a hundred-thousandth of a second times the stiffness \
+                 or [material.damping] damps them, or a larger `smallest_step` passes over them"
+            )
+        })
     }
 
     /// What limits steps, in words; `None` if errors limit none.
@@ -86,5 +110,17 @@ mod tests {
         assert_eq!(limits.words().as_deref(), Some(words));
         (0..10_000).for_each(|_| limits.count(errors(9), [false, false]));
         assert_eq!(limits.words(), None, "less than one in a hundred steps");
+    }
+
+    #[test]
+    fn steps_that_stay_the_shortest_are_said_once_where_many_are_left() {
+        let mut limits = StepLimits::default();
+        let mut take = |count: u64, is_beyond: bool, left: u64| {
+            (0..count).for_each(|_| limits.count([1.0; QUANTITIES], [true, is_beyond]));
+            limits.warning(left).is_some()
+        };
+        assert!(!take(999, true, 20_000) && !take(1, false, 20_000) && !take(999, true, 20_000));
+        assert!(!take(1, true, 10_000), "the rest is short");
+        assert!(take(1, true, 20_000) && !take(1, true, 20_000));
     }
 }

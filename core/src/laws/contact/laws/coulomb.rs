@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Coulomb friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("also" = "brake, belt, stick-slip, stick, slip"))]
+#[schemars(extend("also" = "mu, friction coefficient, brake, belt, stick-slip, stick, slip"))]
 pub struct Coulomb {
     /// Friction coefficient: the largest friction traction divided by the contact pressure.
     #[schemars(range(min = 0), example = 0.3)]

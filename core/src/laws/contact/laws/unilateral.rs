@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// Unilateral constraint: normal displacement <= gap, or normal velocity <= 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("also" = "impact, collision, bounce, shock, wall, hard contact, Signorini"))]
+#[schemars(extend("also" = "impact, collision, bounce, shock, wall, hard, hard contact, Signorini"))]
 pub struct Unilateral {
     /// The quantity that the obstacle bounds.
     #[serde(default)]

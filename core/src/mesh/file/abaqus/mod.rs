@@ -13,6 +13,8 @@ mod regions;
 mod sets;
 mod surface;
 
+pub use model::REVOLVED;
+
 use super::document::Document;
 use crate::error::Result;
 use model::Model;

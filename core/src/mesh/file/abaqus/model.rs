@@ -37,6 +37,10 @@ const SILENT: [&str; 9] = [
     "END STEP",
 ];
 
+/// The note about a body of revolution, for runs that do not know that it is one.
+pub const REVOLVED: &str =
+    "a body of revolution (CAX): state [material] hypothesis = \"axisymmetric\" in the job";
+
 /// Most keywords that a note names.
 const NAMED: usize = 6;
 
@@ -338,10 +342,7 @@ impl Model {
         };
         let mut notes = Vec::new();
         if self.is_revolved {
-            notes.push(
-                "a body of revolution (CAX): state [material] hypothesis = \"axisymmetric\" in the job"
-                    .into(),
-            );
+            notes.push(REVOLVED.into());
         }
         if self.has_membranes {
             notes.push("membranes (M3D) in a plane are the cells: the file has no others".into());
