@@ -618,7 +618,7 @@ fn a_check_prints_the_gaps_of_contacts() {
         // From 0.25 m at the left, there along the normal of the plane, to 2 m times the slope of 0.1 more at the right.
         launch::run(ranks, &["check", job.to_str().expect("a path")])
             .expect(0)
-            .says("gap        top: 2.4876e-1 m to 4.5000e-1 m");
+            .says("gap        top: 0.248759 m to 0.45 m");
     }
     let case = under(&disc("0.8", 0.12));
     let outcome = launch::run(2, &["check", "--json", case.written().to_str().expect("a path")]).expect(0);

@@ -247,7 +247,9 @@ impl Report {
 
     /// Lines that the log of a run does not have.
     fn lines(&self) -> Vec<String> {
-        let of_axis = |(axis, [low, high]): (&str, &[f64; 2])| format!("{axis} from {low} to {high} m");
+        let of_axis = |(axis, [low, high]): (&str, &[f64; 2])| {
+            format!("{axis} from {} to {} m", Digits(*low), Digits(*high))
+        };
         let extent: Vec<String> = ["x", "y", "z"].into_iter().zip(&self.extent).map(of_axis).collect();
         let mut lines = vec![
             format!("unknowns   {} velocity components; supports hold the others", self.unknowns),

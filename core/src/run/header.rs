@@ -69,7 +69,7 @@ pub(super) fn lines<const D: usize, const S: usize>(
         None => format!("{} s", Digits(job.time.step)),
     };
     lines.push(format!(
-        "scheme     {}, steps of {} to {} s; {}, tolerance {:.0e}",
+        "scheme     {}, steps of {} to t = {} s; {}, tolerance {:.0e}",
         scheme.scheme.name(),
         lengths,
         Digits(job.time.end),
@@ -138,15 +138,16 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, job: &Job, limits: Optio
         summary.linear_iterations
     ));
     limits.into_iter().for_each(|words| log.line(format!("adaptive   {words}")));
+    let small = |share: f64| if share == 0.0 { "0".into() } else { format!("{share:.1e}") };
     let inclusion = match summary.inventory.contact_points {
         0 => String::new(),
-        _ => format!("inclusion residual at most {:.1e}, ", summary.max_inclusion_residual),
+        _ => format!("inclusion residual at most {}, ", small(summary.max_inclusion_residual)),
     };
-    let heat = summary.max_heat_imbalance.map_or(String::new(), |most| format!(", of heat {most:.1e}"));
+    let heat = summary.max_heat_imbalance.map_or(String::new(), |most| format!(", of heat {}", small(most)));
     let scheme = words_of_scheme(-summary.energy_of_scheme, job);
     log.line(format!(
-        "checks     {inclusion}energy imbalance at most {:.1e}{heat}{scheme}",
-        summary.max_energy_imbalance
+        "checks     {inclusion}energy imbalance at most {}{heat}{scheme}",
+        small(summary.max_energy_imbalance)
     ));
     if summary.max_residual > job.solver.tolerance {
         log.line(format!(

@@ -65,17 +65,22 @@ pub(super) struct LoadedArea {
 impl LoadedArea {
     /// As a line for the terminal.
     pub(super) fn line(&self) -> String {
-        let part = match &self.part {
-            None => String::new(),
-            Some(Scalar::Number(number)) => format!(" where {number}"),
-            Some(Scalar::Expression(expression)) => format!(" where {}", expression.text()),
-        };
+        let part = words_of_part(self.part.as_ref());
         let unit = if self.is_length { "m" } else { "m^2" };
         let (on, area, facets) = (self.on.join(", "), Digits(self.area), self.facets);
         format!(
             "traction   {on}{part}: {area} {unit} in {facets} facet{}",
             if facets == 1 { "" } else { "s" }
         )
+    }
+}
+
+/// The condition for the facets or nodes of a part of boundaries, if there is one, behind their names.
+pub(super) fn words_of_part(part: Option<&Scalar>) -> String {
+    match part {
+        None => String::new(),
+        Some(Scalar::Number(number)) => format!(" where {number}"),
+        Some(Scalar::Expression(expression)) => format!(" where {}", expression.text()),
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::{
     inside::{Inside, nodes_of_bodies},
+    loads::words_of_part,
     side_words::{exchange_of_sides, warning_of_overhang, warning_of_run},
     steps::shortest_step,
 };
@@ -15,7 +16,7 @@ use crate::{
         space::{axis, longest_side, surface_means},
         state::State,
     },
-    job::{self, Job, Sliding},
+    job::{self, Job, Scalar, Sliding},
     laws::{contact::Gap, digits::Digits},
     linear_algebra::tensor::{Vector, add_scaled, larger, norm},
     mesh::{Mesh, shape::facet_normal},
@@ -325,6 +326,9 @@ fn warning_of_straight_edges<const D: usize>(
 pub(super) struct ContactGaps {
     /// The boundaries.
     on: Vec<String>,
+    /// The condition for their facets, if the contact is on a part of them.
+    #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
+    part: Option<Scalar>,
     /// Smallest and largest gap in m; absent if the normal of no point meets the obstacle.
     range: Option<[f64; 2]>,
     /// What the first step does to points that start inside.
@@ -338,8 +342,8 @@ pub(super) struct ContactGaps {
 impl ContactGaps {
     /// As a line for the terminal.
     pub(super) fn line(&self) -> String {
-        let on = self.on.join(", ");
-        let Some([smallest, largest]) = self.range else {
+        let on = self.on.join(", ") + &words_of_part(self.part.as_ref());
+        let Some([smallest, largest]) = self.range.map(|range| range.map(Digits)) else {
             return format!("gap        {on}: no obstacle along the normal of any point");
         };
         let without = match self.points_without_obstacle {
@@ -352,7 +356,7 @@ impl ContactGaps {
                 rounded(speed)
             )
         });
-        format!("gap        {on}: {smallest:.4e} m to {largest:.4e} m{without}{inside}")
+        format!("gap        {on}: {smallest} m to {largest} m{without}{inside}")
     }
 }
 
@@ -373,6 +377,7 @@ pub(super) fn gaps<const D: usize, const S: usize>(
                 gaps_of_all(session, contact, state.time, &displacement);
             ContactGaps {
                 on: table.on.clone(),
+                part: table.part.clone(),
                 range: (smallest <= largest).then_some([smallest, largest]),
                 ejected: Ejected::of(job, contact, -smallest).filter(|_| -smallest > ROUNDING * size),
                 points: session.total(contact.normal.boundary().count()),

@@ -176,6 +176,12 @@ impl<'a> DrawnBody<'a> {
         Self { look, ..self }
     }
 
+    /// A drawing of another body with the options of this one, with displacements to scale.
+    pub fn alike_to_scale<'b>(&self, snapshot: &'b Snapshot) -> DrawnBody<'b> {
+        let places = places(snapshot, 1.0);
+        DrawnBody { magnification: 1.0, places, ..DrawnBody::new(snapshot).with_look(self.look) }
+    }
+
     /// The same body from another direction, if this drawing does not show its side with this outward normal.
     pub fn hidden_side(&self, normal: [f64; 3]) -> Option<Self> {
         self.view.of_hidden_side(normal).map(|view| Self { view, ..self.clone() })
@@ -788,7 +794,7 @@ mod tests {
         values[399] = 1e6;
         snapshot.fields.insert("von_mises", values);
         let picture = picture(&DrawnBody::new(&snapshot), &VON_MISES);
-        let words = "(0 to 1) × 10⁶ Pa in the cells, drawn as means at the nodes; colours from 0.010025 to 0.98997 Pa, the 1st to \
+        let words = "from 0 to 1 × 10⁶ Pa in the cells, drawn as means at the nodes; colours from 0.010025 to 0.98997 Pa, the 1st to \
                      the 99th percentile.";
         assert!(picture.caption.contains(words), "{}", picture.caption);
     }

@@ -2,6 +2,7 @@
 
 mod arc;
 mod boundary;
+mod close_up;
 mod comparison;
 mod facts;
 mod artifacts;

@@ -4,6 +4,7 @@ use super::{
     artifacts::{MissingFile, RunFiles},
     body::{self, Drawn, DrawnBody},
     boundary::{Boundary, Laws},
+    close_up::around_contact,
     facts, history,
     law::Law,
     markup::{escape, paragraph},
@@ -163,6 +164,13 @@ fn body_section(found: &RunFiles, body: &DrawnBody, snapshot: &Snapshot) -> Resu
     let is_of_body = |history: &&History| history.place == Place::Cell || !has_profiles;
     for history in snapshot.histories.iter().filter(is_of_body) {
         drawn.push(body.of_history(history)?);
+    }
+    if let Some(part) = around_contact(snapshot)
+        && let Some(Drawn::Picture(picture)) = body.alike_to_scale(&part).of_field(&VON_MISES)?
+    {
+        let picture = picture.renamed("von_mises_around_contact");
+        let caption = format!("Around the contact. {}", picture.caption);
+        drawn.push(Drawn::Picture(Picture { caption, ..picture }));
     }
     for direction in contact_directions(found, snapshot) {
         let Some(side) = body.hidden_side(direction) else { continue };

@@ -429,12 +429,13 @@ fn refuse_facets_of_no_cell<const D: usize>(
     }
     match all().find(|(_, (facet, _))| left.contains(facet)) {
         None => Ok(()),
-        Some((name, (_, element))) => {
+        Some((name, (facet, element))) => {
             let kind = if D == 2 { "line" } else { "triangle" };
-            Err(Error::Refused(format!(
-                "element {element}, a {kind} of the boundary `{name}`, is not a facet of any cell: mesh the body and its \
-                 boundary together"
-            )))
+            let fault = match facet.windows(2).any(|pair| pair[0] == pair[1]) {
+                true => "has the same node twice: delete it",
+                false => "is not a facet of any cell: mesh the body and its boundary together",
+            };
+            Err(Error::Refused(format!("element {element}, a {kind} of the boundary `{name}`, {fault}")))
         }
     }
 }

@@ -4,6 +4,7 @@
 //! factor consists of rounding errors. `K + B` with soft springs `B` along the motions on which contact laws act is regular. It is
 //! factored or used for preconditioners; the equations of the step use `K`.
 
+use super::problem::REMEDY;
 use crate::{
     error::{Error, Result},
     fem::{body::Body, coupling::Coupling},
@@ -42,17 +43,19 @@ impl Springs {
         self.free_motions.as_ref().is_some_and(|motions| !motions.is_empty())
     }
 
-    /// Adds to the failure of a step the motions that only contact can prevent, if there are any.
+    /// Adds to the failure of a step, before the usual remedies, the motions that only contact can prevent, if there are any.
     pub(super) fn explain(&self, failure: Agreed) -> Error {
-        match &self.free_motions {
-            Some(motions) if failure.is_failure() && !motions.is_empty() => Error::Failed(format!(
-                "{failure}; only contact and friction resist the following rigid motions, and there is no equilibrium if the \
-                 loads make a body slide away or lift off: {}; add supports, specify a density that is not negligible, \
-                 or change the loads",
-                motions.join("; ")
-            )),
-            _ => failure.into(),
+        let motions = self.free_motions.iter().flatten().map(String::as_str).collect::<Vec<_>>().join("; ");
+        if motions.is_empty() || !failure.is_failure() {
+            return failure.into();
         }
+        let words = failure.to_string();
+        let (why, others) = words.split_once(&format!("; {REMEDY}")).unwrap_or((words.as_str(), ""));
+        let or = if why.len() < words.len() { format!("; or {REMEDY}{others}") } else { String::new() };
+        Error::Failed(format!(
+            "{why}; only contact and friction resist the following rigid motions, and there is no equilibrium if the loads make a body slide \
+             away or lift off: {motions}; add supports, specify a density that is not negligible, or change the loads{or}"
+        ))
     }
 
     /// The rows of the matrix for steps of this length in s, with the springs. Collective.

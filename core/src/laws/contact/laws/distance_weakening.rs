@@ -32,7 +32,8 @@ pub enum Decay {
     Exponential,
 }
 
-/// Friction whose coefficient decreases from static to dynamic with the accumulated slip distance of a point. Field files and
+/// Friction whose coefficient decreases from static to dynamic with the accumulated slip distance of a point: by (static - dynamic) times
+/// min(slip / distance, 1), or 1 - exp(-slip / distance) with an exponential decay. Field files and
 /// checkpoints contain the slip as `slip`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

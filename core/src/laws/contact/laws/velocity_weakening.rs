@@ -8,7 +8,8 @@ use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Friction whose coefficient decreases from static to dynamic with the sliding velocity.
+/// Friction whose coefficient decreases from static to dynamic with the sliding velocity v, as
+/// dynamic + (static - dynamic) exp(-v / decay_velocity).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("also" = "slip_weakening, stick-slip"))]

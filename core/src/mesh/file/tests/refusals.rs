@@ -151,6 +151,7 @@ fn two_groups_of_one_name_are_one_region() {
 fn a_boundary_off_the_body_is_refused() {
     refused(&SQUARE.text().replace("1 1 4\n", "1 2 4\n"), &["element 1", "not a facet of any cell"]);
     refused(&SQUARE.text().replace("1 1 4\n", "1 1 9\n"), &["not a facet of any cell"]);
+    refused(&SQUARE.text().replace("1 1 4\n", "1 1 1\n"), &["element 1", "has the same node twice"]);
     // The diagonal is inside, the other diagonal no facet at all.
     let both = SQUARE.text().replace("1 1 4\n", "1 1 3\n").replace("2 1 2\n", "2 2 4\n");
     refused(&both, &["element 2", "not a facet of any cell"]);
