@@ -297,3 +297,48 @@ fn a_body_that_moves_as_a_whole_has_no_errors_but_rounding() {
         }
     }
 }
+
+/// A stiff block, without inertia, under these supports, tractions and contacts until this time.
+fn drifting(rest: &str, end: f64) -> Case {
+    Case::written_as(&format!(
+        "mesh.rectangle = {{ size = [1.0, 0.2], cells = [4, 2] }}
+         material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.0 }} }}
+         output.probe = [{{ name = 'foot', point = [0.5, 0.0] }}]
+         {rest}
+         time = {{ end = {end}, step = 0.1, scheme = 'implicit_euler', adaptive = {{ smallest_step = 1e-6, largest_step = 1.0 }} }}"
+    ))
+}
+
+#[test]
+fn what_drifts_without_stress_follows_the_tolerance() {
+    let guides = "support = [{ on = ['left', 'right'], fix = ['x'] }]";
+    let sinking = format!(
+        "{guides}\ntraction = [{{ on = ['top'], value = [0, -1e4] }}]\n\
+         contact = [{{ on = ['bottom'], normal.compliance = {{ stiffness = 1e6, damping = 1e6 }} }}]"
+    );
+    let on_a_dashpot = format!(
+        "{guides}\ntraction = [{{ on = ['top'], value = [0, '-1e3*t'] }}]\n\
+         contact = [{{ on = ['bottom'], normal.graph = {{ points = [[0, 0], [1, 1e6]], slope_before = 1e6, slope_after = 1e6 }} }}]"
+    );
+    let rubbing = "traction = [{ on = ['top'], value = ['1e4 + 1e3*t', -1e5] }]\n\
+                   contact = [{ on = ['bottom'], normal.unilateral = {}, friction.expression.coefficient = '0.1 + min(v, 1)' }]";
+    let drawn = "support = [{ on = ['left'], damping.normal = 1e6 }, { on = ['bottom'], fix = ['y'] }]\n\
+                 traction = [{ on = ['right'], value = ['1e3*t', 0] }]";
+    for (rest, end, column, exact) in [
+        (sinking.as_str(), 3.0, "displacement_y", -0.01 * (1.0 - f64::exp(-3.0))),
+        (on_a_dashpot.as_str(), 4.0, "displacement_y", -0.008),
+        (rubbing, 4.0, "displacement_x", 0.08),
+        (drawn, 4.0, "displacement_x", 0.008),
+    ] {
+        for (tolerance, bound) in [(1e-3, 0.02), (1e-4, 0.006)] {
+            let case = drifting(rest, end).set("time.adaptive.tolerance", &format!("{tolerance}"));
+            let results = case.run(1);
+            let (found, steps) = (results.table("probes.csv").last(column), results.number("steps"));
+            let off = (found / exact - 1.0).abs();
+            assert!(
+                off < bound && steps < 500.0,
+                "{rest}: {found} m for {exact} m in {steps} steps at {tolerance}"
+            );
+        }
+    }
+}

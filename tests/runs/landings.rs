@@ -106,3 +106,33 @@ fn a_support_of_a_body_without_mass_moves_by_the_integral_of_its_velocity_whatev
         }
     }
 }
+
+/// A strip on bonds, bent at its end by this displacement.
+fn peeled(displacement: &str, scheme: &str) -> Case {
+    Case::written_as(&format!(
+        "mesh.rectangle = {{ size = [0.1, 0.01], cells = [20, 2] }}
+         material = {{ hypothesis = 'plane_strain', elasticity = {{ youngs_modulus = 1e9, poisson_ratio = 0.3 }} }}
+         output.probe = [{{ name = 'foot', point = [0.05, 0.0] }}]
+         contact = [{{ on = ['bottom'], normal.unilateral = {{}}, adhesion = {{ stiffness = 1e10, energy = 50.0 }} }}]
+         support = [{{ on = ['right'], fix = 'all', displacement = [0, '{displacement}'] }}]
+         time = {{ end = 0.2, step = 0.01, scheme = '{scheme}' }}"
+    ))
+}
+
+#[test]
+fn bonds_hold_after_a_load_that_jumps_and_rests_and_vanish_with_it() {
+    // The state of a body without mass is that of its load, and does not change while that rests.
+    let heights = |scheme: &str| {
+        let case = peeled("5e-4*if(t < 0.05, 1, if(t < 0.1, 0, 2))", scheme).run_and_keep(1);
+        case.results().table("probes.csv").numbers("displacement_y")
+    };
+    let [euler, two_steps] = ["implicit_euler", "bdf2"].map(heights);
+    let most = euler.iter().copied().fold(0.0, f64::max);
+    assert!(most > 1e-4, "{euler:?}");
+    for (one, other) in euler.iter().zip(&two_steps) {
+        assert!((one - other).abs() < 1e-6 * most, "{euler:?} {two_steps:?}");
+    }
+    // Without load, displacements decrease until their squares underflow.
+    let case = peeled("-1e-4*if(t < 0.03, 1, 0)", "bdf2").set("time.end", "1.0").run_and_keep(1);
+    assert!(case.results().table("probes.csv").last("displacement_y").abs() < 1e-12);
+}

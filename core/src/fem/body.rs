@@ -594,6 +594,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.has_form(Form::Mass) || self.has_form(Form::Viscosity)
     }
 
+    /// Whether forces depend on velocities, those of contacts among them.
+    pub fn depends_on_velocities(&self) -> bool {
+        self.resists_velocities() || self.contacts.iter().any(Contact::depends_on_velocity)
+    }
+
     /// Whether an effect has this form in every cell of the body.
     pub fn has_form_everywhere(&self, form: Form) -> bool {
         (form != Form::Mass || self.redistributed_mass.is_none())

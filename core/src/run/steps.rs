@@ -284,7 +284,8 @@ pub(super) fn landings(job: &Job) -> Landings {
 /// After what the steps of a job forget the step before.
 fn forgets(job: &Job) -> Forgets {
     let has_mass = job.materials().all(|(_, material)| material.density.is_some());
-    let may_stick = job.contact.iter().any(|contact| contact.friction.is_some());
+    let may_stick =
+        job.contact.iter().any(|contact| contact.friction.is_some() || contact.adhesion.is_some());
     match job.time.scheme.states() {
         0 | 1 => Forgets::Nothing,
         _ if !has_mass && may_stick => Forgets::Kinks,

@@ -40,8 +40,9 @@ pub struct Adaptive {
     /// Accepted error of a step in velocities, stresses and histories, relative to the largest velocity so far and to the present
     /// stress, at least a twentieth of the largest so far, and in temperatures relative to their range so far. What friction and
     /// wear keep and the motions of obstacles moved by forces count relative to their own largest changes so far, the forces of
-    /// bonds and contact memory also relative to their own largest so far. Under schemes of first order the displacement of a body
-    /// with inertia counts relative to its way so far. The same number limits how far loads and obstacle
+    /// bonds and contact memory also relative to their own largest so far. The displacement counts relative to the
+    /// way so far: that of bodies with inertia under schemes of first order, that of bodies without where viscosity, dashpots or friction let
+    /// them drift without elastic stress. The same number limits how far loads and obstacle
     /// motions may deviate from linear functions of time within a step, relative to their largest values in the run. Errors of steps
     /// add up: what depends on all steps before, as the way of a body, wear, failing bonds or a rebound, is 2 to 4 % off under schemes of
     /// first order with the default, and a third of that for a tenth of it, in three times as many steps; under `bdf2` it is 0.5 % off, in

@@ -8,8 +8,9 @@
 //! in the compliance norm, relative to the present stress without viscosity, or to a twentieth of the largest so far: a stress that
 //! relaxes keeps its accuracy, and one that vanishes does not stop the run. It includes the stress caused by the velocity
 //! error in the step, and the errors of viscoplastic histories, damage, the bonding of adhesion and the memory pressure of contact.
-//! First-order schemes move bodies at the velocity at one end of a step; where inertia alone resists, the error of their displacement is
-//! measured, too, relative to the way so far: that of the velocity vanishes under constant forces.
+//! First-order schemes move bodies at the velocity at one end of a step: the error of their displacement is measured, too, relative to the way
+//! so far, because that of the velocity vanishes under constant forces. So is, under all schemes, that of bodies without inertia, relative to
+//! their displacement if this is larger, where viscosity, dashpots or friction let them drift without a stress that shows it.
 //! What friction and wear keep, and the motions of obstacles moved by forces, are measured against their own largest deviations from
 //! their values at the start, bonds and memory also against their own largest forces: a state of friction may change little beside a
 //! large normal stress, and a bond hold little of it, and still determine the motion.
@@ -200,7 +201,8 @@ impl<const D: usize> Adaptive<D> {
                         session.agree(state.forget_change_of_velocity())?;
                     }
                     self.step_level.jumped = !body.resists_velocities() && self.jumps(step, error);
-                    self.limits.count(of_quantities, [is_limited, error > self.settings.tolerance]);
+                    let is_beyond = error > self.settings.tolerance && !self.step_level.jumped;
+                    self.limits.count(of_quantities, [is_limited, is_beyond]);
                     self.least = self.lowest;
                     return Ok(outcome);
                 }
@@ -420,7 +422,7 @@ impl<const D: usize> Adaptive<D> {
         {
             *out = ratio(found.error, largest.max(found.size).max(found.negligible));
         }
-        ratios[QUANTITIES - 2] = ratio(way.error, self.step_level.way + way.size);
+        ratios[QUANTITIES - 2] = ratio(way.error, (self.step_level.way + way.size).max(way.negligible));
         if let Some(found) = temperature {
             let [lowest, highest] = self.step_level.range_with(found);
             ratios[QUANTITIES - 1] = ratio(found.error, (highest - lowest).max(NEGLIGIBLE_WARMTH * highest));
@@ -593,6 +595,9 @@ mod tests {
             "of the way of the step tried and of this one"
         );
         assert_eq!(adaptive.relative(found(0.0, 0.0)), 0.0);
+        let slow =
+            StepError { way: Deviation { error: 0.5, size: 1.0, negligible: 100.0 }, ..found(0.5, 1.0) };
+        assert_eq!(adaptive.relative(slow), 0.005, "of a displacement that a stage began with");
         assert!(adaptive.relative(found(f64::NAN, 1.0)).is_nan());
     }
 

@@ -6,10 +6,11 @@ use crate::{
     fem::{
         body::Body,
         effect::{Blend, CONTACT_QUANTITIES, Curvature, Deviation, FIRST_OF_OBSTACLES, Form, Step},
+        space::longest_side,
         state::State,
     },
     linear_algebra::petsc::DistributedVector,
-    mesh::Mesh,
+    mesh::{Mesh, count_free_motions},
     parallel::session::Session,
 };
 
@@ -18,6 +19,8 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// Displacements that change by this share of themselves from node to node change by rounding errors: those of the forces in a smooth motion
 /// are as many times their own as the body has cells along an edge.
 const ROUNDING: f64 = 1e3 * f64::EPSILON;
+/// Share of the size of a body without inertia below which a displacement does not count as smaller.
+const LEAST_WAY: f64 = 1e-9;
 
 /// Norms of velocity and stress.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -51,8 +54,9 @@ pub struct StepError {
     /// Without inertia, errors of velocities and stresses below these are rounding errors of displacements, as of a body that moves as a
     /// whole.
     pub rounding: Norms,
-    /// The displacement in the step in the mass norm in kg^(1/2) m, with its error: that of first-order schemes, which move the body at the velocity
-    /// at one end of the step; 0 under others and without inertia.
+    /// The displacement in the step with its error. With inertia in the mass norm in kg^(1/2) m, under first-order schemes, which move the body at
+    /// the velocity at one end of the step, and 0 under others; without, where [`Drift`] is free, the root of the squares of all nodes in m under
+    /// all schemes.
     pub way: Deviation,
     /// Norms of the quantities of contacts, squares in the calculation of the step.
     pub contact: [Deviation; CONTACT_QUANTITIES],
@@ -69,6 +73,31 @@ pub(super) struct ErrorWorkspace {
     strained: Vec<f64>,
     end: Vec<f64>,
     forces: Vec<f64>,
+    drift: Option<Drift>,
+}
+
+/// How a body without inertia may move without stress.
+#[derive(Debug, Clone, Copy, Default)]
+struct Drift {
+    /// Whether velocities, and not forces alone, determine motions that elastic stresses do not show: those as a rigid body, or of cells without
+    /// elasticity.
+    is_free: bool,
+    /// The norm of its displacement in m that does not count as smaller.
+    least: f64,
+}
+
+impl Drift {
+    /// Collective.
+    fn of<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> Result<Self> {
+        let mesh = &body.mesh;
+        let along: Vec<_> = body.held.slanted_directions().collect();
+        let free = count_free_motions(session, mesh, body.held.flags().as_chunks().0, &along)?;
+        let shows_all = free == 0 && body.has_form_everywhere(Form::Elasticity);
+        Ok(Self {
+            is_free: body.depends_on_velocities() && !shows_all,
+            least: LEAST_WAY * longest_side(session, &mesh.nodes) * (mesh.total_nodes as f64).sqrt(),
+        })
+    }
 }
 
 /// A step that is solved and not yet committed.
@@ -99,7 +128,15 @@ impl ErrorWorkspace {
         let trial = velocity.local()?;
         let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
         let values = trial.iter().zip(now.iter().zip(before.iter()));
-        let Self { curved, strained, end, forces } = self;
+        let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
+        let is_massless = form != Some(Form::Mass);
+        let drift = match self.drift {
+            Some(drift) => drift,
+            None => {
+                *self.drift.insert(if is_massless { Drift::of(session, body)? } else { Drift::default() })
+            }
+        };
+        let Self { curved, strained, end, forces, .. } = self;
         write(curved, values.clone().map(|(t, (v, p))| curvature.error([*t, *v, *p])));
         // Displacements, and stresses with them, are one order more accurate in the second-order formula.
         if blend.earlier == 0.0 {
@@ -114,7 +151,6 @@ impl ErrorWorkspace {
             [body.stress_error(curvature, end, surface), surface]
         };
         let contact = contact_deviations(session, body, curvature, (&*end, &*trial));
-        let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
         let mut square = |form: Option<Form>, x: &[f64]| {
             let Some(form) = form else { return 0.0 };
             write(forces, x.iter().map(|_| 0.0));
@@ -122,18 +158,26 @@ impl ErrorWorkspace {
             forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
         };
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
-        let is_massless = form != Some(Form::Mass);
         let strains = blend.length * blend.length * square(elastic, strained);
-        let drifts = (order == 1).then_some(form).flatten().filter(|form| *form == Form::Mass);
-        let of_way = square(drifts, strained);
+        let nodal = |x: &[f64]| match drift.is_free {
+            true => x[..D * body.mesh.owned].iter().map(|x| x * x).sum(),
+            false => 0.0,
+        };
+        let drifts = form.filter(|form| order == 1 && *form == Form::Mass);
+        let of_way = if is_massless { nodal(&strained[..]) } else { square(drifts, strained) };
+        let of_displacement = nodal(&end[..]);
         // Where nothing resists velocities, they jump with the forces: where a step follows none, that at its start may be the one of a jump.
-        let increment = if form.is_none() && step.previous_length == 0.0 {
+        let [increment, increment_of_way] = if form.is_none() && step.previous_length == 0.0 {
             write(strained, trial.iter().map(|v| 0.5 * v));
-            blend.length * blend.length * square(elastic, strained)
+            [blend.length * blend.length * square(elastic, strained), nodal(&strained[..])]
         } else {
-            strains
+            [strains, of_way]
         };
         let [velocity, all_velocity] = [square(form, curved), square(form, &trial)];
+        let all_ways = match drifts {
+            Some(_) => all_velocity,
+            None => nodal(&trial[..]),
+        };
         let [error, size] = [surface.error, surface.size];
         // Norms of displacements whose sign differs from node to node. Velocities follow from displacements, and have their rounding
         // errors over the step, also at rest far from where the body was at the start.
@@ -154,11 +198,15 @@ impl ErrorWorkspace {
             of_velocity,
             of_stress,
             of_way,
+            all_ways,
+            of_displacement,
             strains,
             increment,
+            increment_of_way,
         ]);
-        let [.., strains, increment] = squares;
-        squares[1] += if increment < strains { increment } else { strains };
+        let [.., of_way, _, _, strains, increment, increment_of_way] = squares;
+        let smaller = |increment: f64, whole: f64| if increment < whole { increment } else { whole };
+        squares[1] += smaller(increment, strains);
         // Obstacles that forces move, alike on all ranks.
         for motion in body.obstacle_motions() {
             let unit = if is_massless { step.length } else { 1.0 };
@@ -166,8 +214,21 @@ impl ErrorWorkspace {
             squares[0] += error / unit;
             squares[2] += size / unit;
         }
-        let [velocity, stress, all_velocity, all_stress, error, size, of_velocity, of_stress, of_way, ..] =
-            squares.map(|square| if square > 0.0 { square.sqrt() } else { square });
+        let [
+            velocity,
+            stress,
+            all_velocity,
+            all_stress,
+            error,
+            size,
+            of_velocity,
+            of_stress,
+            _,
+            all_ways,
+            of_displacement,
+            ..,
+        ] = squares.map(root);
+        let of_way = root(smaller(increment_of_way, of_way));
         // With mass both norms are roots of energies: a free body has a stress of rounding errors, a fixed one a velocity of
         // rounding errors. Without mass the square of a velocity norm is a power.
         let unit = if is_massless { step.length.sqrt() } else { 1.0 };
@@ -177,15 +238,20 @@ impl ErrorWorkspace {
             negligible: Norms { velocity: NEGLIGIBLE / unit, stress: NEGLIGIBLE * unit },
             rounding: Norms { velocity: ROUNDING * of_velocity, stress: ROUNDING * of_stress },
             way: Deviation {
-                error: step.length * of_way,
-                size: if drifts.is_some() { step.length * all_velocity } else { 0.0 },
-                negligible: 0.0,
+                error: blend.length * of_way,
+                size: step.length * all_ways,
+                negligible: of_displacement.max(drift.least),
             },
             contact,
             surface: Deviation { error, size, negligible: NEGLIGIBLE * NEGLIGIBLE * all_stress },
             temperature: None,
         })
     }
+}
+
+/// The root of a square, negative rounding errors as they are.
+fn root(square: f64) -> f64 {
+    if square > 0.0 { square.sqrt() } else { square }
 }
 
 /// The norms of the quantities of all contacts over all ranks. Collective where there is contact.

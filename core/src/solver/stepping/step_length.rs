@@ -32,7 +32,7 @@ pub enum Forgets {
     Jumps,
     /// Kinks of loads, steps over jumps and over kinks that are too near to end there, in which a body without mass jumps, too, and the
     /// first step, over the jump of loads that are there at its start: a point with friction that sticks from then on would slide on with
-    /// a share of its last velocity.
+    /// a share of its last velocity, and bonds that hold would go on failing.
     Kinks,
 }
 

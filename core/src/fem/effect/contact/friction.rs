@@ -175,6 +175,13 @@ impl<const D: usize> Friction<D> {
         self.law.steepest_decrease(self.context) > 0.0
     }
 
+    /// Whether the coefficient, or a bound without pressure, depends on the sliding velocity in the current step: it differs at one of these speeds in
+    /// m/s from that at rest.
+    pub fn depends_on_speed(&self) -> bool {
+        let at = |speed: f64| self.law.coefficient(speed, self.context);
+        [1e-9, 1e-6, 1e-3, 1.0].into_iter().any(|speed| at(speed) != at(0.0))
+    }
+
     /// The largest share of its coefficient of friction that a point under pressure lost on this rank in the step just committed, from the
     /// velocities at its end and at its start, with ghosts; `None` where coefficients cannot fall, on all ranks alike.
     pub fn fall(&self, [velocity, before]: [&[f64]; 2]) -> Option<f64> {

@@ -172,6 +172,13 @@ impl<const D: usize> Contact<D> {
     pub fn monotonicity_constant(&self) -> f64 {
         self.normal.law.monotonicity_constant(self.blend.way())
     }
+
+    /// Whether its pressures or friction coefficients depend on velocities.
+    pub fn depends_on_velocity(&self) -> bool {
+        let law = &self.normal.law;
+        let of_pressure = law.damping() > 0.0 || !(law.depends_on_displacement() || law.is_zero());
+        of_pressure || self.friction.as_ref().is_some_and(Friction::depends_on_speed)
+    }
 }
 
 /// Largest number of iterations for the erosion at a point.

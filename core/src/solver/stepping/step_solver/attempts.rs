@@ -459,8 +459,7 @@ impl StepSolver {
         // An estimate of the forces as if they were equal in all unknowns. At rest under steady loads the forces cancel, and a body that
         // its obstacle has released has none: the accuracy of pressures is then limited by rounding errors.
         let accuracy = self.settings.inclusion_tolerance;
-        let size = norm.max(rounding.max(product) / accuracy);
-        let size = if size > 0.0 { size.max(LEAST_REFERENCE) } else { 0.0 };
+        let size = norm.max(rounding.max(product) / accuracy).max(LEAST_REFERENCE);
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
         // The forces that drive obstacles are among those of the step.
         let mut driving = 0.0;
