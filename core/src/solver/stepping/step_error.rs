@@ -55,8 +55,8 @@ pub struct StepError {
     /// whole.
     pub rounding: Norms,
     /// The displacement in the step with its error. With inertia in the mass norm in kg^(1/2) m, under first-order schemes, which move the body at
-    /// the velocity at one end of the step, and 0 under others; without, where [`Drift`] is free, the root of the squares of all nodes in m under
-    /// all schemes.
+    /// the velocity at one end of the step, and 0 under others. Without inertia the root of the squares of all nodes in m, under all schemes,
+    /// where velocities determine motions that stresses do not show.
     pub way: Deviation,
     /// Norms of the quantities of contacts, squares in the calculation of the step.
     pub contact: [Deviation; CONTACT_QUANTITIES],
