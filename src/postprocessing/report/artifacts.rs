@@ -183,8 +183,9 @@ impl RunFiles {
     }
 }
 
-/// Clears rounding errors, up to which size they are, places the body where displacements count from, and adds the contact pressure where the file has tractions alone: their part along the
-/// normal, and all of the traction of a node that touches alone. Those of bonds and of contact memory are not pressures.
+/// Clears rounding errors, up to which size they are, places the body where displacements count from, and adds the contact pressure where the
+/// file has tractions alone: their part along the normal, and all of the traction of a node that touches alone. Those of bonds and of contact
+/// memory are not pressures.
 fn complete(snapshot: &mut Snapshot, rounding: &BTreeMap<String, f64>, job: Option<&Job>) {
     snapshot.clear_below(rounding);
     snapshot.start_from_origin();
